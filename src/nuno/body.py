@@ -1,0 +1,289 @@
+"""Body: coordinates, a shape, a colour, and dynamics while they are attached; static by default."""
+
+from __future__ import annotations
+
+import uuid
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno import quaternion as quat
+from nuno.coordinates import Coordinates, Pose, apply, compose, invert
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.materials import Cloth
+from nuno.shape import Shape, Sheet
+from nuno.surface import SurfacePoints, closest_points, sheet_points
+from nuno.validation import finite_array
+
+if TYPE_CHECKING:
+    from nuno.dynamics import Dynamics
+    from nuno.simulation import Simulation
+
+Color = str | tuple[float, float, float]
+ALL_GROUPS = 0xFFFFFFFF
+
+
+class BodyOptions(TypedDict, total=False):
+    """What every body takes, as keyword arguments; ``Body`` says what each is."""
+
+    name: str | None
+    position: ArrayLike | None
+    quaternion: ArrayLike
+    color: Color
+    friction: Any
+    group: int
+    collides_with: int
+
+
+class Body(Coordinates):
+    """A thing in the world. Its position is the shape's centre.
+
+    Args:
+        shape: What it looks like in its own frame.
+        name: A name; the world numbers a name that is taken ("box", "box_1" ...). None is the shape's kind.
+        position: (3,) or (worlds, 3) [m]; None leaves a mesh where its vertices are, others at the origin.
+        quaternion: (4,) or (worlds, 4), (w, x, y, z).
+        color: A name ("gray", "#4080c0") or (r, g, b) in [0, 1].
+        friction: Coulomb's coefficient, a number or (worlds,); a pair takes the geometric mean.
+        group: Bit mask of the collision groups that the body is in.
+        collides_with: Bit mask of the groups that it touches; both bodies of a pair must agree.
+
+    Raises:
+        InvalidInputError: a value that is not finite, of another shape, or out of range.
+    """
+
+    def __init__(
+        self, shape: Shape, *, name: str | None = None, position: ArrayLike | None = None,
+        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0), color: Color = "gray", friction: Any = 0.5,
+        group: int = 1, collides_with: int = ALL_GROUPS,
+    ) -> None:  # fmt: skip
+        if not isinstance(shape, Shape):
+            raise InvalidInputError(f"a body needs a shape such as Box or Sheet, got {type(shape).__name__}")
+        super().__init__(shape.centre if position is None else position, quaternion)
+        if name is not None and (not isinstance(name, str) or not name):
+            raise InvalidInputError(f"a name is a string that is not empty, got {name!r}")
+        self.key = uuid.uuid4().hex  # the same for copies of the body in imagined worlds and in files
+        self._shape = shape
+        self._name = name or shape.kind
+        self._world: Simulation | None = None
+        self._dynamics: Dynamics | None = None
+        # Vertices (worlds, n, 3) of a static body that dynamics have deformed, and the pose they belong to.
+        self._deformed: tuple[np.ndarray, Pose] | None = None
+        self._friction = _checked_friction(friction)
+        self._thickness = float(Cloth.thickness) if shape.is_cloth else 0.0
+        self._group, self._collides_with = _mask("group", group), _mask("collides_with", collides_with)
+        self.color = color
+
+    def __repr__(self) -> str:
+        state = "dynamic" if self.is_dynamic else "static"
+        return f"<{self._shape.kind} {self._name!r}, {state}>"
+
+    @property
+    def name(self) -> str:
+        """The name, unique in its world."""
+        return self._name
+
+    @property
+    def shape(self) -> Shape:
+        """The shape in the body's own frame, before anything deformed it."""
+        return self._shape
+
+    @property
+    def material(self) -> Cloth | None:
+        """The material of its dynamics, None while it is static."""
+        return None if self._dynamics is None else self._dynamics.material
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether dynamics are attached."""
+        return self._dynamics is not None
+
+    @property
+    def is_deformed(self) -> bool:
+        """Whether the body is static in another shape than ``shape``."""
+        return self._deformed is not None
+
+    @property
+    def thickness(self) -> float:
+        """Contact thickness [m] of a cloth, its last material's (in a batch the largest); 0 for solids."""
+        return self._thickness if self._dynamics is None else float(np.max(self._dynamics.material.thickness))
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether it has an inside: all shapes but cloths and meshes that are open or inside out."""
+        return self._shape.is_solid
+
+    @property
+    def friction(self) -> Any:
+        """Coulomb's coefficient, a number or (worlds,); ``attach`` takes the material's over."""
+        return self._friction
+
+    @friction.setter
+    def friction(self, value: Any) -> None:
+        self._change("_friction", _checked_friction(value))
+
+    @property
+    def group(self) -> int:
+        """Bit mask of the collision groups that the body is in."""
+        return self._group
+
+    @group.setter
+    def group(self, value: int) -> None:
+        self._change("_group", _mask("group", value))
+
+    @property
+    def collides_with(self) -> int:
+        """Bit mask of the collision groups that the body touches."""
+        return self._collides_with
+
+    @collides_with.setter
+    def collides_with(self, value: int) -> None:
+        self._change("_collides_with", _mask("collides_with", value))
+
+    @property
+    def faces(self) -> np.ndarray:
+        """(m, 3) int32, a copy."""
+        return self._shape.mesh()[1].copy()
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n, 3), in a batch (worlds, n, 3), float64 [m]: a copy, in the world frame."""
+        with self._guard():
+            vertices = self._vertices()
+            count = 1 if self._world is None else self._world.world_count
+        if count > 1:
+            return np.array(np.broadcast_to(vertices, (count, *vertices.shape[-2:])))
+        return np.array(vertices[0] if len(vertices) == 1 and vertices.ndim == 3 else vertices)
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return vertices, (n, 3) where all worlds share them, else (worlds, n, 3), and faces: read-only."""
+        with self._guard():
+            return self._vertices(), self._shape.mesh()[1]
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """(n, 3), in a batch (worlds, n, 3), float64 [m/s]: a copy; zero while the body is static."""
+        with self._guard():
+            if self._dynamics is None:
+                return np.zeros_like(self.vertices)
+            velocities = self._dynamics.solver.velocities().astype(np.float64)
+        return velocities if len(velocities) > 1 else velocities[0]
+
+    def at(self, u: ArrayLike, v: ArrayLike) -> SurfacePoints:
+        """Return the points of a sheet at u (along its x) and v (along its y), each in [0, 1].
+
+        Args:
+            u: A number, (k,), or (worlds, k).
+            v: Likewise.
+
+        Raises:
+            InvalidInputError: the body is no sheet, or a value is outside [0, 1].
+        """
+        if not isinstance(self._shape, Sheet):
+            raise InvalidInputError(f"only a sheet has points (u, v); {self._name!r} is a {self._shape.kind}")
+        shapes = ((), ("k",), ("worlds", "k"))
+        try:
+            us, vs = np.broadcast_arrays(finite_array("u", u, *shapes), finite_array("v", v, *shapes))
+        except ValueError as error:
+            raise InvalidInputError(f"u and v must fit each other: {error}") from error
+        if min(us.min(), vs.min()) < 0.0 or max(us.max(), vs.max()) > 1.0:
+            raise InvalidInputError(f"u and v must lie in [0, 1], got u = {u!r}, v = {v!r}")
+        return sheet_points(self._shape.cells, np.atleast_1d(us), np.atleast_1d(vs))
+
+    def closest(self, points: ArrayLike) -> SurfacePoints:
+        """Return the surface points closest to ``points`` (3,), (k, 3) or (worlds, k, 3) [m] of the world."""
+        asked = finite_array("points", points, (3,), ("k", 3), ("worlds", "k", 3))
+        asked = asked[None] if asked.ndim == 1 else asked
+        vertices, faces = self.vertices, self._shape.mesh()[1]
+        if asked.ndim == 2 and vertices.ndim == 2:
+            return closest_points(asked, vertices, faces)
+        count = len(vertices) if vertices.ndim == 3 else 1
+        if asked.ndim == 3 and len(asked) != count:
+            raise InvalidInputError(f"points by world must be (k, 3) or ({count}, k, 3), got {asked.shape}")
+        asked = np.broadcast_to(asked, (count, *asked.shape[-2:]))
+        found = [
+            closest_points(p, v, faces) for p, v in zip(asked, vertices.reshape(count, -1, 3), strict=True)
+        ]
+        return SurfacePoints(np.stack([f.faces for f in found]), np.stack([f.barycentric for f in found]))
+
+    def _guard(self) -> AbstractContextManager[Any]:
+        return nullcontext() if self._world is None else self._world.lock
+
+    def _change(self, attribute: str, value: Any) -> None:
+        with self._guard():
+            if self._world is not None:
+                self._world._check_worlds(attribute.strip("_"), np.shape(value))
+            setattr(self, attribute, value)
+            if self._world is not None:
+                self._world._body_changed(self)
+
+    def _vertices(self) -> np.ndarray:
+        """Return (n, 3) or (worlds, n, 3), not to be written to."""
+        if self._dynamics is not None:
+            return self._dynamics.solver.positions().astype(np.float64)
+        pose = self._pose()
+        if self._deformed is None:
+            return apply(pose, self._shape.mesh()[0])
+        vertices, base = self._deformed
+        if all(np.array_equal(a, b) for a, b in zip(pose, base, strict=True)):
+            return vertices
+        return apply(compose(pose, invert(base)), vertices)
+
+    def _pose(self) -> Pose:
+        if self._dynamics is None:
+            return super()._pose()
+        with self._guard():
+            return _centre(self._vertices()), self._quaternion
+
+    def _place(self, position: np.ndarray, quaternion: np.ndarray) -> None:
+        with self._guard():
+            if self._world is not None:
+                self._world._check_worlds("position", position.shape[:-1])
+                self._world._check_worlds("quaternion", quaternion.shape[:-1])
+            if self._dynamics is None:
+                super()._place(position, quaternion)
+                return
+            # A dynamic body is put elsewhere as a whole: its shape is kept and its velocity turns along.
+            old = self._pose()
+            motion = compose((position, quaternion), invert(old))
+            solver = self._dynamics.solver
+            turned = quat.rotate(motion[1][..., None, :], solver.velocities().astype(np.float64))
+            solver.set_state(apply(motion, self._vertices()), turned.astype(np.float32))
+            self._quaternion = quaternion
+            self._moved()
+
+    def _follow(self, parent: Coordinates) -> None:
+        if self._dynamics is not None:
+            raise BodyStateError(f"{self._name!r} is dynamic and cannot follow a frame; grip it instead")
+        with self._guard():
+            super()._follow(parent)
+
+    def _moved(self) -> None:
+        if self._world is not None:
+            self._world._body_changed(self)
+        super()._moved()
+
+    def _freeze(self, vertices: np.ndarray) -> None:
+        """Keep the vertices (worlds, n, 3) as the shape of the static body, at its present orientation."""
+        self._position = _centre(vertices)
+        self._deformed = (vertices, (self._position, self._quaternion))
+
+
+def _centre(vertices: np.ndarray) -> np.ndarray:
+    centre = vertices.mean(axis=-2)
+    return centre[0] if centre.ndim == 2 and len(centre) == 1 else centre
+
+
+def _checked_friction(value: Any) -> Any:
+    friction = finite_array("friction", value, (), ("worlds",))
+    if (friction < 0.0).any():
+        raise InvalidInputError(f"friction must be at least 0, got {value!r}")
+    return float(friction) if friction.ndim == 0 else friction
+
+
+def _mask(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= ALL_GROUPS:
+        raise InvalidInputError(f"{name} must be a bit mask from 0 to {ALL_GROUPS:#x}, got {value!r}")
+    return int(value)

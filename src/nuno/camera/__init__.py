@@ -1,0 +1,1 @@
+"""Cameras: pinhole geometry, offscreen rendering, and finding the cloth in images."""

@@ -1,0 +1,138 @@
+"""The pinhole camera, in OpenCV's axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.errors import InvalidInputError
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A calibrated pinhole camera: x right, y down, z forward; integer pixels are centres.
+
+    Attributes:
+        width: Image width [px].
+        height: Image height [px].
+        fx: Focal length along x [px].
+        fy: Focal length along y [px].
+        cx: Principal point x [px].
+        cy: Principal point y [px].
+        camera_to_world: (4, 4) float, X_world = R X_camera + t [m].
+        distortion: OpenCV's coefficients (k1, k2, p1, p2[, k3 ...]), or None.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    camera_to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
+    distortion: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        pose = np.asarray(self.camera_to_world, dtype=float)
+        if pose.shape != (4, 4) or not np.isfinite(pose).all():
+            raise InvalidInputError(f"camera_to_world must be a finite (4, 4) matrix, got shape {pose.shape}")
+        rotation = pose[:3, :3]
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+            raise InvalidInputError("the upper left (3, 3) of camera_to_world must be a rotation matrix")
+        if int(self.width) <= 0 or int(self.height) <= 0:
+            raise InvalidInputError(f"an image needs pixels, got {self.width} x {self.height}")
+        intrinsics = np.array([self.fx, self.fy, self.cx, self.cy], dtype=float)
+        if not np.isfinite(intrinsics).all() or self.fx <= 0 or self.fy <= 0:
+            raise InvalidInputError(f"fx, fy must be positive and finite, got fx={self.fx}, fy={self.fy}")
+        object.__setattr__(self, "camera_to_world", pose)
+        if self.distortion is not None:
+            object.__setattr__(self, "distortion", np.asarray(self.distortion, dtype=float).ravel())
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Camera:
+        """Build a camera from the ``camera`` entry of an input.json.
+
+        Raises:
+            InvalidInputError: an entry is missing or not usable.
+        """
+        names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
+        if not isinstance(data, Mapping):
+            raise InvalidInputError(f"a camera is an object with {', '.join(names)}, got {type(data).__name__}")
+        missing = [name for name in names if name not in data]
+        if missing:
+            raise InvalidInputError(f"the camera lacks {', '.join(missing)}; it needs {', '.join(names)}")
+        try:
+            return cls(
+                int(data["width"]), int(data["height"]), *(float(data[k]) for k in ("fx", "fy", "cx", "cy")),
+                camera_to_world=np.asarray(data["camera_to_world"], dtype=float), distortion=data.get("distortion"),
+            )  # fmt: skip
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"the camera's entries are not numbers: {error}") from error
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(3, 3) float, the intrinsic matrix K."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def world_to_camera(self) -> np.ndarray:
+        """(4, 4) float, the inverse of ``camera_to_world``."""
+        return np.linalg.inv(self.camera_to_world)
+
+    def scaled(self, factor: float) -> Camera:
+        """The same view with ``factor`` times as many pixels each way (pixel centres stay centres)."""
+        return replace(
+            self, width=max(1, round(self.width * factor)), height=max(1, round(self.height * factor)),
+            fx=self.fx * factor, fy=self.fy * factor,
+            cx=(self.cx + 0.5) * factor - 0.5, cy=(self.cy + 0.5) * factor - 0.5,
+        )  # fmt: skip
+
+    def depth_of(self, points: ArrayLike) -> np.ndarray:
+        """Depth [m] (..., ) of world points (..., 3) along the optical axis; negative behind the camera."""
+        pose = self.camera_to_world
+        return (np.asarray(points, dtype=float) - pose[:3, 3]) @ pose[:3, 2]
+
+    def project(self, points: ArrayLike) -> np.ndarray:
+        """Pixels (..., 2) of world points (..., 3) [m]; NaN for points behind the camera."""
+        points = np.asarray(points, dtype=float)
+        pose = self.camera_to_world
+        local = (points - pose[:3, 3]) @ pose[:3, :3]
+        depth = np.where(local[..., 2] > 1e-9, local[..., 2], np.nan)
+        xy = local[..., :2] / depth[..., None]
+        if self.distortion is not None:
+            import cv2
+
+            flat = np.concatenate([xy.reshape(-1, 2), np.ones((xy.size // 2, 1))], axis=1)
+            pixels = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), self.matrix, self.distortion)[0]
+            return pixels.reshape(points.shape[:-1] + (2,))
+        return xy * (self.fx, self.fy) + (self.cx, self.cy)
+
+    def rays(self, pixels: ArrayLike) -> np.ndarray:
+        """Directions (..., 3) in the world through pixels (..., 2), scaled to one metre of depth."""
+        pixels = np.asarray(pixels, dtype=float)
+        if self.distortion is not None:
+            import cv2
+
+            xy = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion).reshape(pixels.shape)
+        else:
+            xy = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+        local = np.concatenate([xy, np.ones(xy.shape[:-1] + (1,))], axis=-1)
+        return local @ self.camera_to_world[:3, :3].T
+
+    def back_project(self, pixels: ArrayLike, height: float) -> np.ndarray:
+        """World points (..., 3) [m] where the rays of pixels (..., 2) meet the plane z = height.
+
+        Raises:
+            InvalidInputError: a ray does not meet the plane in front of the camera.
+        """
+        rays = self.rays(pixels)
+        origin = self.camera_to_world[:3, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = (height - origin[2]) / rays[..., 2]
+        if not (np.isfinite(distance) & (distance > 0)).all():
+            raise InvalidInputError(f"a pixel's ray does not meet the plane z = {height} in front of the camera")
+        return origin + distance[..., None] * rays

@@ -1,0 +1,223 @@
+"""A flat cloth on a table: a first look for the region, then its pixels."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from nuno.camera.appearance import Illumination, colour_density, discriminant, guided_filter
+from nuno.camera.camera import Camera
+from nuno.camera.regions import fill_holes, grow, shrink
+from nuno.camera.table import Table, plane_coordinates, table_margin
+from nuno.errors import ClothNotFoundError
+
+_STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture average out
+_DIFFERENT = 4.0  # standard deviations of the table's own colour
+_CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a stain
+_SMALLEST = 20  # [blocks] of a region that may be a cloth
+
+
+def first_look(
+    rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the cloth roughly.
+
+    Args:
+        rgb: (h, w, 3) uint8.
+        camera: The camera.
+        table: The table; with half_extents, or else the cloth is sought as a rectangle that the table
+            surrounds.
+        hint: (2,) a pixel on the cloth, (4,) a box around it, or None.
+
+    Returns:
+        The cloth, and where the table may be seen: two (h // 4, w // 4) bool.
+
+    Raises:
+        ClothNotFoundError: there is none.
+    """
+    h, w = rgb.shape[0] // _STEP, rgb.shape[1] // _STEP
+    small = cv2.resize(rgb[: h * _STEP, : w * _STEP], (w, h), interpolation=cv2.INTER_AREA).astype(np.float32)
+    xy = plane_coordinates(camera, table.height, _STEP)
+    box = None
+    if hint is not None and len(hint) == 4:
+        box = np.zeros((h, w), dtype=bool)
+        u0, v0, u1, v1 = np.round((hint + 0.5) / _STEP).astype(int)
+        box[max(v0, 0) : max(v1, v0 + 1), max(u0, 0) : max(u1, u0 + 1)] = True
+    if table.half_extents is not None:
+        margin = table_margin(table, xy)
+        surface = shrink(margin > 0, 1)
+        rim = surface & (margin < 0.3)
+    else:
+        surface = shrink(np.isfinite(xy[..., 0]), 1)
+        rim = np.zeros_like(surface)
+    if box is not None:
+        around = grow(box, max(4, int(0.2 * np.sqrt(box.sum()))))
+        surface &= around
+        rim = surface & ~box
+    if surface.sum() < 30:
+        raise ClothNotFoundError("no cloth: the camera does not see the table, or not where the hint is")
+    if not rim.any() and table.half_extents is None:
+        return _surrounded(small, xy, hint)
+    rim = rim if rim.sum() > 30 else surface
+    light = Illumination(small, np.where(rim, 1.0, 0.1) * surface)
+    flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, h), slice(0, w))))
+    distance = _difference(cv2.blur(flat, (3, 3)), rim, surface)
+    found = (distance > _DIFFERENT) & (surface if box is None else surface & box)
+    found = cv2.morphologyEx(found.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    found = cv2.morphologyEx(found, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    pixel = None if box is not None else hint
+    return _choose(found, distance, pixel, xy if hint is None else None), surface
+
+
+def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.ndarray:
+    """How many standard deviations of the table's own colour each pixel differs from it."""
+    values = flat[rim]
+    centre = np.median(values, axis=0)
+    for _ in range(4):
+        covariance = np.cov((values - centre).T) + 0.015**2 * np.eye(3)
+        offset = flat - centre
+        distance = np.sqrt(np.einsum("...i,ij,...j->...", offset, np.linalg.inv(covariance), offset))
+        inliers = surface & (distance < 3.5)
+        if inliers.sum() < 30:
+            break
+        values = flat[inliers]
+        centre = values.mean(axis=0)
+    return distance
+
+
+def _choose(
+    found: np.ndarray, distance: np.ndarray, pixel: np.ndarray | None, xy: np.ndarray | None
+) -> np.ndarray:
+    """The part (h, w) bool at a pixel of the full image, or else the one that is largest and differs most.
+
+    Where plane coordinates xy (h, w, 2) are given, it must have a cloth's size on the plane.
+    """
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(found, connectivity=4)
+    stats[0, cv2.CC_STAT_AREA] = 0
+    large = stats[:, cv2.CC_STAT_AREA] >= _SMALLEST
+    if not large.any():
+        raise ClothNotFoundError(
+            f"no cloth: nothing of at least {_SMALLEST * _STEP**2} pixels on the table looks different from the table"
+        )
+    if pixel is None:
+        mass = np.bincount(labels.ravel(), weights=np.minimum(distance, 20).ravel(), minlength=count)
+        best = fill_holes(labels == int(np.where(large, mass, 0.0).argmax()))
+        if xy is not None:
+            contours, _ = cv2.findContours(best.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+            size, _ = _size_on_plane(max(contours, key=len)[:, 0], xy)
+            if min(size) < _CLOTH_SIDES[0]:
+                raise ClothNotFoundError(
+                    f"no cloth: the largest thing on the table that differs from it is {size[0]:.2f} x {size[1]:.2f} m, "
+                    f"and without a hint a cloth is at least {_CLOTH_SIDES[0]} m across"
+                )
+        return best
+    part = _label_near(np.where(large[labels], labels, 0), pixel)
+    if part == 0:
+        raise ClothNotFoundError(f"no cloth at the hint {pixel.tolist()}: it looks like the table there")
+    return fill_holes(labels == part)
+
+
+def _label_near(labels: np.ndarray, pixel: np.ndarray) -> int:
+    """The label at a pixel of the full image or within 2 blocks of it, or 0."""
+    rows, columns = np.nonzero(labels)
+    away = np.hypot(*(np.stack([columns, rows]) - ((pixel + 0.5) / _STEP - 0.5)[:, None]))
+    return int(labels[rows[away.argmin()], columns[away.argmin()]]) if len(away) and away.min() <= 2.0 else 0
+
+
+def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """A rectangle on the plane that one even surface surrounds, and that surface with it.
+
+    For a range of how much colour may change from block to block, even surfaces are followed as far as they
+    go; what such a surface encloses, and makes a rectangle of a cloth's size on the table's plane, may be the
+    cloth. The largest one is.
+    """
+    smooth = cv2.medianBlur(np.clip(small, 0, 255).astype(np.uint8), 5).astype(np.float32)
+    change = cv2.morphologyEx(smooth, cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)).max(axis=-1)
+    best, answer = 0.0, None
+    for limit in (6.0, 9.0, 13.0, 18.0, 25.0, 35.0):
+        even = (change < limit) & np.isfinite(xy[..., 0])
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(even.astype(np.uint8), connectivity=4)
+        for label in np.flatnonzero(stats[:, cv2.CC_STAT_AREA] > 0.03 * even.size):
+            if label == 0:
+                continue
+            surface = cv2.morphologyEx((labels == label).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+            contours, tree = cv2.findContours(surface, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+            for contour, (_, _, _, parent) in zip(contours, tree[0], strict=True):
+                if parent < 0 or len(contour) < 16:
+                    continue
+                hole = np.zeros(surface.shape, dtype=np.uint8)
+                cv2.drawContours(hole, [contour], -1, 1, thickness=cv2.FILLED)
+                blob = hole.astype(bool) & ~surface.astype(bool)
+                if blob.sum() < _SMALLEST or (pixel is not None and _label_near(blob.astype(int), pixel) == 0):
+                    continue
+                size, likeness = _size_on_plane(contour[:, 0], xy)
+                if likeness < 0.8 or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:
+                    continue
+                if likeness * np.sqrt(blob.sum()) > best:
+                    best, answer = likeness * np.sqrt(blob.sum()), (fill_holes(blob), fill_holes(surface.astype(bool)))
+    if answer is None:
+        raise ClothNotFoundError(
+            "no cloth: nothing that the table surrounds is a rectangle on its plane; the table's half_extents,
+            or a box " "around the cloth as a hint, would help"
+        )
+    return answer
+
+
+def _size_on_plane(outline: np.ndarray, xy: np.ndarray) -> tuple[tuple[float, float], float]:
+    """Sides [m] of the smallest rectangle on the plane around an outline (k, 2), and the share of it that it
+    fills.""" ground = xy[outline[:, 1], outline[:, 0]]
+    if not np.isfinite(ground).all():
+        return (0.0, 0.0), 0.0
+    ground = (ground - ground.mean(axis=0)).astype(np.float32)
+    _, size, _ = cv2.minAreaRect(ground)
+    return (float(size[0]), float(size[1])), cv2.contourArea(ground) / max(size[0] * size[1], 1e-9)
+
+
+def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray:
+    h, w = rgb.shape[:2]
+    full = (w // _STEP * _STEP, h // _STEP * _STEP)
+
+    def enlarge(small: np.ndarray) -> np.ndarray:
+        big = cv2.resize(small.astype(np.uint8), full, interpolation=cv2.INTER_NEAREST)
+        return np.pad(big, ((0, h - full[1]), (0, w - full[0])), mode="edge").astype(bool)
+
+    labels, table = enlarge(blob), enlarge(surface)
+    rows, columns = np.flatnonzero(labels.any(axis=1)), np.flatnonzero(labels.any(axis=0))
+    pad = 12 + int(0.15 * max(np.ptp(rows), np.ptp(columns)))
+    window = (
+        slice(max(0, rows[0] - pad), min(h, rows[-1] + pad + 1)),
+        slice(max(0, columns[0] - pad), min(w, columns[-1] + pad + 1)),
+    )
+    image = rgb[window].astype(np.float32)
+    labels, table = labels[window], table[window]
+    around = table & ~grow(labels, 8)
+    # Divide by the light on the table: then one colour is one colour from end to end.
+    step = image[::2, ::2]
+    light = Illumination(step, around[::2, ::2].astype(float), full_shape=image.shape[:2], degree=1)
+    field = light.field((slice(0, image.shape[0]), slice(0, image.shape[1])))
+    image = np.clip(image / field * light.level(), 0, 255)
+    inside = shrink(labels, 5) if shrink(labels, 5).sum() > 20 else labels
+    for turn in range(3):
+        soft = cv2.GaussianBlur(image, (0, 0), 0.8)
+        ratio = np.log(colour_density(soft[inside], soft) / colour_density(soft[around], soft))
+        ratio = np.clip(ratio, -6, 6)
+        guide = discriminant(soft, inside, around)
+        score = guided_filter(ratio, guide, radius=4 if turn < 2 else 3, epsilon=0.05)
+        labels = _near(score > 0, labels)
+        inside, around = shrink(labels, 3), table & ~grow(labels, 4)
+        if inside.sum() < 20 or around.sum() < 20:
+            break
+    if labels.sum() < 0.5 * blob.sum() * _STEP**2:
+        raise ClothNotFoundError("no cloth: what looked like one dissolved on a closer look")
+    mask = np.zeros((h, w), dtype=bool)
+    mask[window] = labels
+    return mask
+
+
+def _near(found: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """The part of what was found that overlaps the labels most, without holes and hairs."""
+    opened = cv2.morphologyEx(found.astype(np.uint8), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
+    count, parts = cv2.connectedComponents(opened, connectivity=4)
+    overlap = np.bincount(parts[labels], minlength=count)
+    overlap[0] = 0
+    return fill_holes(parts == overlap.argmax()) if overlap.any() else np.zeros_like(labels)

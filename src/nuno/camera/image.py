@@ -1,0 +1,80 @@
+"""Reading images, and checking that they fit their camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.camera import Camera
+from nuno.errors import ImageError
+
+
+def read_image(path: str | Path) -> np.ndarray:
+    """Read an image file.
+
+    Args:
+        path: A file that OpenCV can decode (PNG, JPEG, BMP, TIFF ...).
+
+    Returns:
+        (h, w, 3) uint8, RGB.
+
+    Raises:
+        ImageError: there is no such file, or it holds no image that can be decoded.
+    """
+    import cv2
+
+    path = Path(path)
+    if not path.is_file():
+        raise ImageError(f"no image file at {path}")
+    # imdecode instead of imread: imread prints its own warning and cannot open every path on Windows.
+    data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    if image is None:
+        raise ImageError(
+            f"{path} ({data.size} bytes) holds no image that OpenCV can decode (PNG, JPEG, TIFF ...)"
+        )
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def check_image(image: ArrayLike, camera: Camera, name: str = "image") -> np.ndarray:
+    """Return the image as an array if it is RGB, uint8 and of the camera's size.
+
+    Args:
+        image: (h, w, 3) uint8, RGB.
+        camera: The camera that took it.
+        name: What to call it in a message.
+
+    Raises:
+        ImageError: it is not.
+    """
+    array = np.asarray(image)
+    expected = (camera.height, camera.width, 3)
+    if array.shape != expected or array.dtype != np.uint8:
+        raise ImageError(
+            f"{name} must be RGB uint8 of shape {expected} to fit its camera, "
+            f"got {array.dtype} of shape {array.shape}"
+        )
+    return array
+
+
+def check_mask(mask: ArrayLike, camera: Camera, name: str = "mask") -> np.ndarray:
+    """Return the mask as bool (h, w) if it is of the camera's size.
+
+    Args:
+        mask: (h, w) bool, or numbers of which those over half of the largest count as set (0 and 255 in
+            files).
+        camera: The camera whose image it masks.
+        name: What to call it in a message.
+
+    Raises:
+        ImageError: it is of another shape.
+    """
+    array = np.asarray(mask)
+    expected = (camera.height, camera.width)
+    if array.shape != expected:
+        raise ImageError(f"{name} must have shape {expected} to fit its camera, got {array.shape}")
+    if array.dtype == bool:
+        return array
+    return array > 0.5 * max(float(array.max()), 1e-9)

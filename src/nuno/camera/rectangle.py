@@ -1,0 +1,268 @@
+"""The rectangle that a flat cloth makes on its plane: corners, sides and grid points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.camera import Camera
+from nuno.camera.edges import edge_in_image, edge_in_mask, side_pixels
+from nuno.camera.image import check_image, check_mask
+from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
+
+_SQUARE = 0.02  # sides this close to each other do not say which one is the longer
+_ENDS = 0.06  # share of a side next to a corner that is not measured: there the other side bends the edge
+_LEAST = 0.2  # share of a side that must show an edge
+_AGREE = 1.0  # [px] how far the edges in the mask and in the image may be from each other
+_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
+_OUTWARD = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # normal of the side after each corner
+
+
+@dataclass(frozen=True, eq=False)
+class ClothRectangle:
+    """A rectangular cloth flat on a horizontal plane.
+
+    Attributes:
+        corners: (4, 3) float, in the world [m], in the order C00, CI, opposite, CJ. C00 is the corner whose
+            projection is nearest to pixel (0, 0), CI its neighbour along the longer side, CJ along the
+            shorter. Sides within 2 % of each other: CI is the neighbour that comes next clockwise in the
+            image.
+        long_m: Length of the side from C00 to CI [m].
+        short_m: Length of the side from C00 to CJ [m].
+        centre: (3,) float [m].
+        yaw: Angle of CI - C00 about z, from the x axis [rad].
+        residual: Root mean square distance of the measured edge from the rectangle's sides [px].
+        warnings: What a reader of the numbers should know.
+    """
+
+    corners: np.ndarray
+    long_m: float
+    short_m: float
+    centre: np.ndarray
+    yaw: float
+    residual: float
+    warnings: tuple[str, ...] = ()
+
+    def grid_points(self, n: int, m: int) -> np.ndarray:
+        """Points of a grid that spans the cloth: n along the longer side, m along the shorter.
+
+        Returns:
+            (n, m, 3) float [m], P(i, j) = C00 + i/(n-1) (CI - C00) + j/(m-1) (CJ - C00).
+
+        Raises:
+            InvalidInputError: n or m is below 2.
+        """
+        if n < 2 or m < 2:
+            raise InvalidInputError(f"a grid needs at least 2 x 2 points, got {n} x {m}")
+        along, across = self.corners[1] - self.corners[0], self.corners[3] - self.corners[0]
+        i = np.linspace(0.0, 1.0, n)[:, None, None]
+        j = np.linspace(0.0, 1.0, m)[None, :, None]
+        return self.corners[0] + i * along + j * across
+
+
+@dataclass
+class _Pose:
+    """A rectangle on the plane: centre [m], yaw [rad], size along its own x and y [m]."""
+
+    centre: np.ndarray
+    yaw: float
+    size: np.ndarray
+
+    def axes(self) -> np.ndarray:
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return np.array([[c, s], [-s, c]])
+
+    def corners(self) -> np.ndarray:
+        return self.centre + (_CORNERS * self.size) @ self.axes()
+
+
+def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_height: float) -> ClothRectangle:
+    """Fit a rectangle to a cloth that lies flat on a horizontal plane.
+
+    A first rectangle spans the mask's outline, taken back to the plane. Then the edge is measured along the
+    normals of its sides, first in the mask, then in the image, to a fraction of a pixel, and the rectangle's
+    five numbers are fitted to all edge points at once. Distances count in pixels, so the far side, where a
+    pixel is more metres, counts for less in metres; far outliers are weighed down.
+
+    Args:
+        mask: (h, w) bool, the cloth.
+        image: (h, w, 3) uint8 RGB.
+        camera: The camera that took it.
+        plane_height: z of the cloth's middle surface [m]: the table's height and half of the cloth's
+            thickness.
+
+    Raises:
+        ImageError: mask or image does not fit the camera.
+        ClothNotFoundError: the mask is empty.
+        EstimationError: the region is no rectangle on the plane, or one of its sides is outside of the image.
+    """
+    mask = check_mask(mask, camera)
+    rgb = check_image(image, camera)
+    if not mask.any():
+        raise ClothNotFoundError("the mask is empty, so there is no cloth to measure")
+    warnings: list[str] = []
+    mask = _largest(mask, warnings)
+    pose = _spanning(mask, camera, plane_height)
+    soft_mask = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
+    for _ in range(3):
+        pose, residual = _fit_to_edges(pose, soft_mask, None, camera, plane_height)
+    cut = _cut_off(mask, pose, camera, plane_height)
+    if cut:
+        warnings.append(cut)
+    _judge_shape(mask, pose, camera, plane_height, warnings)
+    soft_image = cv2.GaussianBlur(rgb.astype(np.float32), (0, 0), 0.6)
+    try:
+        for _ in range(2):
+            pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
+    except EstimationError:
+        warnings.append("the image shows too little of an edge on one side: the corners come from the mask
+        alone")
+    if residual > 1.5:
+        warnings.append(f"the cloth's sides are not straight: {residual:.1f} px off the rectangle on average")
+    return _labelled(pose, camera, plane_height, residual, warnings)
+
+
+def _largest(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    if areas.max() < 0.95 * areas.sum():
+        warnings.append(f"the mask has {count - 1} parts; the largest, {areas.max() / areas.sum():.0%} of it,
+        was used")
+    return labels == 1 + int(areas.argmax())
+
+
+def _spanning(mask: np.ndarray, camera: Camera, height: float) -> _Pose:
+    """The smallest rectangle on the plane around the mask."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(contours, key=len)[:, 0].astype(float)
+    if len(outline) < 12:
+        raise EstimationError(f"the mask's region has an outline of {len(outline)} pixels, too small for a rectangle")
+    ground = camera.back_project(outline, height)[:, :2]
+    middle = ground.mean(axis=0)
+    centre, size, angle = cv2.minAreaRect((ground - middle).astype(np.float32))
+    return _Pose(middle + centre, float(np.deg2rad(angle)), np.array(size, dtype=float))
+
+
+def _fit_to_edges(
+    pose: _Pose, mask: np.ndarray, image: np.ndarray | None, camera: Camera, height: float
+) -> tuple[_Pose, float]:
+    """Measure the edge along the four sides in a soft mask (h, w), then in the image if there is one, and fit
+    to it.""" corners = pose.corners()
+    ground, weights, sides = [], [], []
+    for side in range(4):
+        pixels, normals, seen = side_pixels(corners[side], corners[(side + 1) % 4], camera, height, _ENDS)
+        pixels, normals, count = pixels[seen], normals[seen], len(seen)
+        edge = edge_in_mask(mask, pixels, normals)
+        if image is not None:
+            fine = edge_in_image(image, pixels, normals)
+            # Farther from the mask's edge than that it is an edge of the cloth's pattern, or of the table's.
+            fine[~(np.linalg.norm(fine - edge, axis=1) < _AGREE)] = np.nan
+            edge = fine
+        good = np.isfinite(edge).all(axis=1)
+        edge, normals = edge[good], normals[good]
+        if len(edge) < _LEAST * count:
+            raise EstimationError(
+                f"only {len(edge) / count:.0%} of one side of the cloth shows an edge in the image: it is cut off, or "
+                "the region is not a rectangle on the plane"
+            )
+        points = camera.back_project(edge, height)[:, :2]
+        further = camera.back_project(edge + normals, height)[:, :2]
+        metres = np.abs((further - points) @ (_OUTWARD[side] @ pose.axes()))
+        ground.append(points)
+        weights.append(1.0 / np.maximum(metres, 1e-6))
+        sides.append(np.full(len(edge), side))
+    fitted, residual = _least_squares(pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights))
+    return fitted, residual
+
+
+def _least_squares(
+    pose: _Pose, points: np.ndarray, sides: np.ndarray, weights: np.ndarray
+) -> tuple[_Pose, float]:
+    """Gauss-Newton with Cauchy weights over points (k, 2) [m] of sides (k,), weights (k,) [px/m]."""
+    centre, yaw, size = pose.centre.copy(), pose.yaw, pose.size.copy()
+    for _ in range(12):
+        now = _Pose(centre, yaw, size)
+        axes = now.axes()
+        normal = _OUTWARD[sides] @ axes
+        turned = _OUTWARD[sides] @ np.array([axes[1], -axes[0]])
+        offset = points - centre
+        half = 0.5 * np.abs(_OUTWARD[sides])
+        distance = (normal * offset).sum(axis=1) - half @ size
+        jacobian = np.column_stack([-normal, (turned * offset).sum(axis=1), -half])
+        error = weights * distance
+        scale = max(2.0 * float(np.median(np.abs(error))), 0.3)
+        robust = weights**2 / (1.0 + (error / scale) ** 2)
+        normal_matrix = jacobian.T @ (jacobian * robust[:, None]) + 1e-12 * np.eye(5)
+        step = np.linalg.solve(normal_matrix, -jacobian.T @ (robust * distance))
+        centre, yaw, size = centre + step[:2], yaw + float(step[2]), size + step[3:]
+        if np.abs(step).max() < 1e-7:
+            break
+    if not (np.isfinite(size).all() and (size > 1e-3).all()):
+        raise EstimationError("the region is not a rectangle on the plane: its sides have no sensible length")
+    good = np.abs(error) < max(3 * scale, 1.0)
+    return _Pose(centre, yaw, size), float(np.sqrt((error[good] ** 2).mean()))
+
+
+def _cut_off(mask: np.ndarray, pose: _Pose, camera: Camera, height: float) -> str | None:
+    rim = np.concatenate([mask[:2].any(axis=0), mask[-2:].any(axis=0), mask[:, :2].any(axis=1), mask[:, -2:].any(axis=1)])
+    pixels = camera.project(np.column_stack([pose.corners(), np.full(4, height)]))
+    size = np.array([camera.width, camera.height])
+    outside = int((~((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1)).sum())
+    if outside:
+        return f"the image's border cuts the cloth off: {outside} of its corners are where its sides would meet outside"
+    return "the cloth touches the image's border: it may go on outside" if rim.sum() > 3 else None
+
+
+def _judge_shape(mask: np.ndarray, pose: _Pose, camera: Camera, height: float, warnings: list[str]) -> None:
+    """Compare the mask with the rectangle's own image."""
+    outline = camera.project(np.column_stack([pose.corners(), np.full(4, height)]))
+    drawn = np.zeros(mask.shape, dtype=np.uint8)
+    cv2.fillConvexPoly(drawn, np.round(outline * 16).astype(np.int32), 1, lineType=cv2.LINE_8, shift=4)
+    inside = drawn.astype(bool)
+    overlap = float((mask & inside).sum() / max((mask | inside).sum(), 1))
+    if overlap < 0.83:  # a disc and its best square share 0.80
+        raise EstimationError(
+            f"the region is not a rectangle on the plane z = {height:.4f} m: it shares {overlap:.0%} with the best one; "
+            "is the cloth folded, the mask wrong, or the height?"
+        )
+    if overlap < 0.95:
+        warnings.append(f"the cloth is not quite a rectangle: it shares {overlap:.0%} with the best one")
+
+
+def _labelled(
+    pose: _Pose, camera: Camera, height: float, residual: float, warnings: list[str]
+) -> ClothRectangle:
+    """Name the corners by the label rule."""
+    corners = np.column_stack([pose.corners(), np.full(4, height)])
+    pixels = camera.project(corners)
+    if not np.isfinite(pixels).all():
+        raise EstimationError("a corner of the rectangle lies behind the camera")
+    first = int(np.linalg.norm(pixels, axis=1).argmin())
+    order = [first, (first + 1) % 4, (first + 2) % 4, (first + 3) % 4]
+    ahead, behind = (float(np.linalg.norm(corners[order[k]] - corners[first])) for k in (1, 3))
+    if abs(ahead - behind) <= _SQUARE * max(ahead, behind):
+        # y points down in an image, so a positive turn from one neighbour to the other is clockwise to the
+        # eye.
+        a, b = pixels[order[1]] - pixels[first], pixels[order[2]] - pixels[first]
+        swap = a[0] * b[1] - a[1] * b[0] < 0
+        warnings.append(
+            f"the sides, {ahead:.3f} and {behind:.3f} m, are within 2 %: i runs to the next corner clockwise in the image"
+        )
+    else:
+        swap = behind > ahead
+    if swap:
+        order = [order[0], order[3], order[2], order[1]]
+    corners = corners[order]
+    along, across = corners[1] - corners[0], corners[3] - corners[0]
+    return ClothRectangle(
+        corners=corners,
+        long_m=float(np.linalg.norm(along)),
+        short_m=float(np.linalg.norm(across)),
+        centre=corners.mean(axis=0),
+        yaw=float(np.arctan2(along[1], along[0])),
+        residual=residual,
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,1 @@
+"""Contact: static shapes against particles, and cloth against itself."""

@@ -1,0 +1,33 @@
+"""Which bodies touch which, and with how much friction: group masks, ignored pairs, friction of pairs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+
+
+class ContactRules:
+    """The exceptions for pairs of bodies, by the bodies' keys.
+
+    Attributes:
+        friction: The coefficient of each pair that has its own.
+        ignored: The pairs that pass through each other.
+    """
+
+    def __init__(self) -> None:
+        self.friction: dict[frozenset[str], Any] = {}
+        self.ignored: set[frozenset[str]] = set()
+
+    def touch(self, a: Body, b: Body) -> bool:
+        """Return whether two bodies touch each other at all."""
+        if frozenset((a.key, b.key)) in self.ignored:
+            return False
+        return bool(a.group & b.collides_with) and bool(b.group & a.collides_with)
+
+    def colliders_of(self, dynamic: Body, static: list[Body]) -> tuple[list[Body], dict[str, Any]]:
+        """Return the bodies that ``dynamic`` touches, and by name the friction of pairs with their own."""
+        touched = [body for body in static if self.touch(dynamic, body)]
+        friction = {body.name: self.friction.get(frozenset((dynamic.key, body.key))) for body in touched}
+        return touched, {name: mu for name, mu in friction.items() if mu is not None}

@@ -1,0 +1,39 @@
+"""Devices by name: "auto", "cpu", "cuda", "cuda:0" ..."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from nuno.errors import InvalidInputError
+
+
+def checked_device(name: Any) -> str:
+    """Return a device's name as it is written; whether there is such a device shows on first use.
+
+    Raises:
+        InvalidInputError: not a device's name.
+    """
+    if not isinstance(name, str) or not re.fullmatch(r"auto|cpu|cuda(:\d+)?", name):
+        raise InvalidInputError(f'device must be "auto", "cpu", "cuda" or "cuda:0" ..., got {name!r}')
+    return name
+
+
+def found_device(name: str) -> str:
+    """Return "cpu" or "cuda:0" ... for a device's name.
+
+    Raises:
+        InvalidInputError: there is no such device here.
+    """
+    if name == "cpu":
+        return name
+    import warp as wp
+
+    available = wp.get_cuda_device_count()
+    if name == "auto":
+        return "cuda:0" if available else "cpu"
+    index = int(name.partition(":")[2] or 0)
+    if index >= available:
+        valid = ", ".join(["cpu", *(f"cuda:{i}" for i in range(available))])
+        raise InvalidInputError(f"there is no device {name!r} here; there are: {valid}")
+    return f"cuda:{index}"

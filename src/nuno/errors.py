@@ -1,0 +1,71 @@
+"""The errors that Nuno raises, all under one root.
+
+Every message says what was received and what is valid; the data that a program may want stands in attributes.
+"""
+
+from __future__ import annotations
+
+
+class NunoError(Exception):
+    """Root of all errors that Nuno raises on purpose."""
+
+
+class InvalidInputError(NunoError, ValueError):
+    """A value that cannot be used: wrong shape, not finite, out of range."""
+
+
+class UnknownNameError(NunoError, KeyError):
+    """A name that is not there.
+
+    Args:
+        kind: What was looked for ("body", "material", ...).
+        name: The name that was asked for.
+        valid: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, valid: list[str]) -> None:
+        self.kind, self.name, self.valid = kind, name, sorted(valid)
+        super().__init__(f"no {kind} named {name!r}; there are: {', '.join(self.valid) or 'none'}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class BodyStateError(NunoError, RuntimeError):
+    """An action that the body's present state does not allow (attach twice, a grip on a static body ...)."""
+
+
+class MeshError(InvalidInputError):
+    """A mesh that cannot be used, with what is wrong and how to mend it."""
+
+
+class FileFormatError(NunoError, ValueError):
+    """A file that Nuno cannot read: another format, a newer version, or damaged."""
+
+
+class ImageError(InvalidInputError):
+    """An image that cannot be read or does not fit its camera."""
+
+
+class ClothNotFoundError(NunoError, RuntimeError):
+    """No cloth was found in the image."""
+
+
+class EstimationError(NunoError, RuntimeError):
+    """Valid input for which no answer could be computed."""
+
+
+class SimulationDiverged(NunoError, RuntimeError):
+    """A state that is no longer finite; the world keeps its last good state.
+
+    Args:
+        body: Name of the body.
+        time: Simulated time [s] of the last good state.
+    """
+
+    def __init__(self, body: str, time: float) -> None:
+        self.body, self.time = body, time
+        super().__init__(
+            f"the state of {body!r} stopped being finite after t = {time:.4f} s; the world was left as it was "
+            "at that time. Smaller steps (substeps=...), softer materials or slower grips help"
+        )

@@ -1,0 +1,171 @@
+"""Grips: points of a body that are led along a path, by another body, or held in place."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno import quaternion as quat
+from nuno.coordinates import apply, invert
+from nuno.errors import InvalidInputError
+from nuno.path import Path
+from nuno.surface import SurfacePoints
+from nuno.validation import finite_array, index_array
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+    from nuno.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class GripSpec:
+    """What a solver needs of a grip. Either ``vertices`` is given, or ``corners`` and ``barycentric``.
+
+    Attributes:
+        vertices: (worlds, k) int32, -1 for no point in this world.
+        corners: (worlds, k, 3) int32, the vertices of the point's face, -1 for no point in this world.
+        barycentric: (worlds, k, 3) float64, the corners' weights.
+        times: (m,) float64 [s] of the world's clock.
+        positions: (worlds, k, m, 3) float64 [m], where each point is at each time.
+        interpolation: "linear" or "minimum_jerk", between the times; before and after them the point is held.
+        compliance: [m/N], 0 is stiff.
+    """
+
+    vertices: np.ndarray | None
+    corners: np.ndarray | None
+    barycentric: np.ndarray | None
+    times: np.ndarray
+    positions: np.ndarray
+    interpolation: str
+    compliance: float
+
+
+class Grip:
+    """A hold on a body's points, made by ``World.grip``.
+
+    Attributes:
+        key: The same for the copies of the grip in imagined worlds and in files.
+        body: The body that is held.
+        target: The body that leads it, or None.
+    """
+
+    def __init__(
+        self, body: Body, spec: GripSpec, target: Body | None = None, offsets: np.ndarray | None = None
+    ) -> None:
+        self.key = uuid.uuid4().hex
+        self.body, self.target = body, target
+        self._spec = spec
+        self._offsets = offsets  # (worlds, k, 3) [m], in the target's frame
+        self._world: Simulation | None = None
+
+    def __repr__(self) -> str:
+        return f"<grip on {self.body.name!r}, {'active' if self.active else 'released'}>"
+
+    @property
+    def active(self) -> bool:
+        """Whether the points are held."""
+        return self._world is not None
+
+    @property
+    def compliance(self) -> float:
+        """[m/N]; 0 is stiff."""
+        return self._spec.compliance
+
+    def release(self) -> None:
+        """Let go. Nothing happens where the grip was released before, or the body detached or removed."""
+        world = self._world
+        if world is not None:
+            with world.lock:
+                if self._world is not None:
+                    world._drop_grip(self)
+
+    def _spec_for(self, time: float, frame: float) -> GripSpec:
+        """Return the keys for a run from ``time`` on; a leading body's last move takes one ``frame`` [s]."""
+        if self.target is None or self._offsets is None:
+            return self._spec
+        now = np.broadcast_to(apply(self.target._pose(), self._offsets), self._offsets.shape)
+        last = self._spec.positions[:, :, -1]
+        keys = {"times": np.array([time]), "positions": now[:, :, None].copy()}
+        if not np.array_equal(last, now):
+            keys = {"times": np.array([time, time + frame]), "positions": np.stack([last, now], axis=2)}
+        # The keys become the grip's own, so that the next run starts from where this one led.
+        self._spec = GripSpec(**{**self._spec.__dict__, **keys})
+        return self._spec
+
+
+def make_grip(
+    body: Body, where: Any, to: Any, compliance: float, target: Body | None, world: Simulation
+) -> Grip:
+    """Return a grip on ``body``, not yet active; see ``World.grip``.
+
+    Raises:
+        InvalidInputError: points or a target that cannot be used.
+    """
+    worlds = world.world_count
+    vertices, corners, weights = _points(body, where, worlds)
+    positions = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
+    rows = np.arange(worlds)[:, None]
+    if vertices is not None:
+        held, valid = positions[rows, vertices], vertices >= 0
+    else:
+        assert corners is not None and weights is not None
+        held = np.einsum("wkc,wkcx->wkx", weights, positions[rows[..., None], corners])
+        valid = corners[..., 0] >= 0
+    number = np.maximum(valid.sum(axis=1), 1)[:, None]
+    mean = np.where(valid[..., None], held, 0.0).sum(axis=1) / number
+    offsets = np.where(valid[..., None], held - mean[:, None], 0.0)
+
+    interpolation = "linear"
+    local = None
+    if target is not None:
+        local = np.broadcast_to(apply(invert(target._pose()), held), held.shape).copy()
+        times, keys = np.array([world.time]), held[:, :, None]
+    elif isinstance(to, Path):
+        if to.world_count not in (None, worlds):
+            raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {worlds}")
+        times, keys, interpolation = _along(to, offsets, world)
+    else:
+        goal = finite_array("to, where it is no Path or Body,", to, (3,), (worlds, 3))
+        times = np.array([world.time])
+        keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
+    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance)
+    return Grip(body, spec, target, local)
+
+
+def _points(
+    body: Body, where: Any, worlds: int
+) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    vertex_count, faces = body.vertices.shape[-2], body.faces
+    if not isinstance(where, SurfacePoints):
+        indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
+    chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
+    corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
+    shape = (worlds, *corners.shape[-2:])
+    return (
+        None,
+        np.array(np.broadcast_to(corners, shape)),
+        np.array(np.broadcast_to(where.barycentric, shape)),
+    )
+
+
+def _along(path: Path, offsets: np.ndarray, world: Simulation) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return times, keys (worlds, k, m, 3) and interpolation of points that keep their offsets on a path."""
+    times, interpolation = path.times, str(path.interpolation)
+    if path.quaternions is None:
+        centres = path.positions
+        around = offsets[:, :, None]
+    else:
+        # Straight lines between turned keys would cut the arc of the offsets: a key a frame follows it.
+        steps = np.arange(times[0], times[-1], 1.0 / world.frame_rate)
+        times, interpolation = np.union1d(times, steps), "linear"
+        centres = path.at(times)
+        start = path.quaternion_at(world.time)
+        turn = quat.multiply(path.quaternion_at(times), quat.inverse(start)[..., None, :])
+        turn = np.broadcast_to(turn, (len(offsets), len(times), 4))
+        around = quat.rotate(turn[:, None], offsets[:, :, None])
+    centres = np.broadcast_to(centres, (len(offsets), len(times), 3))
+    return times, centres[:, None] + around, interpolation

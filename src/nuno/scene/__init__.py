@@ -1,0 +1,1 @@
+"""What the solver works on, assembled from bodies: flat arrays, colours, contact shapes."""

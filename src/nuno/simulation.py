@@ -1,0 +1,205 @@
+"""What is inside a world: its bodies, their dynamics, what touches what, and how time passes.
+
+``World`` adds the verbs that a program uses.
+"""
+
+from __future__ import annotations
+
+import uuid
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.background import FrameLock
+from nuno.body import Body
+from nuno.contact_rules import ContactRules
+from nuno.device import checked_device, found_device
+from nuno.dynamics import SOON, Dynamics, make_colliders
+from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
+from nuno.grip import Grip
+from nuno.validation import count, finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.background import Background
+
+CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
+
+
+class Simulation:
+    """The bodies of one world, or of a batch of equal ones, and their time; the arguments are ``World``'s."""
+
+    def __init__(
+        self, *, device: str = "auto", gravity: ArrayLike = (0.0, 0.0, -9.81), frame_rate: float = 60.0,
+        substeps: int | None = None,
+    ) -> None:  # fmt: skip
+        self._device = checked_device(device)
+        gx, gy, gz = finite_array("gravity", gravity, (3,))
+        self.gravity: tuple[float, float, float] = (float(gx), float(gy), float(gz))
+        self.frame_rate = number("frame_rate", frame_rate, above=0.0)
+        self.substeps = None if substeps is None else count("substeps", substeps)
+        self.world_count = 1
+        self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
+        self._time = 0.0
+        self._family = uuid.uuid4().hex
+        self._bodies: dict[str, Body] = {}
+        self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
+        self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
+        self._rules = ContactRules()
+        self._colliders: dict[Any, Any] = {}
+        self._collider_version = 0
+        self._background: Background | None = None
+
+    def __repr__(self) -> str:
+        batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
+        return f"<World at t = {self._time:.3f} s, {len(self._bodies)} bodies{batch}>"
+
+    @property
+    def time(self) -> float:
+        """The simulated time [s]."""
+        return self._time
+
+    @property
+    def device(self) -> str:
+        """The device that dynamics run on, "cpu" or "cuda:0" ..."""
+        self._device = found_device(self._device)
+        return self._device
+
+    @property
+    def is_running(self) -> bool:
+        """Whether frames are made in the background."""
+        return self._background is not None and self._background.alive
+
+    @contextmanager
+    def _call(self) -> Iterator[None]:
+        with self.lock:
+            self._raise_background_error()
+            yield
+
+    def _raise_background_error(self) -> None:
+        background = self._background
+        if background is not None and background.error is not None and not background.is_current_thread:
+            self._background = None
+            raise background.error
+
+    def _own(self, body: Body | str) -> Body:
+        """Return this world's body for a name, one of its bodies, or one of the world it comes from."""
+        if isinstance(body, str):
+            named = next((b for b in self._bodies.values() if b.name == body), None)
+            if named is None:
+                raise UnknownNameError("body", body, [b.name for b in self._bodies.values()])
+            return named
+        if not isinstance(body, Body):
+            raise InvalidInputError(f"a body or its name is needed, got {type(body).__name__}")
+        own = self._bodies.get(body.key)
+        if own is None:
+            where = "no world" if body._world is None else "another world"
+            raise BodyStateError(f"{body.name!r} is in {where}, not in this one")
+        return own
+
+    def _pair(self, a: Body | str, b: Body | str) -> frozenset[str]:
+        first, second = self._own(a), self._own(b)
+        if first is second:
+            raise InvalidInputError(f"a pair needs two bodies, got {first.name!r} twice")
+        return frozenset((first.key, second.key))
+
+    def _attached(self) -> list[Dynamics]:
+        return [body._dynamics for body in self._bodies.values() if body._dynamics is not None]
+
+    def _check_worlds(self, what: str, axes: tuple[int, ...]) -> None:
+        if axes and axes != (self.world_count,):
+            raise InvalidInputError(
+                f"{what} must be one value or {self.world_count}, one a world, got {axes[0]}"
+            )
+
+    def _register(self, body: Body) -> None:
+        body._world = self
+        self._bodies[body.key] = self._known_bodies[body.key] = body
+
+    def _detach(self, body: Body) -> None:
+        assert body._dynamics is not None
+        vertices = body._vertices()
+        for grip in list(body._dynamics.grips):
+            self._drop_grip(grip)
+        body._thickness, body._dynamics = body.thickness, None
+        body._freeze(vertices)
+        self._colliders_changed()
+
+    def _hold(self, grip: Grip) -> None:
+        assert grip.body._dynamics is not None
+        grip._world = self
+        self._known_grips[grip.key] = grip
+        grip.body._dynamics.grips.append(grip)
+        grip.body._dynamics.grips_changed = True
+
+    def _drop_grip(self, grip: Grip) -> None:
+        grip._world = None
+        dynamics = grip.body._dynamics
+        if dynamics is not None:
+            dynamics.grips = [other for other in dynamics.grips if other is not grip]
+            dynamics.grips_changed = True
+
+    def _colliders_changed(self) -> None:
+        self._collider_version += 1
+        self._colliders.clear()
+
+    def _body_changed(self, body: Body) -> None:
+        """Be told that a body was moved, or its friction or groups changed."""
+        dynamics = body._dynamics
+        if dynamics is not None and not np.array_equal(dynamics.friction, body.friction):
+            # A solver takes its friction when it is made.
+            positions, velocities = dynamics.solver.positions(), dynamics.solver.velocities()
+            renewed = Dynamics(body.shape, dynamics.material, positions, velocities, body.friction, self)
+            renewed.solver.load_state(dynamics.state())
+            renewed.grips, renewed.pushes, renewed.grips_changed = dynamics.grips, dynamics.pushes, True
+            body._dynamics = renewed
+        self._colliders_changed()
+
+    def _bring_colliders(self) -> None:
+        static: list[Body] | None = None
+        for body in self._bodies.values():
+            dynamics = body._dynamics
+            if dynamics is None or dynamics.collider_version == self._collider_version:
+                continue
+            if static is None:
+                static = [b for b in self._bodies.values() if b._dynamics is None]
+            touched, friction = self._rules.colliders_of(body, static)
+            key = (
+                *(b.key for b in touched),
+                *((name, np.asarray(mu).tobytes()) for name, mu in friction.items()),
+            )
+            if key not in self._colliders:
+                self._colliders[key] = make_colliders(touched, friction, self)
+            dynamics.solver.set_colliders(self._colliders[key])
+            dynamics.collider_version = self._collider_version
+
+    def _advance(self, duration: float, end: float | None = None) -> None:
+        """Advance everything, or leave the world as it was and raise."""
+        start = self._time
+        finish = start + duration if end is None else end
+        moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
+        saved = [(dynamics, dynamics.state()) for dynamics in moving.values()]
+        self._bring_colliders()
+        try:
+            ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
+            stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
+            now = start
+            for stop in stops:
+                for dynamics in moving.values():
+                    dynamics.run(now, stop - now, 1.0 / self.frame_rate)
+                now = stop
+            for body, dynamics in moving.items():
+                if not np.all(dynamics.solver.finite()):
+                    raise SimulationDiverged(body.name, start)
+        except BaseException:
+            for dynamics, state in saved:
+                dynamics.solver.load_state(state)
+            raise
+        for body, dynamics in moving.items():
+            dynamics.pushes = [p for p in dynamics.pushes if p.end is None or p.end > finish + SOON]
+            if body._children:
+                self._colliders_changed()  # what follows the body has moved along
+        self._time = finish

@@ -1,0 +1,137 @@
+"""Snapshots as files: one .npz, read without pickle, with a JSON header beside the arrays.
+
+The header holds ``format``, ``units``, ``meshes`` (SHA-256 of each mesh's vertices and faces, by body) and
+``world``, the snapshot as JSON in which {"array": name} stands for an array of the file, {"dict": {...}} for
+a dict, and {"type": name, "fields": {...}} for one of the classes in ``TYPES``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from nuno import shape as shapes
+from nuno.dynamics import Push
+from nuno.errors import FileFormatError, NunoError
+from nuno.grip import GripSpec
+from nuno.materials import Cloth
+from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+
+FORMAT = 1
+UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
+SHAPES = (
+    shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule, shapes.Plane, shapes.Sheet,
+    shapes.TriangleMesh, shapes.ClothMesh,
+)  # fmt: skip
+TYPES: dict[str, Any] = {
+    kind.__name__: kind
+    for kind in (*SHAPES, Cloth, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
+}
+
+
+def write_snapshot(snapshot: Snapshot, path: str | os.PathLike[str]) -> None:
+    """Write a snapshot; a file that is there is replaced at once, so that none is ever half written."""
+    arrays: dict[str, np.ndarray] = {}
+    header = {
+        "format": FORMAT,
+        "units": UNITS,
+        "meshes": {body.key: mesh_hash(body.shape) for body in snapshot.bodies},
+        "world": _encoded(snapshot, arrays),
+    }
+    goal = FilePath(path)
+    partial = goal.with_name(f".{goal.name}.{os.getpid()}.partial")
+    try:
+        with open(partial, "wb") as stream:
+            np.savez(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
+        os.replace(partial, goal)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
+    """Read a snapshot.
+
+    Raises:
+        FileFormatError: no such file, damaged, no snapshot, or of an unknown or newer format.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        header = json.loads(str(arrays["header"][()]))
+        version = header["format"]
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        EOFError,
+        IndexError,
+        AttributeError,
+        zipfile.BadZipFile,
+    ) as error:
+        raise FileFormatError(f"cannot read {os.fspath(path)!r} as a saved world: {error}") from error
+    if version != FORMAT:
+        raise FileFormatError(
+            f"{os.fspath(path)!r} has the format {version!r}; this version of nuno reads format {FORMAT}"
+        )
+    try:
+        snapshot = _decoded(header["world"], arrays)
+        meshes = header["meshes"]
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError("the header holds no world")
+        for body in snapshot.bodies:
+            if meshes[body.key] != mesh_hash(body.shape):
+                raise FileFormatError(
+                    f"the mesh of {body.name!r} in {os.fspath(path)!r} does not match its hash"
+                )
+    except FileFormatError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, NunoError) as error:
+        raise FileFormatError(f"{os.fspath(path)!r} is damaged: {error}") from error
+    return replace(snapshot, from_file=True)
+
+
+def mesh_hash(shape: shapes.Shape) -> str:
+    """Return the SHA-256 of a shape's vertices and faces."""
+    vertices, faces = (
+        (shape.vertices, shape.faces) if isinstance(shape, shapes.TriangleMesh) else shape.mesh()
+    )
+    digest = hashlib.sha256(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(faces, dtype="<i4").tobytes())
+    return digest.hexdigest()
+
+
+def _encoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    if isinstance(value, np.ndarray):
+        name = f"array_{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if is_dataclass(value) and not isinstance(value, type):
+        items = {f.name: _encoded(getattr(value, f.name), arrays) for f in fields(value) if f.init}
+        return {"type": type(value).__name__, "fields": items}
+    if isinstance(value, tuple | list):
+        return [_encoded(item, arrays) for item in value]
+    if isinstance(value, dict):
+        return {"dict": {name: _encoded(item, arrays) for name, item in value.items()}}
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _decoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    if isinstance(value, list):
+        return tuple(_decoded(item, arrays) for item in value)
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        return arrays[value["array"]]
+    if "dict" in value:
+        return {name: _decoded(item, arrays) for name, item in value["dict"].items()}
+    if value.get("type") not in TYPES:
+        raise FileFormatError(f"the file holds an unknown kind of object, {value.get('type')!r}")
+    return TYPES[value["type"]](**{name: _decoded(item, arrays) for name, item in value["fields"].items()})

@@ -1,0 +1,1 @@
+"""The XPBD core: Warp kernels by constraint, and the plans that launch them. It knows nothing of World."""

@@ -1,0 +1,523 @@
+"""One dynamic cloth in one or many worlds: its arrays on the device, and the plan that runs it."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.scene.cloth import ClothTopology, Elements
+from nuno.solver.frame import run_worlds
+from nuno.solver.lanes import LANES, lane, lane_int
+from nuno.solver.large import LargePlan
+from nuno.solver.state import NOTES, ORIGIN, SCALARS, SPEED, TRAVEL, Settings, Shapes, Sizes, StateFloat, StateLanes, Topology
+
+if TYPE_CHECKING:
+    from nuno.grip import GripSpec
+    from nuno.materials import Cloth
+    from nuno.scene.colliders import Colliders
+
+BLOCK_THREADS = 512
+"""Threads of a CUDA block, which runs one world."""
+BLOCK_PARTICLES = 4096
+"""Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
+SAG = 0.01
+"""Edge strain that the default number of substeps allows a cloth hanging from its end (see default_substeps)."""
+
+OVER_RELAXATION = 1.6
+"""What one pass lacks in stretch: the mass term of an edge's update is divided by this (the compliance is not), which
+nearly halves the strain that a hanging cloth keeps at the same number of substeps."""
+
+_threads: ThreadPoolExecutor | None = None
+
+
+def _pool() -> ThreadPoolExecutor:
+    """A thread per core; Warp's CPU launches release the GIL."""
+    global _threads
+    if _threads is None:
+        _threads = ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="nuno-lanes")
+    return _threads
+
+
+def default_substeps(topology: ClothTopology, gravity: float, frame: float) -> int:
+    """Substeps a frame from the cell size: one pass a substep leaves a hanging cloth a strain of 2 g L dt^2 / h^2.
+
+    L is the cloth's extent and h its cell size [m]; the rule bounds that strain by ``SAG``. Physical stretch
+    compliance comes on top. At least 10, so that contact is looked at every 1.7 ms at 60 frames a second.
+    """
+    step = topology.cell_size * math.sqrt(SAG / (2.0 * max(gravity, 1.0) * topology.extent))
+    return max(10, math.ceil(frame / step))
+
+
+class ClothSolver:
+    """A cloth's state and how it advances.
+
+    Args:
+        topology: The cloth's elements.
+        material: A `nuno.materials.Cloth`.
+        positions: (worlds, n, 3) float [m].
+        velocities: (worlds, n, 3) float [m/s].
+        device: "cpu" or "cuda:0" ...
+        gravity: (3,) [m/s2].
+        frame_rate: Frames a second.
+        substeps: Substeps a frame; None takes `default_substeps`.
+        friction: Friction coefficient of the body; None takes the material's. A number or one per world.
+        self_contact: Whether the cloth collides with itself.
+        plan: "auto", "fused" (a thread, or a block, per world), or "large" (a launch per phase).
+
+    Limitations: one pass a substep, so that stiffness beyond m / dt^2 acts as an inextensible limit and not as the
+    stated value; damping acts on stretch along edges and on bending, not on shear or general triangles.
+    """
+
+    def __init__(
+        self,
+        topology: ClothTopology,
+        material: Cloth,
+        positions: np.ndarray,
+        velocities: np.ndarray,
+        *,
+        device: str = "cpu",
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        frame_rate: float = 60.0,
+        substeps: int | None = None,
+        friction: float | np.ndarray | None = None,
+        self_contact: bool = True,
+        plan: str = "auto",
+    ) -> None:
+        positions = np.asarray(positions, dtype=np.float32)
+        self.topology, self.device, self.frame_rate = topology, str(device), float(frame_rate)
+        self.world_count, self.particle_count = positions.shape[:2]
+        self.gravity = np.asarray(gravity, dtype=float)
+        down = float(np.linalg.norm(self.gravity))
+        self.substeps = int(substeps) if substeps else default_substeps(topology, down, 1.0 / frame_rate)
+        self.self_contact = self_contact
+        self._cuda = self.device.startswith("cuda")
+        self.lanes = LANES if not self._cuda and self.world_count > 1 else 1
+        self.group_count = -(-self.world_count // self.lanes)
+        self._number: Any = lane if self.lanes > 1 else float
+        self._integer: Any = lane_int if self.lanes > 1 else int
+        if plan == "auto":
+            plan = "large" if self._cuda and self.particle_count > BLOCK_PARTICLES else "fused"
+        self.plan = plan
+        self._build(material, friction)
+        self.set_state(positions, velocities)
+        self.set_colliders(None)
+        self.set_grips(())
+        self.set_forces(None)
+        self._large: LargePlan | None = None
+
+    # -- arrays: worlds are the leading axis outside, lanes the innermost inside
+
+    def _put(self, values: np.ndarray, integer: bool = False) -> wp.array:
+        """A device array of (worlds, k) numbers, k elements per world or per group of lanes."""
+        kind = np.int32 if integer else np.float32
+        values = np.ascontiguousarray(np.asarray(values, dtype=kind).reshape(self.world_count, -1))
+        dtype = self._integer if integer else self._number
+        if self.lanes > 1:
+            pad = self.group_count * self.lanes - self.world_count
+            # lanes beyond the last world repeat it: they cost nothing more and stay finite
+            values = np.concatenate([values, np.repeat(values[-1:], pad, axis=0)])
+            values = values.reshape(self.group_count, self.lanes, -1).transpose(0, 2, 1)
+            return wp.array(np.ascontiguousarray(values).reshape(-1, self.lanes), dtype=dtype, device=self.device)
+        return wp.array(values.ravel(), dtype=dtype, device=self.device)
+
+    def _get(self, array: wp.array, count: int) -> np.ndarray:
+        """The (worlds, count) numbers of a device array."""
+        values = array.numpy()
+        if self.lanes > 1:
+            values = values.reshape(self.group_count, count, self.lanes).transpose(0, 2, 1)
+        return values.reshape(-1, count)[: self.world_count]
+
+    def _build(self, material: Cloth, friction: float | np.ndarray | None) -> None:
+        topology, worlds, n = self.topology, self.world_count, self.particle_count
+        values = material.resolved(worlds, topology.element_count)
+        state = StateLanes() if self.lanes > 1 else StateFloat()
+        size = Sizes()
+        topo = Topology()
+        shared = upload(topology, self.device)
+        for name, value in shared.items():
+            setattr(topo, name, value)
+        topo.particles, topo.blocks = n, topology.blocks.count
+        topo.ring_sq, topo.contact_reach = topology.blocks.ring**2, topology.blocks.contact_reach
+        self._size, self._state, self._topology = size, state, topo
+
+        def table(which: tuple[str, ...]) -> tuple[list[np.ndarray], bool]:
+            columns = [np.maximum(np.asarray(values[name], dtype=np.float64), 1e-12) for name in which]
+            return columns, any(column.shape[1] > 1 for column in columns)
+
+        stretch, per_element = table(("stretch_stiffness_warp", "stretch_stiffness_weft"))
+        for elements, field in ((topology.edges, "edge_soft"), (topology.triangles, "triangle_soft")):
+            if len(elements):
+                state.stretch_soft, size.stretch_soft, soft = self._soft(elements, stretch, per_element)
+                if field == "triangle_soft":
+                    count = len(elements)
+                    u = np.arange(count) if per_element else np.zeros(count, int)
+                    v = u + count if per_element else u + 1
+                    shear_values, shear_each = table(("shear_stiffness",))
+                    w = np.arange(count) if shear_each else np.zeros(count, int)
+                    both = [np.concatenate([c[:, elements.faces[:, 0]] for c in stretch], axis=1)] if per_element else []
+                    if both:
+                        state.stretch_soft, size.stretch_soft = self._put(1.0 / both[0]), both[0].shape[1]
+                    topo.triangle_soft = wp.array(np.stack([u, v, w], 1).astype(np.int32), dtype=wp.vec3i, device=self.device)
+                else:
+                    topo.edge_soft = wp.array(soft, dtype=int, device=self.device)
+        shear, per_element = table(("shear_stiffness",))
+        elements = topology.cells if len(topology.cells) else topology.triangles
+        state.shear_soft, size.shear_soft, soft = self._soft(elements, shear, per_element)
+        topo.cell_soft = wp.array(soft if len(topology.cells) else soft[:0], dtype=int, device=self.device)
+        bend, per_element = table(("bending_rigidity_warp", "bending_rigidity_weft"))
+        both = np.sqrt(bend[0] * bend[1])
+        bend = [bend[0], bend[1], both]
+        parts, sizes = [], 0
+        for elements, field in ((topology.lines, "line_soft"), (topology.hinges, "hinge_soft")):
+            soft_values, count, soft = self._soft_values(elements, bend, per_element)
+            setattr(topo, field, wp.array((soft + sizes).astype(np.int32), dtype=int, device=self.device))
+            parts.append(soft_values)
+            sizes += count
+        state.bend_soft, size.bend_soft = self._put(np.concatenate(parts, axis=1)), sizes
+        density = np.asarray(values["area_density"], dtype=float)
+        per_face = density.shape[1] > 1
+        mass = self._vertex_mass(density) if per_face else density[:, :1] * topology.area[None]
+        self._inverse_mass = (1.0 / mass).astype(np.float32)
+        self.mass = mass
+        own = values["friction"] if friction is None else np.broadcast_to(np.asarray(friction, float).reshape(-1, 1), (worlds, 1))
+        # thicker than half a cell, layers of one fold would push their own neighbours apart
+        thickness = np.minimum(values["thickness"], 0.5 * topology.cell_size)
+        self._scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
+        self._scalars[:, :ORIGIN] = np.concatenate([values["air_drag"], own, values["damping"], thickness], axis=1)
+        self._damped = bool(np.any(values["damping"] > 0))
+        self._allocate()
+
+    def _soft_values(self, elements: Elements, columns: list[np.ndarray], per_element: bool) -> tuple[np.ndarray, int, np.ndarray]:
+        """Compliances (worlds, k), how many, and which one each element takes."""
+        if not per_element:
+            return 1.0 / np.concatenate([c[:, :1] for c in columns], axis=1), len(columns), elements.axis
+        count = len(elements)
+        full = np.stack([np.broadcast_to(c, (len(c), self.topology.element_count)) for c in columns], axis=1)
+        mean = full[:, elements.axis[:, None], elements.faces].mean(axis=2)
+        return 1.0 / mean.reshape(len(mean), count), count, np.arange(count)
+
+    def _soft(self, elements: Elements, columns: list[np.ndarray], per_element: bool) -> tuple[wp.array, int, np.ndarray]:
+        values, count, index = self._soft_values(elements, columns, per_element)
+        values = np.broadcast_to(values, (self.world_count, values.shape[1]))
+        return self._put(values), count, index.astype(np.int32)
+
+    def _vertex_mass(self, density: np.ndarray) -> np.ndarray:
+        """(worlds, n) masses [kg] where the area density is given per element."""
+        topology = self.topology
+        per_face = len(topology.faces) // topology.element_count
+        x = topology.rest[topology.faces]
+        areas = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
+        face_mass = np.repeat(density, per_face, axis=1) * areas / 3
+        mass = np.zeros((self.world_count, self.particle_count))
+        for k in range(3):
+            np.add.at(mass, (slice(None), topology.faces[:, k]), np.broadcast_to(face_mass, (self.world_count, len(areas))))
+        return mass
+
+    def _allocate(self) -> None:
+        """Room for what the kernels keep for themselves."""
+        state, size, n, groups = self._state, self._size, self.particle_count, self.group_count
+        blocks = self.topology.blocks.count
+        size.blocks = blocks
+        # candidates seen in crumpled cloths: under 3 a vertex (vertex-triangle) and 8 a vertex (edge-edge)
+        size.vertex_triangle, size.edge_edge = 6 * n + 64, 16 * n + 128
+        if not self.self_contact:
+            size.vertex_triangle = size.edge_edge = 1
+        size.moved = 4 * n if self._cuda else 1
+
+        def empty(count: int, dtype: Any) -> wp.array:
+            return wp.zeros(groups * count, dtype=dtype, device=self.device)
+
+        for name in ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w"):
+            setattr(state, name, empty(n, self._number))
+        state.notes = empty(NOTES, self._number)
+        state.bounds = empty(6 * blocks, self._number)
+        state.box = empty(6, self._number)
+        state.vertex_triangle = empty(4 * size.vertex_triangle, self._integer)
+        state.edge_edge = empty(4 * size.edge_edge, self._integer)
+        state.pair_count = empty(2, self._integer)
+        state.moved = empty(size.moved, int)
+        state.worlds = self.world_count
+
+    # -- state
+
+    def positions(self) -> np.ndarray:
+        """(worlds, n, 3) float64, a copy [m]."""
+        return self.local_positions() + self.origin[:, None]
+
+    def local_positions(self) -> np.ndarray:
+        """(worlds, n, 3) float32, relative to each world's ``origin`` [m]: the solver's own digits."""
+        s, n = self._state, self.particle_count
+        return np.stack([self._get(a, n) for a in (s.x, s.y, s.z)], axis=-1)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(worlds, 3) float64, what ``local_positions`` are relative to [m]."""
+        return self._scalars[:, ORIGIN : ORIGIN + 3].astype(np.float64)
+
+    def velocities(self) -> np.ndarray:
+        """(worlds, n, 3) float32, a copy [m/s]."""
+        s, n = self._state, self.particle_count
+        return np.stack([self._get(a, n) for a in (s.vx, s.vy, s.vz)], axis=-1)
+
+    def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
+        """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
+        positions = np.asarray(positions, dtype=np.float64)
+        # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
+        origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
+        notes = np.zeros((self.world_count, NOTES), dtype=np.float32)
+        notes[:, TRAVEL] = 1.0e9
+        speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
+        notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
+        self.load_state(
+            dict(
+                local=(positions - origin[:, None]).astype(np.float32), origin=origin.astype(np.float32),
+                velocities=np.asarray(velocities, dtype=np.float32), notes=notes,
+            )
+        )  # fmt: skip
+
+    def save_state(self) -> dict[str, np.ndarray]:
+        """All that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
+        notes = self._get(self._state.notes, NOTES).copy()
+        # the list of candidate pairs is not part of the state: it is made anew, which changes no result
+        notes[:, TRAVEL] = 1.0e9
+        return dict(
+            local=self.local_positions(), origin=self._scalars[:, ORIGIN : ORIGIN + 3].copy(),
+            velocities=self.velocities(), notes=notes,
+        )  # fmt: skip
+
+    def load_state(self, state: dict[str, np.ndarray]) -> None:
+        """Set the state that `save_state` gave; leading axes of 1 are spread over the worlds."""
+        s, worlds, n = self._state, self.world_count, self.particle_count
+        local = np.broadcast_to(state["local"], (worlds, n, 3))
+        velocities = np.broadcast_to(state["velocities"], (worlds, n, 3))
+        for k, (a, b, c) in enumerate((("x", "px", "vx"), ("y", "py", "vy"), ("z", "pz", "vz"))):
+            wp.copy(getattr(s, a), self._put(local[..., k]))
+            wp.copy(getattr(s, b), self._put(local[..., k]))
+            wp.copy(getattr(s, c), self._put(velocities[..., k]))
+        wp.copy(s.notes, self._put(np.broadcast_to(state["notes"], (worlds, NOTES))))
+        self._scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
+        s.scalars = self._put(self._scalars)
+        if hasattr(self, "_grips"):
+            self.set_grips(self._grips)
+
+    def finite(self) -> np.ndarray:
+        """(worlds,) bool: whether every position and velocity is a finite number."""
+        s, n = self._state, self.particle_count
+        arrays = (s.x, s.y, s.z, s.vx, s.vy, s.vz)
+        return np.all([np.isfinite(self._get(a, n)).all(axis=1) for a in arrays], axis=0)
+
+    def positions_on_device(self) -> wp.array:
+        """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy."""
+        from nuno.solver.pack import pack_positions
+
+        return pack_positions(self._state, self.world_count, self.particle_count, self.lanes, self.device)
+
+    @property
+    def arrays(self) -> dict[str, wp.array]:
+        """The solver's own arrays x, y, z [m] and vx, vy, vz [m/s].
+
+        On CUDA and for one world on the CPU each is (worlds * n,) float32; in a batch on the CPU it is
+        (groups * n,) vectors of 16 worlds.
+        """
+        return {name: getattr(self._state, name) for name in ("x", "y", "z", "vx", "vy", "vz")}
+
+    @property
+    def pair_counts(self) -> np.ndarray:
+        """(worlds, 2) int: listed vertex-triangle and edge-edge candidates, those that did not fit included."""
+        return self._get(self._state.pair_count, 2)
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes of device memory that this cloth holds, elements shared by all worlds included."""
+        total = 0
+        for holder in (self._state, self._topology):
+            for name in holder._cls.vars:
+                value = getattr(holder, name)
+                total += value.capacity if isinstance(value, wp.array) else 0
+        return total
+
+    # -- what acts on the cloth
+
+    def set_colliders(self, colliders: Colliders | None) -> None:
+        """The static shapes that the cloth meets; None for none."""
+        if colliders is None:
+            shapes = Shapes()
+            shapes.count = shapes.stride = shapes.mesh_stride = 0
+            shapes.kind = wp.zeros(1, dtype=int, device=self.device)
+            shapes.table = wp.zeros(1, dtype=float, device=self.device)
+            shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
+        else:
+            shapes = colliders.shapes
+        self._colliders, self._shapes = colliders, shapes
+        self._size.near = max(1, int(shapes.count)) + 1
+        self._state.near = wp.zeros(self.group_count * self._size.near, dtype=int, device=self.device)
+        self._large = None
+
+    def set_forces(self, forces: np.ndarray | None) -> None:
+        """Forces [N] on the vertices, (worlds, n, 3), held until set anew; None for none."""
+        s = self._state
+        self._pushed = forces is not None
+        if forces is None:
+            self._size.forces = 1
+            for name in ("fx", "fy", "fz"):
+                setattr(s, name, wp.zeros(self.group_count, dtype=self._number, device=self.device))
+        else:
+            self._size.forces = self.particle_count
+            for k, name in enumerate(("fx", "fy", "fz")):
+                setattr(s, name, self._put(np.asarray(forces)[..., k]))
+        self._large = None
+
+    def set_grips(self, grips: Sequence[GripSpec]) -> None:
+        """What is held, and where it goes; vertices that are no longer held get their mass back."""
+        self._grips = tuple(grips)
+        worlds = self.world_count
+        entries: list[dict[str, Any]] = []
+        for grip in grips:
+            if grip.vertices is not None:
+                corners = np.repeat(np.asarray(grip.vertices)[..., None], 3, axis=-1)
+                barycentric = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+            else:
+                corners, barycentric = np.asarray(grip.corners), np.asarray(grip.barycentric)
+            for k in range(corners.shape[1]):
+                single = barycentric[:, k]
+                vertex = bool((np.abs(single[:, 0] - 1.0) < 1e-6).all())
+                entries.append(
+                    dict(
+                        corners=corners[:, k], weights=single, times=np.asarray(grip.times, float),
+                        positions=np.asarray(grip.positions)[:, k] - self.origin[:, None], ease=grip.interpolation == "minimum_jerk",
+                        compliance=float(grip.compliance), fixed=vertex and grip.compliance == 0.0,
+                    )
+                )  # fmt: skip
+        keys = max([len(e["times"]) for e in entries], default=1)
+        count = max(1, len(entries))
+        corner = np.full((worlds, count, 3), -1, dtype=np.int32)
+        weight = np.zeros((worlds, count, 3), dtype=np.float32)
+        place = np.zeros((worlds, count, keys, 3), dtype=np.float32)
+        self._grip_times = np.zeros((count, keys))
+        mass = self._inverse_mass.copy()
+        for g, e in enumerate(entries):
+            corner[:, g], weight[:, g] = e["corners"], e["weights"]
+            m = len(e["times"])
+            self._grip_times[g] = np.concatenate([e["times"], np.full(keys - m, e["times"][-1])])
+            place[:, g, :m] = e["positions"]
+            place[:, g, m:] = e["positions"][:, -1:]
+            if e["fixed"]:
+                held = np.nonzero(e["corners"][:, 0] >= 0)[0]
+                mass[held, e["corners"][held, 0]] = 0.0
+        s, size = self._state, self._size
+        size.keys, size.grips = count * keys, count
+        for k, name in enumerate(("grip_x", "grip_y", "grip_z")):
+            setattr(s, name, self._put(place[..., k]))
+        s.grip_weight, s.grip_corner = self._put(weight), self._put(corner, integer=True)
+        wp.copy(s.w, self._put(mass))
+        self._grip_count, self._grip_keys = len(entries), keys
+        put = lambda values, dtype: wp.array(values, dtype=dtype, device=self.device)  # noqa: E731
+        self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
+        self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
+        self._grip_soft = np.array([e["compliance"] for e in entries] or [0.0])
+        self._large = None
+
+    # -- running
+
+    def run(self, time: float, duration: float) -> None:
+        """Advance by whole frames and a shorter last one.
+
+        Args:
+            time: World time at the start [s], for the grips' paths.
+            duration: How long [s].
+        """
+        frame = 1.0 / self.frame_rate
+        whole = math.floor(duration / frame + 1e-6)
+        rest = duration - whole * frame
+        if whole:
+            self._launch(time, frame / self.substeps, whole * self.substeps)
+        if rest > 1e-9:
+            count = max(1, math.ceil(self.substeps * rest / frame - 1e-6))
+            self._launch(time + whole * frame, rest / count, count)
+
+    def settings(self, time: float, dt: float) -> Settings:
+        """The run's settings, paths counted from ``time``."""
+        run = Settings()
+        run.dt = dt
+        run.gravity = wp.vec3(*(float(g) for g in self.gravity))
+        run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
+        # candidates within a third of a cell: few enough to look at, and good for several substeps
+        run.margin = 0.35 * self.topology.cell_size
+        run.slack = 1.2 * run.margin / self.topology.altitude
+        run.frame = self.substeps
+        run.relax = 1.0 / OVER_RELAXATION
+        run.grips, run.keys = self._grip_count, self._grip_keys
+        run.grip_time = wp.array((self._grip_times - time).ravel(), dtype=float, device=self.device)
+        run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
+        run.grip_soft = wp.array(self._grip_soft / dt**2, dtype=float, device=self.device)
+        return run
+
+    def _launch(self, time: float, dt: float, substeps: int) -> None:
+        run = self.settings(time, dt)
+        self._reset_clock()
+        if self.plan == "large":
+            if self._large is None:
+                self._large = LargePlan(self._state, self._topology, self._size, self._shapes, self.device)
+            self._large.run(run, substeps, self.world_count)
+            return
+        common = [self._state, self._topology, self._size, run, self._shapes]
+        if self._cuda:
+            wp.launch(
+                run_worlds, dim=self.group_count * BLOCK_THREADS, inputs=[*common, 0, substeps, BLOCK_THREADS],
+                device=self.device, block_dim=BLOCK_THREADS,
+            )  # fmt: skip
+            return
+
+        def group(first: int) -> None:
+            wp.launch(run_worlds, dim=1, inputs=[*common, first, substeps, 1], device=self.device)
+
+        if self.group_count == 1:
+            group(0)
+        else:
+            list(_pool().map(group, range(self.group_count)))
+
+    def _reset_clock(self) -> None:
+        from nuno.solver.pack import reset_clock
+
+        reset_clock(self._state, self.group_count, self.lanes, self.device)
+
+
+def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
+    """The topology's arrays on a device, made once."""
+    found = topology.device_arrays.get(device)
+    if found is not None:
+        return found
+
+    def put(values: np.ndarray, dtype: Any) -> wp.array:
+        kind = np.int32 if dtype in (int, wp.vec2i, wp.vec3i, wp.vec4i) else np.float32
+        return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)
+
+    t, b = topology, topology.blocks
+    made = dict(
+        edge=put(t.edges.vertices, wp.vec2i), edge_rest=put(t.edges.extra["rest"], float),
+        edge_scale=put(t.edges.scale, float), edge_colour=put(t.edges.offsets, int), edge_soft=put(t.edges.axis, int),
+        cell=put(t.cells.vertices, wp.vec4i), cell_scale=put(t.cells.extra["quarter"], float),
+        cell_colour=put(t.cells.offsets, int), cell_soft=put(t.cells.axis, int),
+        triangle=put(t.triangles.vertices, wp.vec3i), triangle_u=put(t.triangles.extra["u"], wp.vec3),
+        triangle_v=put(t.triangles.extra["v"], wp.vec3), triangle_area=put(t.triangles.extra["area"], float),
+        triangle_colour=put(t.triangles.offsets, int),
+        triangle_soft=put(np.zeros((len(t.triangles), 3)), wp.vec3i),
+        line=put(t.lines.vertices, wp.vec3i), line_scale=put(t.lines.scale, float),
+        line_colour=put(t.lines.offsets, int), line_soft=put(t.lines.axis, int),
+        hinge=put(t.hinges.vertices, wp.vec4i), hinge_weight=put(t.hinges.extra["weight"], wp.vec4),
+        hinge_rest=put(t.hinges.extra["rest"], float), hinge_scale=put(t.hinges.scale, float),
+        hinge_colour=put(t.hinges.offsets, int), hinge_soft=put(t.hinges.axis, int),
+        block_vertex=put(b.vertex, int), block_vertex_start=put(b.vertex_start, int),
+        block_face=put(b.face, wp.vec3i), block_face_start=put(b.face_start, int),
+        block_face_reach=put(b.face_reach, float), block_edge=put(b.edge, wp.vec2i),
+        block_edge_start=put(b.edge_start, int), block_edge_reach=put(b.edge_reach, float),
+        rest=put(t.rest, wp.vec3), ring_triangle=put(b.ring_triangle, wp.vec4i), ring_edge=put(b.ring_edge, wp.vec4i),
+    )  # fmt: skip
+    topology.device_arrays[device] = made
+    return made

@@ -1,0 +1,82 @@
+"""Grips: vertices and surface points that follow key frames."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import clipped, choose, fill, gather, known, largest, over, place, times
+from nuno.solver.state import CLOCK, Settings
+
+
+@wp.func
+def key_position(t: Any, run: Settings, g: int):
+    """Where grip g should be now: linear or quintic minimum jerk between its key frames."""
+    now = largest(t.notes[CLOCK])
+    first = g * run.keys
+    k = int(0)
+    while k < run.keys - 2 and now > run.grip_time[first + k + 1]:
+        k = k + 1
+    last = wp.min(k + 1, run.keys - 1)
+    begin = run.grip_time[first + k]
+    span = run.grip_time[first + last] - begin
+    s = float(1.0)
+    if span > 0.0:
+        s = wp.clamp((now - begin) / span, 0.0, 1.0)
+    if run.grip_ease[g] != 0:
+        s = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    a = first + k
+    b = first + last
+    x = t.grip_x[a] + (t.grip_x[b] - t.grip_x[a]) * s
+    y = t.grip_y[a] + (t.grip_y[b] - t.grip_y[a]) * s
+    z = t.grip_z[a] + (t.grip_z[b] - t.grip_z[a]) * s
+    return x, y, z
+
+
+@wp.func
+def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
+    """Stiff grips on vertices: the vertex has no inverse mass and stands where its path is."""
+    one = fill(t.x[0], 1.0)
+    for g in range(thread, run.grips, threads):
+        if run.grip_fixed[g] != 0:
+            x, y, z = key_position(t, run, g)
+            i = clipped(t.grip_corner[3 * g])
+            # a world without this grip writes back what was there
+            on = times(known(one, t.grip_corner[3 * g]), one - choose(gather(t.w, i), one, one - one))
+            place(t.x, i, choose(on, x, gather(t.x, i)))
+            place(t.y, i, choose(on, y, gather(t.y, i)))
+            place(t.z, i, choose(on, z, gather(t.z, i)))
+
+
+@wp.func
+def pull_points(t: Any, run: Settings, thread: int, threads: int):
+    """Grips on surface points, and compliant ones: c = sum b_i x_i - path, one after the other."""
+    if thread == 0:
+        for g in range(run.grips):
+            if run.grip_fixed[g] == 0:
+                x, y, z = key_position(t, run, g)
+                on = known(x, t.grip_corner[3 * g])
+                a = clipped(t.grip_corner[3 * g])
+                b = clipped(t.grip_corner[3 * g + 1])
+                c = clipped(t.grip_corner[3 * g + 2])
+                ka = t.grip_weight[3 * g]
+                kb = t.grip_weight[3 * g + 1]
+                kc = t.grip_weight[3 * g + 2]
+                dx = times(ka, gather(t.x, a)) + times(kb, gather(t.x, b)) + times(kc, gather(t.x, c)) - x
+                dy = times(ka, gather(t.y, a)) + times(kb, gather(t.y, b)) + times(kc, gather(t.y, c)) - y
+                dz = times(ka, gather(t.z, a)) + times(kb, gather(t.z, b)) + times(kc, gather(t.z, c)) - z
+                wa = times(ka, gather(t.w, a))
+                wb = times(kb, gather(t.w, b))
+                wc = times(kc, gather(t.w, c))
+                weight = times(wa, ka) + times(wb, kb) + times(wc, kc)
+                s = over(-on, weight + fill(x, run.grip_soft[g] + 1.0e-9))
+                nudge(t, a, dx, dy, dz, times(s, wa))
+                nudge(t, b, dx, dy, dz, times(s, wb))
+                nudge(t, c, dx, dy, dz, times(s, wc))
+
+
+@wp.func
+def nudge(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
+    """Move particle i (its own in each lane) by s (dx, dy, dz)."""
+    place(t.x, i, gather(t.x, i) + times(dx, s))
+    place(t.y, i, gather(t.y, i) + times(dy, s))
+    place(t.z, i, gather(t.z, i) + times(dz, s))

@@ -1,0 +1,95 @@
+"""The first and the last act of a substep: predict positions, and read velocities off them."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import choose, fill, largest, most, over, times
+from nuno.solver.state import CLOCK, DRAG, SPEED, TRAVEL, Settings
+
+
+@wp.func
+def predict(t: Any, n: int, run: Settings, thread: int, threads: int):
+    """Gravity, pushes and air drag (implicit: v / (1 + drag dt)), then x = p + v dt."""
+    one = fill(t.x[0], 1.0)
+    zero = fill(t.x[0], 0.0)
+    slow = over(one, one + t.scalars[DRAG] * run.dt)
+    gx = fill(one, run.gravity[0] * run.dt)
+    gy = fill(one, run.gravity[1] * run.dt)
+    gz = fill(one, run.gravity[2] * run.dt)
+    for i in range(thread, n, threads):
+        w = t.w[i]
+        free = choose(w, one, zero)
+        ux = t.vx[i] + gx
+        uy = t.vy[i] + gy
+        uz = t.vz[i] + gz
+        if run.pushed != 0:
+            ux = ux + times(w, t.fx[i]) * run.dt
+            uy = uy + times(w, t.fy[i]) * run.dt
+            uz = uz + times(w, t.fz[i]) * run.dt
+        keep = times(free, slow)
+        ux = times(ux, keep)
+        uy = times(uy, keep)
+        uz = times(uz, keep)
+        x = t.x[i]
+        y = t.y[i]
+        z = t.z[i]
+        t.px[i] = x
+        t.py[i] = y
+        t.pz[i] = z
+        t.vx[i] = ux
+        t.vy[i] = uy
+        t.vz[i] = uz
+        t.x[i] = x + ux * run.dt
+        t.y[i] = y + uy * run.dt
+        t.z[i] = z + uz * run.dt
+
+
+@wp.func
+def raise_speed(notes: wp.array(dtype=float), value: float, threads: int):
+    """Keep the largest squared speed."""
+    if threads > 1:
+        wp.atomic_max(notes, SPEED, value)
+    else:
+        notes[SPEED] = most(notes[SPEED], value)
+
+
+@wp.func
+def raise_speed(notes: wp.array(dtype=Any), value: Any, threads: int):  # noqa: F811
+    notes[SPEED] = most(notes[SPEED], value)
+
+
+@wp.func
+def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
+    """v = (x - p) / dt, and the largest speed.
+
+    Written as the predicted velocity plus what the constraints moved, so that rounding of the large coordinates
+    does not enter a free particle's velocity.
+    """
+    rate = 1.0 / run.dt
+    top = fill(t.x[0], 0.0)
+    for i in range(thread, n, threads):
+        vx = t.vx[i] + (t.x[i] - (t.px[i] + t.vx[i] * run.dt)) * rate
+        vy = t.vy[i] + (t.y[i] - (t.py[i] + t.vy[i] * run.dt)) * rate
+        vz = t.vz[i] + (t.z[i] - (t.pz[i] + t.vz[i] * run.dt)) * rate
+        t.vx[i] = vx
+        t.vy[i] = vy
+        t.vz[i] = vz
+        top = most(top, times(vx, vx) + times(vy, vy) + times(vz, vz))
+    if thread < n:
+        raise_speed(t.notes, top, threads)
+
+
+@wp.func
+def reset_speed(t: Any, thread: int):
+    """Forget the largest speed before it is measured anew; one thread does it."""
+    if thread == 0:
+        t.notes[SPEED] = fill(t.x[0], 0.0)
+
+
+@wp.func
+def tick(t: Any, run: Settings, thread: int):
+    """Advance the run's clock and the distance that anything may have gone since the pairs were listed."""
+    if thread == 0:
+        t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], run.dt)
+        t.notes[TRAVEL] = t.notes[TRAVEL] + wp.sqrt(largest(t.notes[SPEED])) * fill(t.x[0], run.dt)

@@ -1,0 +1,234 @@
+"""One source for two machines: arithmetic on a float, or on sixteen worlds in the lanes of a vector.
+
+On CUDA a thread handles one constraint of one world and every quantity is a ``float``. On the CPU a batch puts
+sixteen worlds into the lanes of a vector: the same constraint functions, typed ``Any``, then compile to SIMD.
+The functions here are the few elementwise operations that Warp spells differently for the two.
+"""
+
+import warp as wp
+
+LANES = 16
+"""Worlds in one vector: one AVX-512 register of floats."""
+
+lane = wp.types.vector(length=LANES, dtype=float)
+lane_int = wp.types.vector(length=LANES, dtype=int)
+
+# Clang's vector extension: what it compiles to is SIMD by construction, not by the optimiser's grace.
+_SIMD = (
+    "typedef float V __attribute__((vector_size(64), aligned(4)));"
+    "typedef int I __attribute__((vector_size(64), aligned(4)));"
+)
+
+
+def _simd(expression: str, *arguments: str) -> str:
+    """C++ for a function of lanes: ``expression`` of the arguments' capitals."""
+    loads = "".join(f"V {a.upper()} = *(const V*)&{a};" for a in arguments)
+    return f"{_SIMD}{loads} wp::vec_t<16,wp::float32> r; *(V*)&r = {expression}; return r;"
+
+
+@wp.func
+def times(a: float, b: float):
+    """The elementwise product."""
+    return a * b
+
+
+@wp.func_native(_simd("A * B", "a", "b"))
+def times(a: lane, b: lane) -> lane: ...  # noqa: F811 (Warp overload)
+
+
+@wp.func
+def over(a: float, b: float):
+    """The elementwise quotient."""
+    return a / b
+
+
+@wp.func_native(_simd("A / B", "a", "b"))
+def over(a: lane, b: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def root(a: float):
+    """The elementwise square root."""
+    return wp.sqrt(a)
+
+
+@wp.func_native(_simd("__builtin_elementwise_sqrt(A)", "a"))
+def root(a: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def fill(like: float, value: float):
+    """A constant, in the type of ``like``."""
+    return value
+
+
+@wp.func
+def fill(like: lane, value: float):  # noqa: F811
+    return lane(value)
+
+
+@wp.func
+def choose(sign: float, a: float, b: float):
+    """``a`` where ``sign`` is positive, else ``b``."""
+    return wp.where(sign > 0.0, a, b)
+
+
+@wp.func_native(_simd("(V)((SIGN > 0.f) ? (I)A : (I)B)", "sign", "a", "b"))
+def choose(sign: lane, a: lane, b: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def least(a: float, b: float):
+    """The elementwise minimum."""
+    return wp.min(a, b)
+
+
+@wp.func_native(_simd("(V)((A < B) ? (I)A : (I)B)", "a", "b"))
+def least(a: lane, b: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def most(a: float, b: float):
+    """The elementwise maximum."""
+    return wp.max(a, b)
+
+
+@wp.func_native(_simd("(V)((A > B) ? (I)A : (I)B)", "a", "b"))
+def most(a: lane, b: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def size_of(a: float):
+    """The elementwise absolute value."""
+    return wp.abs(a)
+
+
+@wp.func_native(_simd("(V)((A > 0.f) ? (I)A : (I)(-A))", "a"))
+def size_of(a: lane) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def anywhere(a: float):
+    """Whether a lane is positive."""
+    return a > 0.0
+
+
+@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;")
+def anywhere(a: lane) -> bool: ...  # noqa: F811
+
+
+@wp.func
+def largest(a: float):
+    """The largest lane."""
+    return a
+
+
+@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_max(A);")
+def largest(a: lane) -> float: ...  # noqa: F811
+
+
+@wp.func
+def highest(a: int):
+    """The largest lane of an integer."""
+    return a
+
+
+@wp.func
+def highest(a: lane_int):  # noqa: F811
+    return wp.max(a)
+
+
+@wp.func
+def gather(x: wp.array(dtype=float), i: int):
+    """Element i of ``x``; with lanes, each lane reads its own element."""
+    return x[i]
+
+
+@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = x.data[i[l]][l]; return r;")
+def gather(x: wp.array(dtype=lane), i: lane_int) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def place(x: wp.array(dtype=float), i: int, value: float):
+    """Write ``value`` to element i of ``x``; with lanes, each lane writes its own element."""
+    x[i] = value
+
+
+@wp.func_native("for (int l=0; l<16; ++l) x.data[i[l]][l] = value[l];")
+def place(x: wp.array(dtype=lane), i: lane_int, value: lane): ...  # noqa: F811
+
+
+@wp.func
+def known(like: float, i: int):
+    """1 where the index i is not negative, else 0."""
+    return wp.where(i < 0, 0.0, 1.0)
+
+
+@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = i[l] < 0 ? 0.f : 1.f; return r;")
+def known(like: lane, i: lane_int) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def within(like: float, k: int, count: int):
+    """1 where k is below ``count``, else 0."""
+    return wp.where(k < count, 1.0, 0.0)
+
+
+@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = k < count[l] ? 1.f : 0.f; return r;")
+def within(like: lane, k: int, count: lane_int) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def clipped(i: int):
+    """The index i, or 0 where it is negative."""
+    return wp.max(i, 0)
+
+
+@wp.func_native("wp::vec_t<16,wp::int32> r; for (int l=0; l<16; ++l) r[l] = i[l] < 0 ? 0 : i[l]; return r;")
+def clipped(i: lane_int) -> lane_int: ...  # noqa: F811
+
+
+@wp.func
+def window(a: wp.array(dtype=float), first: int, count: int):
+    """The ``count`` elements of ``a`` from ``first`` on, without a copy."""
+    return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4), shape=(count,), dtype=float)
+
+
+@wp.func
+def window(a: wp.array(dtype=lane), first: int, count: int):  # noqa: F811
+    return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane)
+
+
+@wp.func
+def window(a: wp.array(dtype=int), first: int, count: int):  # noqa: F811
+    return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4), shape=(count,), dtype=int)
+
+
+@wp.func
+def window(a: wp.array(dtype=lane_int), first: int, count: int):  # noqa: F811
+    return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane_int)
+
+
+@wp.func
+def per_world(like: float, table: wp.array(dtype=float), group: int, stride: int, worlds: int, entry: int):
+    """Entry of a table that holds one row for all worlds (stride 0) or a row per world."""
+    return table[group * stride + entry]
+
+
+@wp.func
+def per_world(like: lane, table: wp.array(dtype=float), group: int, stride: int, worlds: int, entry: int):  # noqa: F811
+    r = lane(table[entry])
+    if stride > 0:
+        for k in range(16):
+            r[k] = table[wp.min(group * 16 + k, worlds - 1) * stride + entry]
+    return r
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+if (threads > 1) __syncthreads();
+#endif
+""")
+def barrier(threads: int):
+    """Wait for all threads of the block; nothing to wait for on the CPU."""
+    ...

@@ -1,0 +1,60 @@
+"""Small kernels between the solver's layout and the rest: positions for the renderer, the clock."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import lane
+from nuno.solver.state import CLOCK, NOTES, ORIGIN, SCALARS
+
+
+@wp.kernel(enable_backward=False)
+def pack(x: wp.array(dtype=Any), y: wp.array(dtype=Any), z: wp.array(dtype=Any), scalars: wp.array(dtype=Any), n: int, out: wp.array2d(dtype=wp.vec3)):
+    """One world after the other, (worlds, n) of vec3."""
+    world, i = wp.tid()
+    k = world * n + i
+    o = world * SCALARS + ORIGIN
+    out[world, i] = wp.vec3(x[k] + scalars[o], y[k] + scalars[o + 1], z[k] + scalars[o + 2])
+
+
+@wp.kernel(enable_backward=False)
+def pack_lanes(x: wp.array(dtype=lane), y: wp.array(dtype=lane), z: wp.array(dtype=lane), scalars: wp.array(dtype=lane), n: int, out: wp.array2d(dtype=wp.vec3)):  # noqa: E501
+    """The same out of lanes."""
+    group, i = wp.tid()
+    k = group * n + i
+    a = x[k]
+    b = y[k]
+    c = z[k]
+    o = group * SCALARS + ORIGIN
+    a = a + scalars[o]
+    b = b + scalars[o + 1]
+    c = c + scalars[o + 2]
+    for j in range(16):
+        world = group * 16 + j
+        if world < out.shape[0]:
+            out[world, i] = wp.vec3(a[j], b[j], c[j])
+
+
+@wp.kernel(enable_backward=False)
+def zero_clock(notes: wp.array(dtype=Any), stride: int, entry: int):
+    """Set the clock of each world or group to zero."""
+    i = wp.tid() * stride + entry
+    notes[i] = notes[i] * 0.0
+
+
+wp.overload(pack, [wp.array(dtype=float), wp.array(dtype=float), wp.array(dtype=float), wp.array(dtype=float), int, wp.array2d(dtype=wp.vec3)])
+wp.overload(zero_clock, [wp.array(dtype=float), int, int])
+wp.overload(zero_clock, [wp.array(dtype=lane), int, int])
+
+
+def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str) -> wp.array:
+    """(worlds, n) array of vec3 [m] from a solver's state."""
+    out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
+    kernel, count = (pack_lanes, -(-worlds // lanes)) if lanes > 1 else (pack, worlds)
+    wp.launch(kernel, dim=(count, n), inputs=[state.x, state.y, state.z, state.scalars, n, out], device=device)
+    return out
+
+
+def reset_clock(state: Any, groups: int, lanes: int, device: str) -> None:
+    """Start a run's clock at zero."""
+    wp.launch(zero_clock, dim=groups, inputs=[state.notes, NOTES, CLOCK], device=device)

@@ -1,0 +1,174 @@
+"""What a kernel sees: the state of the worlds, the cloth that they share, and the settings of a run."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import lane, lane_int, window
+
+# Per-world scalars in `State.scalars`.
+DRAG, FRICTION, DAMPING, THICKNESS, ORIGIN = 0, 1, 2, 3, 4
+SCALARS = 7
+"""The origin takes three: positions are kept relative to it, for a float's digits are scarce: at 1 m from zero
+a coordinate's step is 1e-7 m, a tenth of what gravity moves a vertex in a substep."""
+# Per-world figures that the solver keeps for itself in `State.notes`.
+TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
+NOTES = 4
+
+
+def _state_fields(number: type, integer: type) -> dict[str, Any]:
+    """The fields of a State whose numbers are floats or lanes of floats."""
+    numbers = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w", "fx", "fy", "fz")
+    numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box")
+    numbers += ("grip_x", "grip_y", "grip_z", "grip_weight")
+    integers = ("grip_corner", "vertex_triangle", "edge_edge", "pair_count")
+    fields = {name: wp.array(dtype=number) for name in numbers}
+    fields |= {name: wp.array(dtype=integer) for name in integers}
+    return fields | {"moved": wp.array(dtype=int), "near": wp.array(dtype=int), "group": int, "worlds": int}
+
+
+def _make(name: str, number: type, integer: type) -> Any:
+    return wp.struct(type(name, (), {"__annotations__": _state_fields(number, integer), "__module__": __name__}))
+
+
+StateFloat = _make("StateFloat", float, int)
+"""One world after the other: CUDA, and one world alone on the CPU."""
+
+StateLanes = _make("StateLanes", lane, lane_int)
+"""Sixteen worlds in the lanes of each element: batches on the CPU."""
+
+
+@wp.struct
+class Topology:
+    """The cloth's elements, the same in every world."""
+
+    particles: int
+    edge: wp.array(dtype=wp.vec2i)
+    edge_rest: wp.array(dtype=float)
+    edge_scale: wp.array(dtype=float)
+    edge_soft: wp.array(dtype=int)
+    edge_colour: wp.array(dtype=int)
+    cell: wp.array(dtype=wp.vec4i)
+    cell_scale: wp.array(dtype=float)
+    cell_soft: wp.array(dtype=int)
+    cell_colour: wp.array(dtype=int)
+    triangle: wp.array(dtype=wp.vec3i)
+    triangle_u: wp.array(dtype=wp.vec3)
+    triangle_v: wp.array(dtype=wp.vec3)
+    triangle_area: wp.array(dtype=float)
+    triangle_soft: wp.array(dtype=wp.vec3i)
+    triangle_colour: wp.array(dtype=int)
+    line: wp.array(dtype=wp.vec3i)
+    line_scale: wp.array(dtype=float)
+    line_soft: wp.array(dtype=int)
+    line_colour: wp.array(dtype=int)
+    hinge: wp.array(dtype=wp.vec4i)
+    hinge_weight: wp.array(dtype=wp.vec4)
+    hinge_rest: wp.array(dtype=float)
+    hinge_scale: wp.array(dtype=float)
+    hinge_soft: wp.array(dtype=int)
+    hinge_colour: wp.array(dtype=int)
+    # self-contact: elements sorted by block of neighbouring vertices
+    blocks: int
+    block_vertex: wp.array(dtype=int)
+    block_vertex_start: wp.array(dtype=int)
+    block_face: wp.array(dtype=wp.vec3i)
+    block_face_start: wp.array(dtype=int)
+    block_face_reach: wp.array(dtype=float)
+    block_edge: wp.array(dtype=wp.vec2i)
+    block_edge_start: wp.array(dtype=int)
+    block_edge_reach: wp.array(dtype=float)
+    # pairs of elements of neighbouring cells, and how near vertices are at rest to count as neighbours
+    rest: wp.array(dtype=wp.vec3)
+    ring_sq: float
+    contact_reach: float
+    ring_triangle: wp.array(dtype=wp.vec4i)
+    ring_edge: wp.array(dtype=wp.vec4i)
+
+
+@wp.struct
+class Sizes:
+    """How many elements of each per-world array belong to one world."""
+
+    stretch_soft: int
+    shear_soft: int
+    bend_soft: int
+    forces: int
+    keys: int
+    grips: int
+    blocks: int
+    vertex_triangle: int
+    edge_edge: int
+    moved: int
+    near: int
+
+
+@wp.struct
+class Settings:
+    """What holds for the whole run."""
+
+    dt: float
+    gravity: wp.vec3
+    pushed: int
+    damped: int
+    relax: float
+    touching: int
+    margin: float
+    slack: float
+    frame: int
+    grips: int
+    keys: int
+    grip_time: wp.array(dtype=float)
+    grip_ease: wp.array(dtype=int)
+    grip_fixed: wp.array(dtype=int)
+    grip_soft: wp.array(dtype=float)
+
+
+@wp.struct
+class Shapes:
+    """Static shapes: a row of numbers each, for all worlds (stride 0) or per world."""
+
+    count: int
+    stride: int
+    mesh_stride: int
+    kind: wp.array(dtype=int)
+    table: wp.array(dtype=float)
+    mesh: wp.array(dtype=wp.uint64)
+
+
+@wp.func
+def view(s: Any, group: int, n: int, size: Sizes):
+    """The part of the state that belongs to one world, or to one group of lanes."""
+    t = s
+    t.group = group
+    t.x = window(s.x, group * n, n)
+    t.y = window(s.y, group * n, n)
+    t.z = window(s.z, group * n, n)
+    t.px = window(s.px, group * n, n)
+    t.py = window(s.py, group * n, n)
+    t.pz = window(s.pz, group * n, n)
+    t.vx = window(s.vx, group * n, n)
+    t.vy = window(s.vy, group * n, n)
+    t.vz = window(s.vz, group * n, n)
+    t.w = window(s.w, group * n, n)
+    t.fx = window(s.fx, group * size.forces, size.forces)
+    t.fy = window(s.fy, group * size.forces, size.forces)
+    t.fz = window(s.fz, group * size.forces, size.forces)
+    t.stretch_soft = window(s.stretch_soft, group * size.stretch_soft, size.stretch_soft)
+    t.shear_soft = window(s.shear_soft, group * size.shear_soft, size.shear_soft)
+    t.bend_soft = window(s.bend_soft, group * size.bend_soft, size.bend_soft)
+    t.scalars = window(s.scalars, group * 7, 7)
+    t.notes = window(s.notes, group * 4, 4)
+    t.bounds = window(s.bounds, group * 6 * size.blocks, 6 * size.blocks)
+    t.box = window(s.box, group * 6, 6)
+    t.grip_x = window(s.grip_x, group * size.keys, size.keys)
+    t.grip_y = window(s.grip_y, group * size.keys, size.keys)
+    t.grip_z = window(s.grip_z, group * size.keys, size.keys)
+    t.grip_weight = window(s.grip_weight, group * 3 * size.grips, 3 * size.grips)
+    t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
+    t.vertex_triangle = window(s.vertex_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
+    t.edge_edge = window(s.edge_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
+    t.pair_count = window(s.pair_count, group * 2, 2)
+    t.moved = window(s.moved, group * size.moved, size.moved)
+    t.near = window(s.near, group * size.near, size.near)
+    return t

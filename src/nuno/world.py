@@ -1,0 +1,404 @@
+"""World: bodies that come and go, dynamics that come and go, and time."""
+
+from __future__ import annotations
+
+import math
+import os
+from contextlib import suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.background import Background
+from nuno.body import Body
+from nuno.dynamics import Dynamics, check_material, make_push
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.grip import Grip, make_grip
+from nuno.materials import Cloth
+from nuno.simulation import CHUNK, SOON, Simulation
+from nuno.snapshot import Snapshot, apply, capture, check_world_index
+from nuno.validation import count, finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.camera.camera import Camera
+
+
+class World(Simulation):
+    """A room: static bodies, which cost nothing, and attached ones, which move.
+
+    All methods may be called while the world runs in the background; they take effect between frames. Where a
+    body is asked for, an imagined world also takes the body of the world that it was imagined from.
+
+    Args:
+        device: "auto" (CUDA where there is a device, else the CPU), "cpu", "cuda" or "cuda:1" ...
+        gravity: (3,) [m/s2].
+        frame_rate: Frames per second of simulated time [1/s].
+        substeps: Substeps of a frame; None lets each solver choose by its rule.
+
+    Raises:
+        InvalidInputError: a value that is not finite or out of range.
+    """
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.stop()
+        else:
+            with suppress(Exception):  # the error that ended the block is the one to see
+                self.stop()
+
+    # Bodies
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, in the order in which they were added."""
+        with self._call():
+            return tuple(self._bodies.values())
+
+    def add(self, body: Body) -> Body:
+        """Put a body into the world and return it; a name that is taken gets a number ("box_1").
+
+        Raises:
+            BodyStateError: the body is in a world already.
+        """
+        with self._call():
+            if not isinstance(body, Body):
+                raise InvalidInputError(f"add needs a Body, got {type(body).__name__}")
+            if body._world is not None or body.key in self._bodies:
+                where = "this" if body.key in self._bodies else "another"
+                raise BodyStateError(f"{body.name!r} is in {where} world already")
+            for what, array in (("position", body._position), ("quaternion", body._quaternion)):
+                self._check_worlds(what, array.shape[:-1])
+            for what, value in (("friction", body.friction), ("thickness", body.thickness)):
+                self._check_worlds(what, np.shape(value))
+            if body._deformed is not None and len(body._deformed[0]) not in (1, self.world_count):
+                raise InvalidInputError(f"{body.name!r} has the shapes of {len(body._deformed[0])} worlds")
+            taken = {other.name for other in self._bodies.values()}
+            name, number_ = body._name, 0
+            while name in taken:
+                number_ += 1
+                name = f"{body._name}_{number_}"
+            body._name = name
+            self._register(body)
+            self._colliders_changed()
+        return body
+
+    def remove(self, body: Body | str) -> Body:
+        """Take a body out of the world, detached in the shape that it has now, and return it."""
+        with self._call():
+            gone = self._own(body)
+            if gone._dynamics is not None:
+                self._detach(gone)
+            for other in self._attached():
+                for grip in [g for g in other.grips if g.target is gone]:
+                    self._drop_grip(grip)
+            del self._bodies[gone.key]
+            gone._world = None
+            self._colliders_changed()
+        return gone
+
+    def find(self, name: str) -> Body:
+        """Return the body of that name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        with self._call():
+            return self._own(name)
+
+    # Dynamics
+
+    def attach(self, body: Body | str, material: Cloth | None = None) -> Body:
+        """Give a body dynamics, from the shape that it has now, at rest; no other body changes.
+
+        The body takes the material's friction and thickness over, and keeps them when it is detached. Without
+        a material a cloth gets ``Cloth`` with the body's friction.
+
+        Raises:
+            BodyStateError: it has dynamics already, or follows another frame.
+            InvalidInputError: the shape has no dynamics, or the material does not fit.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is not None:
+                raise BodyStateError(
+                    f"{own.name!r} is dynamic already; detach it first to change its material"
+                )
+            if own._parent is not None:
+                raise BodyStateError(f"{own.name!r} follows another frame; dissoc it first")
+            chosen = Cloth(friction=own.friction) if material is None else material
+            check_material(own.shape, chosen, self.world_count)
+            vertices = own._vertices()
+            positions = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+            dynamics = Dynamics(own.shape, chosen, positions, np.zeros_like(positions), chosen.friction, self)
+            own._friction = chosen.friction
+            own._deformed, own._dynamics = None, dynamics
+            self._colliders_changed()
+        return own
+
+    def detach(self, body: Body | str) -> Body:
+        """Take a body's dynamics away: static from now on, in the shape that it has now. Its grips let go.
+
+        Raises:
+            BodyStateError: it has none.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; there is nothing to detach")
+            self._detach(own)
+        return own
+
+    def grip(self, body: Body | str, where: Any, *, to: Any, compliance: float = 0.0) -> Grip:
+        """Hold points of a dynamic body from now on.
+
+        Args:
+            body: The body.
+            where: Vertex indices, (k,) for the same ones in every world or (worlds, k), -1 for none; or
+                ``SurfacePoints``, from ``body.at`` or ``body.closest``.
+            to: Where the mean of the points goes: a ``Path``, or a fixed point (3,) or (worlds, 3) [m]. The
+                points keep their present offsets from it, which turn with the path's quaternions. Or a
+                ``Body``: then they keep their present places in its frame.
+            compliance: [m/N]; 0 is stiff.
+
+        Raises:
+            BodyStateError: the body is static, or the leading body dynamic.
+            InvalidInputError: a vertex out of range, or a target that cannot be used.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
+            target = self._own(to) if isinstance(to, Body) else None
+            if target is not None and target._dynamics is not None:
+                raise BodyStateError(f"{target.name!r} is dynamic and cannot lead a grip")
+            grip = make_grip(own, where, to, number("compliance", compliance, low=0.0), target, self)
+            self._hold(grip)
+        return grip
+
+    def push(self, body: Body | str, force: ArrayLike, duration: float | None = None) -> None:
+        """Apply a force to a dynamic body.
+
+        Args:
+            body: The body.
+            force: (3,) or (worlds, 3), spread over the vertices by their share of the area; or of every
+                vertex, (n, 3) or (worlds, n, 3) [N]. Where worlds = n, two axes mean vertices.
+            duration: How long [s], on top of other pushes; None is until the next such push, which takes its
+                place (a force of zero ends it).
+
+        Raises:
+            BodyStateError: the body is static.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
+            own._dynamics.add_push(make_push(own.shape, force, duration, self))
+
+    def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
+        """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back."""
+        with self._call():
+            pair = self._pair(a, b)
+            if mu is None:
+                self._rules.friction.pop(pair, None)
+            else:
+                value = finite_array("mu", mu, (), (self.world_count,))
+                if (value < 0.0).any():
+                    raise InvalidInputError(f"mu must be at least 0, got {mu!r}")
+                self._rules.friction[pair] = float(value) if value.ndim == 0 else value
+            self._colliders_changed()
+
+    def ignore_contact(self, a: Body | str, b: Body | str, ignore: bool = True) -> None:
+        """Let two bodies pass through each other, or, with ``ignore=False``, touch again."""
+        with self._call():
+            pair = self._pair(a, b)
+            (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
+            self._colliders_changed()
+
+    def state(self, body: Body | str) -> dict[str, Any]:
+        """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
+
+        They are copies on the world's device, in the layout that other libraries expect (``__dlpack__``,
+        ``__cuda_array_interface__``). Positions are copied there; velocities pass through the host.
+        """
+        import warp as wp
+
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
+            solver = own._dynamics.solver
+            velocities: Any = wp.array(solver.velocities(), dtype=wp.vec3, device=self.device)
+            return {"positions": solver.positions_on_device(), "velocities": velocities}
+
+    # Time
+
+    def step(self) -> None:
+        """Advance by one frame."""
+        self.run(1.0 / self.frame_rate)
+
+    def run(self, seconds: float, progress: bool | None = None) -> None:
+        """Advance by whole frames and a shorter last one; in the background, sleep until that time has come.
+
+        Args:
+            seconds: How long [s] of simulated time.
+            progress: Show a progress bar; None shows one in a terminal after two seconds.
+
+        Raises:
+            SimulationDiverged: a state stopped being finite; the world keeps the last good one.
+        """
+        span = number("seconds", seconds, low=0.0)
+        with self._call():
+            begin = self._time
+        if self.is_running:
+            self._wait_until(begin + span)
+            return
+        frames = span * self.frame_rate
+        pieces = max(1, math.ceil(math.floor(frames + 1e-6) / CHUNK))
+        ends = [begin + k * CHUNK / self.frame_rate for k in range(1, pieces)] + [begin + span]
+        for end in _with_bar(ends, pieces, progress):
+            with self._call():
+                self._advance(end - self._time, end)
+
+    def start(self, real_time_factor: float = 1.0) -> None:
+        """Run in the background, at ``real_time_factor`` times real time (``math.inf``: as fast as possible).
+
+        Raises:
+            BodyStateError: the world runs already.
+        """
+        with self._call():
+            if self.is_running:
+                raise BodyStateError("the world runs in the background already")
+            factor = math.inf if real_time_factor == math.inf else real_time_factor
+            if factor != math.inf:
+                factor = number("real_time_factor", factor, above=0.0)
+            self._background = Background(self, factor)
+
+    def stop(self) -> None:
+        """End the running in the background, after the frame it is in; nothing where it does not run.
+
+        Raises:
+            Exception: whatever ended it early, such as ``SimulationDiverged``.
+        """
+        background = self._background
+        if background is not None:
+            background.stop()
+        self._raise_background_error()
+        self._background = None
+
+    # Snapshots
+
+    def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
+        """Return everything that the world is, and write it to ``path`` (.npz) where one is given."""
+        with self._call():
+            snapshot = capture(self)
+        if path is not None:
+            from nuno.snapshot_file import write_snapshot
+
+            write_snapshot(snapshot, path)
+        return snapshot
+
+    def restore(self, saved: Snapshot | str | os.PathLike[str]) -> None:
+        """Make the world what it was. Bodies removed since come back, bodies added since go.
+
+        Body and Grip objects keep their identity; a file of another process finds its bodies by name and
+        shape.
+
+        Raises:
+            FileFormatError: the file cannot be read, or its format is unknown or newer.
+        """
+        snapshot = saved
+        if isinstance(snapshot, str | os.PathLike):
+            from nuno.snapshot_file import read_snapshot
+
+            snapshot = read_snapshot(snapshot)
+        if not isinstance(snapshot, Snapshot):
+            raise InvalidInputError(
+                f"restore needs what save returned, or a path, got {type(saved).__name__}"
+            )
+        with self._call():
+            apply(snapshot, self)
+
+    def imagine(self, n: int, device: str | None = None) -> World:
+        """Return a batch of ``n`` copies of this world as it is now, with everything in it.
+
+        Args:
+            n: How many.
+            device: Where they run; None is where this world runs.
+
+        Raises:
+            BodyStateError: this world is a batch itself.
+        """
+        worlds = count("n", n)
+        with self._call():
+            if self.world_count != 1:
+                raise BodyStateError(
+                    f"only a single world can be imagined further; this one has {self.world_count}"
+                )
+            futures = World(device=self._device if device is None else device)
+            snapshot = capture(self)
+        apply(snapshot.spread(worlds), futures)
+        futures._family = self._family
+        return futures
+
+    def adopt(self, futures: World, k: int) -> None:
+        """Become world ``k`` of a batch that was imagined from this one; Body objects keep their identity.
+
+        Raises:
+            InvalidInputError: not imagined from this world, or ``k`` out of range.
+        """
+        if not isinstance(futures, World) or futures is self or futures._family != self._family:
+            raise InvalidInputError("adopt needs a world that imagine of this world returned")
+        with futures._call():
+            snapshot = capture(futures).pick(check_world_index(k, futures.world_count))
+        with self._call():
+            if self.world_count != 1:
+                raise BodyStateError("a batch cannot adopt a world; adopt it in the single world")
+            apply(snapshot, self)
+
+    # Cameras
+
+    def masks(self, camera: Camera, body: Body | str) -> Any:
+        """Return where ``body`` is seen: bool (h, w) or (worlds, h, w), on the device."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_masks(self, camera, self._own(body))
+
+    def depth(self, camera: Camera) -> Any:
+        """Return the depth along the camera's axis [m]: float (h, w) or (worlds, h, w), on the device."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_depth(self, camera)
+
+    def ids(self, camera: Camera) -> Any:
+        """Return which body is seen, its index in ``bodies`` or -1: int (h, w) or (worlds, h, w)."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_ids(self, camera)
+
+    def _wait_until(self, end: float) -> None:
+        while self._time < end - SOON:
+            background = self._background
+            self._raise_background_error()
+            if background is None or not background.alive:
+                return self.run(end - self._time)  # it was stopped while we slept
+            background.wait_for_frame()
+        return None
+
+
+def _with_bar(ends: list[float], pieces: int, progress: bool | None) -> Any:
+    if pieces == 1 and not progress:
+        return ends
+    from tqdm import tqdm
+
+    hidden = None if progress is None else not progress  # None: hidden unless standard error is a terminal
+    return tqdm(ends, desc="simulating", disable=hidden, delay=0.0 if progress else 2.0, leave=bool(progress))

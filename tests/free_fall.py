@@ -1,0 +1,122 @@
+"""A stand-in for the cloth solver, vertices that fall or follow their grips: for tests of the world."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import nuno.dynamics
+
+
+class Topology:
+    """Remembers what it was made of."""
+
+    @classmethod
+    def sheet(cls, cells, size):
+        """Take what a sheet is made of."""
+        return SimpleNamespace(cells=cells, size=size)
+
+    @classmethod
+    def mesh(cls, rest, faces):
+        """Take what a cloth mesh is made of."""
+        return SimpleNamespace(rest=rest, faces=faces)
+
+
+class Colliders:
+    """Remembers the bodies."""
+
+    made = 0
+
+    @classmethod
+    def from_bodies(cls, bodies, world_count, device, *, pair_friction):
+        """Take the bodies."""
+        Colliders.made += 1
+        for body in bodies:
+            assert np.isfinite(body.vertices).all()
+            assert np.ndim(body.friction) <= 1
+        return SimpleNamespace(
+            names=[b.name for b in bodies], friction=[b.friction for b in bodies], pairs=pair_friction
+        )
+
+
+class FreeFall:
+    """Unit masses under gravity and forces, one explicit step a run."""
+
+    diverging = False
+
+    def __init__(
+        self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction
+    ):
+        self.gravity = np.array(gravity, dtype=np.float32)
+        self.set_state(positions, velocities)
+        self.friction, self.grips, self.forces, self.colliders = friction, [], None, None
+        self.runs = []
+
+    def positions(self):
+        """(worlds, n, 3)."""
+        return self.x.copy()
+
+    def velocities(self):
+        """(worlds, n, 3)."""
+        return self.v.copy()
+
+    def set_state(self, positions, velocities):
+        """Take a state."""
+        self.x, self.v = positions.astype(np.float32), velocities.astype(np.float32)
+
+    def save_state(self):
+        """Copy everything."""
+        return {
+            "local": self.x.copy(),
+            "origin": np.zeros((len(self.x), 3), np.float32),
+            "velocities": self.v.copy(),
+        }
+
+    def load_state(self, state):
+        """Take what ``save_state`` gave."""
+        assert all(array.dtype == np.float32 for array in state.values())
+        self.x, self.v = state["local"].copy(), state["velocities"].copy()
+
+    def set_colliders(self, colliders):
+        """Take the colliders."""
+        self.colliders = colliders
+
+    def set_grips(self, grips):
+        """Take the grips."""
+        self.grips = list(grips)
+
+    def set_forces(self, forces):
+        """Take the forces."""
+        self.forces = forces
+
+    def run(self, time, duration):
+        """Fall."""
+        self.runs.append((time, duration))
+        force = 0.0 if self.forces is None else self.forces
+        self.v = self.v + np.float32(duration) * (self.gravity + force)
+        self.x = self.x + np.float32(duration) * self.v
+        for grip in self.grips:
+            k = np.clip(np.searchsorted(grip.times, time + duration), 0, len(grip.times) - 1)
+            corners = grip.vertices
+            if corners is None:  # the nearest vertex
+                heaviest = np.argmax(grip.barycentric, axis=-1)[..., None]
+                corners = np.take_along_axis(grip.corners, heaviest, axis=-1)[..., 0]
+            for world, chosen in enumerate(corners):
+                valid = chosen >= 0
+                self.x[world, chosen[valid]] = grip.positions[world, valid, k]
+        if FreeFall.diverging:
+            self.x[0, 0] = np.nan
+
+    def finite(self):
+        """(worlds,) bool."""
+        return np.isfinite(self.x).all(axis=(1, 2))
+
+
+@pytest.fixture
+def free_fall(monkeypatch):
+    """Let worlds use the stand-in."""
+    monkeypatch.setattr(nuno.dynamics, "backend", lambda: (FreeFall, Topology, Colliders))
+    monkeypatch.setattr(FreeFall, "diverging", False)
+    return FreeFall

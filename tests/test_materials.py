@@ -1,0 +1,69 @@
+"""Cloth: checks, values by world and by element, presets."""
+
+import numpy as np
+import pytest
+
+from nuno import Cloth, InvalidInputError, UnknownNameError
+
+
+def test_resolved_broadcasts_to_worlds_and_elements():
+    """Scalars become (worlds, 1), values by element (worlds, elements), pairs warp and weft."""
+    cloth = Cloth(
+        area_density=[0.1, 0.2],
+        stretch_stiffness=(100.0, np.arange(1.0, 6.0)),
+        bending_rigidity=np.full((2, 5), 1e-4),
+    )
+    got = cloth.resolved(2, 5)
+    assert all(array.dtype == np.float32 for array in got.values())
+    np.testing.assert_array_equal(got["area_density"], np.float32([[0.1], [0.2]]))
+    assert got["stretch_stiffness_warp"].shape == (2, 1)
+    np.testing.assert_array_equal(got["stretch_stiffness_weft"], [[1, 2, 3, 4, 5]] * 2)
+    assert got["bending_rigidity_warp"].shape == got["bending_rigidity_weft"].shape == (2, 5)
+    assert got["thickness"].shape == (2, 1)
+
+
+def test_resolved_names_what_fits():
+    """An array that fits neither worlds nor elements is refused with the shapes that do."""
+    with pytest.raises(
+        InvalidInputError, match=r"shear_stiffness.*\(2,\).*\(5,\).*got an array of shape \(3,\)"
+    ):
+        Cloth(shear_stiffness=[1.0, 2.0, 3.0]).resolved(2, 5)
+    with pytest.raises(InvalidInputError, match="thickness"):
+        Cloth(thickness=np.full(5, 1e-3)).resolved(2, 5)
+
+
+def test_one_world_of_a_batch():
+    """Picking a world keeps its own values only."""
+    cloth = Cloth(area_density=[0.1, 0.2], bending_rigidity=(np.full((2, 5), 1e-4), 3e-5)).of_world(1, 2)
+    assert cloth.area_density == 0.2
+    assert cloth.bending_rigidity[0].shape == (5,) and cloth.bending_rigidity[1] == 3e-5
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"area_density": 0.0},
+        {"thickness": -0.001},
+        {"stretch_stiffness": np.nan},
+        {"stretch_stiffness": (100.0, 0.0)},
+        {"bending_rigidity": (1e-5, 1e-5, 1e-5)},
+        {"friction": -0.1},
+        {"damping": np.inf},
+        {"shear_stiffness": "soft"},
+        {"air_drag": [[1.0]]},
+    ],
+)
+def test_bad_values(values):
+    """Every bad value is named."""
+    with pytest.raises(InvalidInputError, match=next(iter(values))):
+        Cloth(**values)
+
+
+def test_presets():
+    """Denim is as Wang, Ramamoorthi and O'Brien (2011) measured it; an unknown name lists the valid ones."""
+    denim = Cloth.preset("denim")
+    assert denim.area_density == 0.324
+    np.testing.assert_allclose(denim.bending_rigidity, (64e-6, 97e-6), rtol=1e-12)
+    assert Cloth.preset("towel").same_as(Cloth())
+    with pytest.raises(UnknownNameError, match="tablecloth"):
+        Cloth.preset("silk")

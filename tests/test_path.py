@@ -1,0 +1,65 @@
+"""Paths: interpolation, holding before and after, checks."""
+
+import numpy as np
+import pytest
+
+from nuno import InvalidInputError, Path
+
+EXACT = 1e-12  # a few roundings of float64 at lengths of about 1
+
+
+def test_linear():
+    """Straight between the keys, still before and after."""
+    path = Path([1.0, 2.0, 4.0], [(0, 0, 0), (1, 0, 0), (1, 2, 0)])
+    np.testing.assert_allclose(path.at(0.0), (0, 0, 0))
+    np.testing.assert_allclose(path.at(1.25), (0.25, 0, 0), atol=EXACT)
+    np.testing.assert_allclose(path.at([2.0, 3.0, 9.0]), [(1, 0, 0), (1, 1, 0), (1, 2, 0)], atol=EXACT)
+
+
+def test_minimum_jerk_is_the_quintic():
+    """10 s^3 - 15 s^4 + 6 s^5 in each segment, with rest at the keys."""
+    path = Path([0.0, 2.0, 3.0], [(0, 0, 0), (1, 0, 0), (0, 0, 0)], interpolation="minimum_jerk")
+    s = 0.3
+    np.testing.assert_allclose(path.at(0.6)[0], 10 * s**3 - 15 * s**4 + 6 * s**5, atol=EXACT)
+    np.testing.assert_allclose(path.at(2.5)[0], 0.5, atol=EXACT)
+    # the quintic leaves its key as 10 s^3: 1e-11 after 1e-4 of a segment
+    assert abs(path.at(2.0001)[0] - 1.0) < 1.1e-11
+
+
+def test_orientations_go_the_short_way():
+    """Halfway between 0 and 90 degrees is 45, whatever the quaternions' signs."""
+    turned = -np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+    path = Path([0.0, 1.0], np.zeros((2, 3)), [(1, 0, 0, 0), turned])
+    half = path.quaternion_at(0.5)
+    np.testing.assert_allclose(half, (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8)), atol=EXACT)
+    np.testing.assert_array_equal(Path([0.0], [(0, 0, 0)]).quaternion_at(3.0), (1, 0, 0, 0))
+
+
+def test_by_world_and_sampled():
+    """A path may differ by world, and its samples lie on it."""
+    path = Path([0.0, 1.0], [[(0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 1, 0)]], interpolation="minimum_jerk")
+    assert path.world_count == 2 and path.at(0.5).shape == (2, 3)
+    times = np.linspace(0.0, 1.0, 5)
+    samples = path.sampled(times)
+    np.testing.assert_array_equal(samples.at(times), path.at(times))
+    assert samples.at(times).shape == (2, 5, 3)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ([0.0, 0.0], np.zeros((2, 3))),
+        ([1.0, 0.0], np.zeros((2, 3))),
+        ([0.0, np.nan], np.zeros((2, 3))),
+        ([], np.zeros((0, 3))),
+        ([0.0, 1.0], np.zeros((3, 3))),
+        ([0.0, 1.0], [(0, 0, np.inf), (0, 0, 0)]),
+        ([0.0, 1.0], np.zeros((2, 3)), np.zeros((2, 4))),
+        ([0.0, 1.0], np.zeros((2, 3)), None, "cubic"),
+        ([0.0], np.zeros((2, 1, 3)), np.ones((3, 1, 4))),
+    ],
+)
+def test_bad_paths(arguments):
+    """Times that do not increase, values that are not finite, shapes that do not fit."""
+    with pytest.raises(InvalidInputError):
+        Path(*arguments)

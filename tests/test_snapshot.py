@@ -1,0 +1,241 @@
+"""Save, restore, imagine and adopt: bit for bit, in memory and through a file."""
+
+import json
+
+import numpy as np
+import pytest
+
+import nuno
+from free_fall import free_fall  # noqa: F401
+from nuno import BodyStateError, Cloth, FileFormatError, InvalidInputError, Path, SurfacePoints
+
+pytestmark = pytest.mark.usefixtures("free_fall")
+
+
+def room():
+    """A world with something of everything that a snapshot holds."""
+    world = nuno.World(device="cpu", gravity=(0, 0, -1.62), frame_rate=50, substeps=7)
+    table = world.add(nuno.box((1, 1, 0.02), name="table", color=(0.5, 0.25, 0.0), friction=0.7, group=3))
+    cup = world.add(nuno.cylinder(0.04, 0.1, name="cup", position=(0, 0, 0.1)))
+    table.assoc(cup)
+    world.add(nuno.mesh(([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), name="flag"))
+    rag = world.add(nuno.sheet((0.3, 0.3), cells=(2, 2), name="rag", position=(2, 0, 1)))
+    world.attach(rag)
+    world.grip(rag, 0, to=(2, 0, 2))
+    world.run(0.1)
+    world.detach(rag)
+    rag.rotate(0.3, "y")
+    towel = world.add(nuno.sheet((0.6, 0.4), cells=(3, 2), name="towel", position=(0, 0, 1)))
+    world.attach(towel, Cloth(bending_rigidity=(1e-5, 2e-5), shear_stiffness=np.arange(1.0, 7.0)))
+    grip = world.grip(towel, towel.at(0.4, 0.3), to=Path([0.0, 3.0], [(0, 0, 1), (0, 0, 2)]), compliance=1e-5)
+    world.grip(towel, 11, to=world.find("flag"))
+    world.push(towel, (0, 1, 0), duration=1.0)
+    world.push(towel, (0.1, 0, 0))
+    world.set_friction(towel, table, 0.9)
+    world.ignore_contact(towel, cup)
+    world.run(0.31)
+    return world, towel, grip
+
+
+def everything(world):
+    """All that a snapshot has to bring back, as arrays and plain values."""
+    arrays, plain = [], [world.time, world.gravity, world.frame_rate, world.substeps, world.world_count]
+    for body in world.bodies:
+        arrays += [body.vertices, body.velocities, body.position, body.quaternion, np.asarray(body.friction)]
+        plain += [body.name, body.is_dynamic, body.is_deformed, body.thickness, body.color, body.group]
+        plain += [body.parent.name if body.parent else None]
+    return arrays, plain
+
+
+def assert_same(a, b):
+    """Check that two results of ``everything`` are equal, bit for bit."""
+    for x, y in zip(a[0], b[0], strict=True):
+        np.testing.assert_array_equal(x, y)
+    assert a[1] == b[1]
+
+
+def disturb(world, towel):
+    """Change something of everything."""
+    world.run(0.5)
+    world.detach(towel)
+    world.remove(towel)
+    world.remove("rag")
+    world.find("table").translate((1, 0, 0)).rotate(1.0, "z")
+    world.find("flag").friction = 0.1
+    world.add(nuno.sphere(1.0, name="towel"))
+    world.set_friction("flag", "table", 0.2)
+
+
+def test_restore_in_memory_is_exact_and_keeps_identity():
+    """Everything comes back bit for bit, also what was removed, in the same objects, and runs on alike."""
+    world, towel, grip = room()
+    before, bodies, saved = everything(world), world.bodies, world.save()
+    world.run(0.4)
+    later = everything(world)
+    disturb(world, towel)
+    assert not grip.active
+    world.restore(saved)
+    assert_same(everything(world), before)
+    assert world.bodies == bodies and grip.active and grip in towel._dynamics.grips
+    world.run(0.4)
+    assert_same(everything(world), later)
+    world.restore(saved)
+    assert_same(everything(world), before)
+
+
+def test_restore_from_a_file_in_the_same_world(tmp_path):
+    """A file does what memory does."""
+    world, towel, grip = room()
+    before, bodies = everything(world), world.bodies
+    world.save(tmp_path / "room.npz")
+    world.run(0.4)
+    later = everything(world)
+    disturb(world, towel)
+    world.restore(tmp_path / "room.npz")
+    assert_same(everything(world), before)
+    assert world.bodies == bodies and grip.active
+    world.run(0.4)
+    assert_same(everything(world), later)
+
+
+def test_restore_from_a_file_in_an_empty_world(tmp_path):
+    """A new program gets the same room, and it runs on alike."""
+    world, _, _ = room()
+    world.save(tmp_path / "room.npz")
+    other = nuno.World(device="cpu")
+    other.restore(str(tmp_path / "room.npz"))
+    assert_same(everything(other), everything(world))
+    assert other.find("towel").material.same_as(world.find("towel").material)
+    for w in (world, other):
+        w.find("flag").translate((0, 0, 0.2))
+        w.run(1.3)
+    assert_same(everything(other), everything(world))
+    assert other.find("towel")._dynamics.solver.colliders.names == ["table", "flag", "rag"]
+
+
+def test_a_file_of_another_process_finds_its_bodies_by_name_and_shape(tmp_path):
+    """Bodies that the program has made anew under the same names keep their identity."""
+    world, _, _ = room()
+    world.save(tmp_path / "room.npz")
+    other = nuno.World(device="cpu")
+    towel = other.add(nuno.sheet((0.6, 0.4), cells=(3, 2), name="towel"))
+    table = other.add(nuno.box((2, 1, 0.02), name="table"))
+    other.restore(tmp_path / "room.npz")
+    assert other.find("towel") is towel and other.find("table") is not table
+    assert_same(everything(other), everything(world))
+    other.step()
+    assert other.find("towel")._dynamics.solver.colliders.names == ["table", "flag", "rag"]
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    """No file, damaged files, other formats and pickles raise FileFormatError, and nothing changes."""
+    world, _, _ = room()
+    path = tmp_path / "room.npz"
+    world.save(path)
+    data = path.read_bytes()
+    with np.load(path) as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"]))
+    assert header["format"] == 1 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+
+    def variant(name, **changes):
+        changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
+        np.savez(tmp_path / name, **changed)
+
+    variant("newer.npz", format=2)
+    variant("strange.npz", world={"type": "Path", "fields": {}})
+    variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
+    variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))
+    np.savez(tmp_path / "pickle.npz", header=np.array({"format": 1}, dtype=object))
+    np.savez(tmp_path / "other.npz", numbers=np.arange(3))
+    (tmp_path / "text.npz").write_text("no zip")
+    (tmp_path / "cut.npz").write_bytes(data[: len(data) // 2])
+    before = everything(world)
+    for name in ("newer", "strange", "missing", "swapped", "pickle", "other", "text", "cut", "absent"):
+        with pytest.raises(FileFormatError):
+            world.restore(tmp_path / f"{name}.npz")
+    assert_same(everything(world), before)
+
+
+def test_imagine_copies_everything_and_touches_nothing():
+    """All worlds of the batch are equal to now, and run on as this one does."""
+    world, towel, _ = room()
+    before = everything(world)
+    futures = world.imagine(3)
+    assert futures.world_count == 3 and futures.time == world.time
+    copy = futures.find("towel")
+    assert copy is not towel and copy.vertices.shape == (3, 12, 3)
+    for k in range(3):
+        np.testing.assert_array_equal(copy.vertices[k], towel.vertices)
+    futures.run(0.7)
+    assert_same(everything(world), before)
+    world.run(0.7)
+    for body in world.bodies:
+        np.testing.assert_array_equal(futures.find(body.name).vertices[1], body.vertices)
+
+
+def test_arguments_by_world_and_adopt():
+    """Grips, pushes, poses and materials may differ by world; adopting one makes it now."""
+    world = nuno.World(device="cpu")
+    table = world.add(nuno.box((1, 1, 0.02), name="table"))
+    towel = world.add(nuno.sheet((0.6, 0.4), cells=(3, 2), name="towel", position=(0, 0, 1)))
+    futures = world.imagine(2)
+    futures.attach(towel, Cloth(area_density=[0.1, 0.2], friction=[0.3, 0.6]))
+    futures.find("table").locate([(0, 0, 0), (0, 0, -1)])
+    goals = np.array([(0, 0, 2.0), (0, 1, 3)])
+    grip = futures.grip(
+        towel, towel.at([0.0, 1.0], 0.0).per_world(), to=Path([0.0, 1.0], goals[:, None].repeat(2, 1))
+    )
+    futures.grip(towel, [[11], [-1]], to=goals)
+    futures.push(towel, [(1, 0, 0), (2, 0, 0)])
+    futures.run(0.5)
+    shape = futures.find("towel").vertices
+    np.testing.assert_array_equal(shape[[0, 1], [0, 3]], goals)
+    np.testing.assert_array_equal(shape[0, 11], goals[0])
+    world.adopt(futures, 1)
+    assert world.find("towel") is towel and world.bodies == (table, towel) and world.time == 0.5
+    np.testing.assert_array_equal(towel.vertices, shape[1])
+    np.testing.assert_array_equal(table.position, (0, 0, -1))
+    assert towel.material.area_density == 0.2 and towel.friction == 0.6 and table.friction == 0.5
+    assert grip.active and grip.body is not towel and len(towel._dynamics.grips) == 2
+    futures.run(0.5)
+    world.run(0.5)
+    np.testing.assert_array_equal(towel.vertices, futures.find("towel").vertices[1])
+
+
+def test_detached_in_a_batch():
+    """A body detached in a batch has a shape for each world, and one of them is adopted."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.6, 0.4), cells=(3, 2), position=(0, 0, 1)))
+    futures = world.imagine(2)
+    futures.attach(towel)
+    futures.grip(towel, [[0], [5]], to=(0, 0, 3))
+    futures.run(0.2)
+    futures.detach(towel)
+    shape = futures.find("sheet").vertices
+    assert not np.array_equal(shape[0], shape[1]) and futures.find("sheet").position.shape == (2, 3)
+    again = futures.save()
+    futures.find("sheet").locate((0, 0, 0))
+    futures.restore(again)
+    np.testing.assert_array_equal(futures.find("sheet").vertices, shape)
+    world.adopt(futures, 0)
+    np.testing.assert_array_equal(towel.vertices, shape[0])
+    np.testing.assert_array_equal(towel.position, shape[0].mean(axis=0))
+
+
+def test_wrong_batches_are_refused():
+    """A batch is not imagined further; what is by world must fit the batch; a batch adopts nothing."""
+    world, towel, _ = room()
+    futures = world.imagine(2)
+    with pytest.raises(BodyStateError):
+        futures.imagine(2)
+    with pytest.raises(InvalidInputError):
+        futures.grip(towel, np.zeros((3, 1), int), to=(0, 0, 0))
+    with pytest.raises(InvalidInputError):
+        futures.grip(towel, SurfacePoints(np.zeros((3, 1), int), [[(1.0, 0, 0)]] * 3), to=(0, 0, 0))
+    with pytest.raises(InvalidInputError):
+        futures.grip(towel, 0, to=np.zeros((3, 3)))
+    with pytest.raises(InvalidInputError):
+        futures.find("table").locate(np.zeros((3, 3)))
+    with pytest.raises(InvalidInputError):
+        world.adopt(world, 0)
