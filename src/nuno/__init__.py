@@ -30,6 +30,10 @@ from nuno.surface import SurfacePoints
 from nuno.world import World
 
 if TYPE_CHECKING:
+    from nuno.camera.table import Table
+    from nuno.estimate.case import PickCase, read_case
+    from nuno.estimate.pick import estimate_pick
+    from nuno.estimate.pick_result import PickResult
     from nuno.estimate.similarity import similarity
 
 __version__ = "0.1.0"
@@ -53,12 +57,15 @@ __all__ = [
     "MeshError",
     "NunoError",
     "Path",
+    "PickCase",
+    "PickResult",
     "Plane",
     "Sheet",
     "SimulationDiverged",
     "Snapshot",
     "Sphere",
     "SurfacePoints",
+    "Table",
     "TriangleMesh",
     "UnknownNameError",
     "World",
@@ -66,15 +73,24 @@ __all__ = [
     "capsule",
     "cloth_mesh",
     "cylinder",
+    "estimate_pick",
     "mesh",
     "plane",
+    "read_case",
     "sheet",
     "similarity",
     "sphere",
 ]
 
 # Names whose modules load Warp, OpenCV and the like, and so are imported on first use.
-_LAZY = {"similarity": "nuno.estimate.similarity"}
+_LAZY = {
+    "PickCase": "nuno.estimate.case",
+    "PickResult": "nuno.estimate.pick_result",
+    "Table": "nuno.camera.table",
+    "estimate_pick": "nuno.estimate.pick",
+    "read_case": "nuno.estimate.case",
+    "similarity": "nuno.estimate.similarity",
+}
 
 
 def __getattr__(name: str) -> Any:

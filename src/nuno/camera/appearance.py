@@ -38,8 +38,11 @@ class Illumination:
     """
 
     def __init__(
-        self, image: np.ndarray, weights: np.ndarray, full_shape: tuple[int, int] | None = None, degree: int =
-        2
+        self,
+        image: np.ndarray,
+        weights: np.ndarray,
+        full_shape: tuple[int, int] | None = None,
+        degree: int = 2,
     ) -> None:
         terms = (1, 3, 6)[degree]
         self._shape = full_shape or image.shape[:2]
@@ -87,11 +90,12 @@ def colour_density(samples: np.ndarray, colours: np.ndarray, smoothing: float = 
     """
     index = np.clip(samples / (256 / _BINS), 0, _BINS - 1).astype(np.int32)
     flat = (index[:, 0] * _BINS + index[:, 1]) * _BINS + index[:, 2]
-    histogram = np.bincount(flat, minlength=_BINS**3).astype(np.float32).reshape(_BINS, _BINS, _BINS)
+    counts = np.bincount(flat, minlength=_BINS**3).astype(np.float32)
+    histogram: np.ndarray = counts.reshape(_BINS, _BINS, _BINS)
     for axis in range(3):
         moved = np.ascontiguousarray(np.moveaxis(histogram, axis, 0)).reshape(_BINS, -1)
-        moved = cv2.GaussianBlur(moved, (1, 7), sigmaX=0.01, sigmaY=smoothing, borderType=cv2.BORDER_REPLICATE)
-        histogram = np.moveaxis(moved.reshape(_BINS, _BINS, _BINS), 0, axis)
+        smooth = cv2.GaussianBlur(moved, (1, 7), sigmaX=0.01, sigmaY=smoothing)
+        histogram = np.moveaxis(smooth.reshape(_BINS, _BINS, _BINS), 0, axis)
     histogram = histogram / max(float(histogram.sum()), 1e-9) * (_BINS / 256) ** 3
     look = np.clip(colours / (256 / _BINS), 0, _BINS - 1).astype(np.int32)
     return 0.99 * histogram[look[..., 0], look[..., 1], look[..., 2]] + 0.01 / COLOUR_VOLUME
@@ -103,8 +107,8 @@ def brightness(image: np.ndarray) -> np.ndarray:
 
 
 def normal_density(pixels: np.ndarray, colour: np.ndarray, variance: np.ndarray) -> np.ndarray:
-    """Density (...) of pixels (..., 3) around a colour (..., 3) of the same variance, independent in each
-    channel.""" offset = pixels - colour
+    """Density (...) of pixels (..., 3) around colours (..., 3), independent in each channel."""
+    offset = pixels - colour
     variance = np.broadcast_to(variance, offset.shape)
     scale = variance[..., 0] * variance[..., 1] * variance[..., 2]
     distance2 = np.einsum("...i,...i->...", offset * offset, 1.0 / variance)
@@ -112,8 +116,12 @@ def normal_density(pixels: np.ndarray, colour: np.ndarray, variance: np.ndarray)
 
 
 def shaded_density(
-    pixels: np.ndarray, colour: np.ndarray, noise: float, darkest: float, brightest: float, spread: float =
-        0.03
+    pixels: np.ndarray,
+    colour: np.ndarray,
+    noise: float,
+    darkest: float,
+    brightest: float,
+    spread: float = 0.03,
 ) -> np.ndarray:
     """Density of pixels that show a colour in any light between two.
 
@@ -136,7 +144,9 @@ def shaded_density(
     along2 = share * share * length2
     across2 = np.maximum(np.einsum("...i,...i->...", pixels, pixels) - along2, 0.0)
     variance = np.float32(noise**2) + np.float32(spread**2) * along2
-    ends = np.clip(np.minimum(share - darkest, brightest - share) / np.float32(0.05) + np.float32(0.5), 0.0, 1.0)
+    ends = np.clip(
+        np.minimum(share - darkest, brightest - share) / np.float32(0.05) + np.float32(0.5), 0.0, 1.0
+    )
     even = ends / (np.float32(brightest - darkest) * np.sqrt(length2))
     return even * np.exp(-0.5 * across2 / variance) / (np.float32(2 * np.pi) * variance)
 
@@ -153,16 +163,22 @@ def palette(samples: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """
     samples = np.ascontiguousarray(samples[:: max(1, len(samples) // 3000)], dtype=np.float32)
     count = min(count, len(samples))
-    cv2.setRNGSeed(1)  # the same image gives the same answer
+    # Start from equal parts along the main direction of colour: no dice, so one image gives one answer.
+    offset = samples - samples.mean(axis=0)
+    main = np.linalg.svd(offset.T @ offset)[0][:, 0]
+    labels = np.empty((len(samples), 1), dtype=np.int32)
+    labels[np.argsort(offset @ main, kind="stable"), 0] = np.arange(len(samples)) * count // len(samples)
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 15, 0.5)
-    _, labels, centres = cv2.kmeans(samples, count, None, criteria, 1, cv2.KMEANS_PP_CENTERS)
+    centres = cv2.kmeans(samples, count, labels, criteria, 1, cv2.KMEANS_USE_INITIAL_LABELS)[2]
+    centres = np.asarray(centres, dtype=np.float32)
     share = np.bincount(labels.ravel(), minlength=count).astype(np.float32) / len(samples)
     return centres[share > 0], share[share > 0]
 
 
 def guided_filter(values: np.ndarray, guide: np.ndarray, radius: int, epsilon: float) -> np.ndarray:
-    """Smooth values, but not across edges of a guide (He, Sun, Tang: Guided image filtering, 2010, eq. 5, 6,
-    8).
+    """Smooth values, but not across edges of a guide.
+
+    He, Sun, Tang: Guided image filtering (2010), eq. 5, 6 and 8.
 
     Args:
         values: (h, w) float32.

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from nuno.camera.appearance import COLOUR_VOLUME, Illumination, brightness, normal_density, palette, shaded_density
+from nuno.camera.appearance import (
+    COLOUR_VOLUME,
+    Illumination,
+    brightness,
+    normal_density,
+    palette,
+    shaded_density,
+)
 from nuno.camera.regions import grow, shrink
 
 _BLUR = 0.8  # [px] both images are smoothed by this before they are compared pixel by pixel
@@ -53,9 +60,9 @@ class Background:
         total = self._mixture(self.view, self.scene, noise2, 0.008, self.table)
         if self.hidden.any():
             view, smooth = self.view[self.hidden], self.scene[self.hidden]
-            noise2 = np.float32(self.noise**2)
+            even = np.full((1, 1), self.noise**2, dtype=np.float32)
             total[self.hidden] = sum(
-                share * self._mixture(view, smooth * colour, noise2, 0.04, np.ones(len(view), dtype=bool))
+                share * self._mixture(view, smooth * colour, even, 0.04, np.ones(len(view), dtype=bool))
                 for colour, share in zip(self.colours, self.shares, strict=True)
             )
         return total * np.exp(self.grain) + _UNKNOWN
@@ -63,8 +70,8 @@ class Background:
     def _mixture(
         self, view: np.ndarray, colour: np.ndarray, noise2: np.ndarray, spread: float, table: np.ndarray
     ) -> np.ndarray:
-        """Density of the view if the colour is lit, in the cloth's usual shadow on the table, or in some
-        shadow.""" usual, some = (0.25, 0.05) if self.shade is not None else (0.0, 0.15)
+        """Density of the view if the colour is lit, in the usual shadow on the table, or in some shadow."""
+        usual, some = (0.25, 0.05) if self.shade is not None else (0.0, 0.15)
         at = np.where(table, 1.0, 0.25).astype(np.float32)  # a shadow falls on the table first
         total = (1.0 - at * (usual + some)) * normal_density(view, colour, noise2 + (spread * colour) ** 2)
         total += at * some * shaded_density(view, colour, self.noise, *_SHADE)
@@ -75,7 +82,9 @@ class Background:
         return total
 
 
-def compare(before: np.ndarray, after: np.ndarray, mask: np.ndarray, table: np.ndarray, reach: np.ndarray) -> Background:
+def compare(
+    before: np.ndarray, after: np.ndarray, mask: np.ndarray, table: np.ndarray, reach: np.ndarray
+) -> Background:
     """Model the background of the image after from the image before.
 
     Args:
@@ -103,13 +112,15 @@ def compare(before: np.ndarray, after: np.ndarray, mask: np.ndarray, table: np.n
     inside = shrink(mask, 3)
     grain = _grain(first, view, scene, hidden, ring, inside if inside.any() else mask)
     darkest = float(colours[shares > 0.03].mean(axis=-1).min(initial=1.0))
-    shade = _shade(view, scene, grain, table, noise, np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9)))
+    shade = _shade(
+        view, scene, grain, table, noise, np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9))
+    )
     return Background(view, scene, hidden, table, colours, shares, noise, grain, shade)
 
 
 def _gains(first: np.ndarray, second: np.ndarray, use: np.ndarray) -> tuple[np.ndarray, float]:
-    """The channels' gains (3,) between the images where nothing but the light changed, and the noise that is
-    left.""" every = (slice(None, None, 4), slice(None, None, 4))
+    """Gains (3,) of the channels where nothing but the light changed, and the noise that is left."""
+    every = (slice(None, None, 4), slice(None, None, 4))
     a, b = first[every][use[every]], second[every][use[every]]
     exposed = (a.min(axis=-1) > 15) & (a.max(axis=-1) < 245) & (b.max(axis=-1) < 250)
     a, b = a[exposed], b[exposed]
@@ -127,8 +138,12 @@ def _gains(first: np.ndarray, second: np.ndarray, use: np.ndarray) -> tuple[np.n
 
 
 def _grain(
-    first: np.ndarray, view: np.ndarray, scene: np.ndarray, hidden: np.ndarray, ring: np.ndarray, cloth:
-        np.ndarray
+    first: np.ndarray,
+    view: np.ndarray,
+    scene: np.ndarray,
+    hidden: np.ndarray,
+    ring: np.ndarray,
+    cloth: np.ndarray,
 ) -> np.ndarray:
     """Evidence (h, w) of fine texture for the background.
 
@@ -161,10 +176,14 @@ def _grain(
 
 def _heavy_tailed(offset: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Density of an offset: normal, with a tenth spread over 60 levels."""
-    return 0.9 * np.exp(-0.5 * offset * offset / variance) / np.sqrt(2 * np.pi * variance) + np.float32(0.1 / 60.0)
+    return 0.9 * np.exp(-0.5 * offset * offset / variance) / np.sqrt(2 * np.pi * variance) + np.float32(
+        0.1 / 60.0
+    )
 
 
-def _roughness_ratio(found: np.ndarray, noise: np.ndarray, table: np.ndarray, cloth: np.ndarray) -> np.ndarray:
+def _roughness_ratio(
+    found: np.ndarray, noise: np.ndarray, table: np.ndarray, cloth: np.ndarray
+) -> np.ndarray:
     """Logarithm (k,) of how much likelier a relative roughness is for the table than for the cloth.
 
     Args:

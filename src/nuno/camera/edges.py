@@ -43,8 +43,8 @@ def side_pixels(
     normal *= np.where((step * normal).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     size = np.array([camera.width, camera.height])
     with np.errstate(invalid="ignore"):
-        seen = ((pixels > _BORDER) & (pixels < size - 1 - _BORDER)).all(axis=1)
-    return pixels, normal, seen
+        seen = np.all((pixels > _BORDER) & (pixels < size - 1 - _BORDER), axis=1)
+    return pixels, normal, np.asarray(seen)
 
 
 def _profiles(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,8 +100,8 @@ def edge_in_image(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray) ->
         (k, 2) float, the edge points; NaN where the colours are too alike or there is no edge within 2 px.
     """
     offsets, values = _profiles(image, pixels, normals)
-    inner = (offsets >= -5.0) & (offsets <= -2.5)
-    outer = (offsets <= 5.0) & (offsets >= 2.5)
+    inner = (offsets >= -3.5) & (offsets <= -1.75)
+    outer = (offsets <= 3.5) & (offsets >= 1.75)
     # The mean over neighbours along the side halves the noise; texture across the side stays.
     inside = cv2.blur(values[:, inner].mean(axis=1), (1, 5), borderType=cv2.BORDER_REPLICATE).reshape(-1, 3)
     outside = cv2.blur(values[:, outer].mean(axis=1), (1, 5), borderType=cv2.BORDER_REPLICATE).reshape(-1, 3)

@@ -16,9 +16,12 @@ from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _ENDS = 0.06  # share of a side next to a corner that is not measured: there the other side bends the edge
 _LEAST = 0.2  # share of a side that must show an edge
-_AGREE = 1.0  # [px] how far the edges in the mask and in the image may be from each other
+_SCATTER = 0.25  # [px] median scatter of an edge about its line that noise explains
+_AGREE = 1.0  # [px] how far an edge may be from the one that most others agree on
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
-_OUTWARD = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # normal of the side after each corner
+_OUTWARD = np.array(
+    [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]
+)  # normal of the side after each corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +117,8 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_heigh
         warnings.append(cut)
     _judge_shape(mask, pose, camera, plane_height, warnings)
     soft_image = cv2.GaussianBlur(rgb.astype(np.float32), (0, 0), 0.6)
-    try:
-        for _ in range(2):
-            pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
-    except EstimationError:
-        warnings.append("the image shows too little of an edge on one side: the corners come from the mask
-        alone")
+    for _ in range(2):
+        pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
     if residual > 1.5:
         warnings.append(f"the cloth's sides are not straight: {residual:.1f} px off the rectangle on average")
     return _labelled(pose, camera, plane_height, residual, warnings)
@@ -129,8 +128,9 @@ def _largest(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA]
     if areas.max() < 0.95 * areas.sum():
-        warnings.append(f"the mask has {count - 1} parts; the largest, {areas.max() / areas.sum():.0%} of it,
-        was used")
+        warnings.append(
+            f"of the mask's {count - 1} parts the largest, {areas.max() / areas.sum():.0%}, was used"
+        )
     return labels == 1 + int(areas.argmax())
 
 
@@ -139,7 +139,9 @@ def _spanning(mask: np.ndarray, camera: Camera, height: float) -> _Pose:
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max(contours, key=len)[:, 0].astype(float)
     if len(outline) < 12:
-        raise EstimationError(f"the mask's region has an outline of {len(outline)} pixels, too small for a rectangle")
+        raise EstimationError(
+            f"the mask's region has an outline of {len(outline)} pixels, too small for a rectangle"
+        )
     ground = camera.back_project(outline, height)[:, :2]
     middle = ground.mean(axis=0)
     centre, size, angle = cv2.minAreaRect((ground - middle).astype(np.float32))
@@ -149,24 +151,21 @@ def _spanning(mask: np.ndarray, camera: Camera, height: float) -> _Pose:
 def _fit_to_edges(
     pose: _Pose, mask: np.ndarray, image: np.ndarray | None, camera: Camera, height: float
 ) -> tuple[_Pose, float]:
-    """Measure the edge along the four sides in a soft mask (h, w), then in the image if there is one, and fit
-    to it.""" corners = pose.corners()
+    """Measure the edge along the sides, in a soft mask (h, w) or also in the image, and fit to it."""
+    corners = pose.corners()
     ground, weights, sides = [], [], []
     for side in range(4):
         pixels, normals, seen = side_pixels(corners[side], corners[(side + 1) % 4], camera, height, _ENDS)
         pixels, normals, count = pixels[seen], normals[seen], len(seen)
         edge = edge_in_mask(mask, pixels, normals)
         if image is not None:
-            fine = edge_in_image(image, pixels, normals)
-            # Farther from the mask's edge than that it is an edge of the cloth's pattern, or of the table's.
-            fine[~(np.linalg.norm(fine - edge, axis=1) < _AGREE)] = np.nan
-            edge = fine
+            edge = _refined(pixels, normals, edge, edge_in_image(image, pixels, normals))
         good = np.isfinite(edge).all(axis=1)
         edge, normals = edge[good], normals[good]
         if len(edge) < _LEAST * count:
             raise EstimationError(
-                f"only {len(edge) / count:.0%} of one side of the cloth shows an edge in the image: it is cut off, or "
-                "the region is not a rectangle on the plane"
+                f"only {len(edge) / count:.0%} of one side of the cloth shows an edge: it is cut off, "
+                "or the region is not a rectangle on the plane"
             )
         points = camera.back_project(edge, height)[:, :2]
         further = camera.back_project(edge + normals, height)[:, :2]
@@ -174,8 +173,31 @@ def _fit_to_edges(
         ground.append(points)
         weights.append(1.0 / np.maximum(metres, 1e-6))
         sides.append(np.full(len(edge), side))
-    fitted, residual = _least_squares(pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights))
+    fitted, residual = _least_squares(
+        pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights)
+    )
     return fitted, residual
+
+
+def _refined(line: np.ndarray, normals: np.ndarray, rough: np.ndarray, fine: np.ndarray) -> np.ndarray:
+    """The edge (k, 2) along a line (k, 2): the image's, or the mask's where the image's is in doubt.
+
+    The mask is right on average but may be rough; the image is fine where a plain cloth meets a plain
+    table. Where a pattern runs along the side, the image's edges jump between the cloth's and the pattern's.
+    """
+    offsets = [((edge - line) * normals).sum(axis=1) for edge in (rough, fine)]
+    middles = [
+        float(np.median(offset[np.isfinite(offset)])) for offset in offsets if np.isfinite(offset).any()
+    ]
+    if len(middles) < 2 or np.isfinite(offsets[1]).mean() < 0.5 or abs(middles[1] - middles[0]) > _AGREE:
+        return rough
+    scatter = [
+        float(np.nanmedian(np.abs(offset - middle))) for offset, middle in zip(offsets, middles, strict=True)
+    ]
+    if scatter[1] > max(scatter[0], _SCATTER):
+        return rough
+    fine[np.abs(offsets[1] - middles[1]) > _AGREE] = np.nan
+    return fine
 
 
 def _least_squares(
@@ -207,12 +229,14 @@ def _least_squares(
 
 
 def _cut_off(mask: np.ndarray, pose: _Pose, camera: Camera, height: float) -> str | None:
-    rim = np.concatenate([mask[:2].any(axis=0), mask[-2:].any(axis=0), mask[:, :2].any(axis=1), mask[:, -2:].any(axis=1)])
+    rim = np.concatenate(
+        [mask[:2].any(axis=0), mask[-2:].any(axis=0), mask[:, :2].any(axis=1), mask[:, -2:].any(axis=1)]
+    )
     pixels = camera.project(np.column_stack([pose.corners(), np.full(4, height)]))
     size = np.array([camera.width, camera.height])
     outside = int((~((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1)).sum())
     if outside:
-        return f"the image's border cuts the cloth off: {outside} of its corners are where its sides would meet outside"
+        return f"the image's border cuts the cloth off: {outside} corners are where sides would meet outside"
     return "the cloth touches the image's border: it may go on outside" if rim.sum() > 3 else None
 
 
@@ -225,8 +249,8 @@ def _judge_shape(mask: np.ndarray, pose: _Pose, camera: Camera, height: float, w
     overlap = float((mask & inside).sum() / max((mask | inside).sum(), 1))
     if overlap < 0.83:  # a disc and its best square share 0.80
         raise EstimationError(
-            f"the region is not a rectangle on the plane z = {height:.4f} m: it shares {overlap:.0%} with the best one; "
-            "is the cloth folded, the mask wrong, or the height?"
+            f"the region is not a rectangle on the plane z = {height:.4f} m: it shares "
+            f"{overlap:.0%} with the best one; is the cloth folded, the mask wrong, or the height?"
         )
     if overlap < 0.95:
         warnings.append(f"the cloth is not quite a rectangle: it shares {overlap:.0%} with the best one")
@@ -249,7 +273,8 @@ def _labelled(
         a, b = pixels[order[1]] - pixels[first], pixels[order[2]] - pixels[first]
         swap = a[0] * b[1] - a[1] * b[0] < 0
         warnings.append(
-            f"the sides, {ahead:.3f} and {behind:.3f} m, are within 2 %: i runs to the next corner clockwise in the image"
+            f"the sides, {ahead:.3f} and {behind:.3f} m, are within 2 %: "
+            "i runs to the next corner clockwise in the image"
         )
     else:
         swap = behind > ahead

@@ -16,8 +16,8 @@ def grow(mask: np.ndarray, radius: int) -> np.ndarray:
 
 
 def shrink(mask: np.ndarray, radius: int) -> np.ndarray:
-    """What of the mask (h, w) bool is farther than a radius [px] from its outside; the image's border is no
-    outside.""" return cv2.erode(mask.astype(np.uint8), _disc(radius)).astype(bool)
+    """What of the mask (h, w) bool is farther than a radius [px] from its outside."""
+    return cv2.erode(mask.astype(np.uint8), _disc(radius)).astype(bool)
 
 
 def fill_holes(mask: np.ndarray) -> np.ndarray:
@@ -41,7 +41,6 @@ def fill_doubtful_holes(mask: np.ndarray, score: np.ndarray, *, area: int, doubt
         (h, w) bool.
     """
     count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
-    h, w = mask.shape
     rim = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     sizes = stats[:, cv2.CC_STAT_AREA]
     mean = np.bincount(labels.ravel(), weights=score.ravel(), minlength=count) / np.maximum(sizes, 1)
@@ -65,7 +64,7 @@ def parts_at(found: np.ndarray, score: np.ndarray, anchor: np.ndarray, pixel: np
         (h, w) bool.
     """
     joined = (found | anchor).astype(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(joined, connectivity=8)
+    count, labels = cv2.connectedComponents(joined, connectivity=8)
     if count < 2:
         return np.zeros_like(found)
     rows, columns = np.nonzero(found)
@@ -86,8 +85,7 @@ def parts_at(found: np.ndarray, score: np.ndarray, anchor: np.ndarray, pixel: np
 
 
 def sharpen(mask: np.ndarray, image: np.ndarray, noise: float) -> np.ndarray:
-    """Decide the pixels along the outline anew, by whether they are more like what is inside or outside next
-    to them.
+    """Decide the pixels along the outline anew: are they more like the inside or the outside near them?
 
     A pixel on an outline shows a mixture that may look like anything (between a dark and a light grey lies
     every grey); but it is on the mixing line of its two neighbours, and past the middle it is the other
@@ -117,8 +115,8 @@ def sharpen(mask: np.ndarray, image: np.ndarray, noise: float) -> np.ndarray:
 
 
 def _nearest(image: np.ndarray, region: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Colour (k, 3) of the region's pixel that is nearest to each pixel of ``where``, and its distance (k,)
-    [px].""" distance, labels = cv2.distanceTransformWithLabels(
+    """Colour (k, 3) of the region's pixel nearest to each pixel of ``where``, and its distance (k,)."""
+    distance, labels = cv2.distanceTransformWithLabels(
         (~region).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     colours = np.zeros((int(labels.max()) + 1, 3), dtype=np.float32)

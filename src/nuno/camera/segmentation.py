@@ -80,17 +80,23 @@ def segment_after(
     before = check_image(before_image, camera, "the image before")
     mask = check_mask(before_mask, camera, "the mask before")
     hand = np.asarray(hand_position, dtype=float)
-    if hand.shape != (3,) or not np.isfinite(hand).all() or not (np.isfinite(hand_radius) and hand_radius >= 0):
+    if (
+        hand.shape != (3,)
+        or not np.isfinite(hand).all()
+        or not (np.isfinite(hand_radius) and hand_radius >= 0)
+    ):
         raise InvalidInputError(
-            f"the hand needs a position of three finite numbers and a radius from 0 up [m], got {hand_position!r} and "
-            f"{hand_radius!r}"
+            "the hand needs a position of three finite numbers and a radius from 0 up [m], "
+            f"got {hand_position!r} and {hand_radius!r}"
         )
     if not mask.any():
         raise ClothNotFoundError("the mask before is empty, so nothing is known of the cloth's colours")
 
     reach = _sphere(camera, hand, _largest_length(mask, camera, table.height), step=4)
     if not reach.any():
-        raise ClothNotFoundError(f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image")
+        raise ClothNotFoundError(
+            f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image"
+        )
     background = compare(before, rgb, mask, _table_top(camera, table), reach)
     inside = shrink(mask, 3)
     colours, shares = palette(before[inside if inside.any() else mask].astype(np.float32), 6)
@@ -104,7 +110,9 @@ def segment_after(
     ratio[grip | ~reach] = -_CERTAIN
     likely, unlikely = (ratio > 2.0) & reach, (ratio < -2.0) & reach
     if likely.sum() < 20:
-        raise ClothNotFoundError("no cloth: nothing within reach of the hand has the colours of the cloth before")
+        raise ClothNotFoundError(
+            "no cloth: nothing within reach of the hand has the colours of the cloth before"
+        )
     if unlikely.sum() >= 20:
         guide = discriminant(background.view, likely, unlikely)
         ratio = guided_filter(ratio, guide, radius=3, epsilon=0.05)
@@ -123,14 +131,20 @@ def _check_hint(hint: ArrayLike | None, camera: Camera) -> np.ndarray | None:
     if values.size not in (2, 4) or not np.isfinite(values).all():
         raise InvalidInputError(f"a hint is a pixel (u, v) or a box (u0, v0, u1, v1), got {hint!r}")
     size = np.array([camera.width, camera.height] * (values.size // 2))
-    if (values < -0.5).any() or (values > size - 0.5).any() or (values.size == 4 and (values[2:] <= values[:2]).any()):
-        raise InvalidInputError(f"the hint {values.tolist()} does not lie in the {camera.width} x {camera.height} image")
+    if (
+        (values < -0.5).any()
+        or (values > size - 0.5).any()
+        or (values.size == 4 and (values[2:] <= values[:2]).any())
+    ):
+        raise InvalidInputError(
+            f"the hint {values.tolist()} does not lie in the {camera.width} x {camera.height} image"
+        )
     return values
 
 
 def _largest_length(mask: np.ndarray, camera: Camera, height: float) -> float:
-    """The longest distance [m] across the cloth that lies flat at a height [m]: the cloth's reach from the
-    hand.""" contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    """The longest distance [m] across the cloth, flat at a height [m]: its reach from the hand."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     ground = camera.back_project(np.concatenate(contours)[:, 0].astype(float), height)[:, :2]
     hull = cv2.convexHull(ground.astype(np.float32))[:, 0]
     return 1.03 * float(np.linalg.norm(hull[:, None] - hull[None], axis=-1).max())
@@ -139,7 +153,9 @@ def _largest_length(mask: np.ndarray, camera: Camera, height: float) -> float:
 def _table_top(camera: Camera, table: Table) -> np.ndarray:
     """(h, w) bool, the table's top, or its whole plane where its extents are not known; to about 2 px."""
     xy = plane_coordinates(camera, table.height, step=4)
-    return _enlarge(np.isfinite(xy[..., 0]) if table.half_extents is None else table_margin(table, xy) > 0, camera)
+    return _enlarge(
+        np.isfinite(xy[..., 0]) if table.half_extents is None else table_margin(table, xy) > 0, camera
+    )
 
 
 def _sphere(camera: Camera, centre: np.ndarray, radius: float, step: int = 1) -> np.ndarray:

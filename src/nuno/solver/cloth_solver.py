@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from nuno.materials import Cloth
     from nuno.scene.colliders import Colliders
 
-BLOCK_THREADS = 512
+BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
 SAG = 0.01
 """Edge strain that the default number of substeps allows a cloth hanging from its end (see default_substeps)."""
 
-OVER_RELAXATION = 1.6
+OVER_RELAXATION = 1.0
 """What one pass lacks in stretch: the mass term of an edge's update is divided by this (the compliance is not), which
 nearly halves the strain that a hanging cloth keeps at the same number of substeps."""
 

@@ -172,7 +172,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         barrier(threads)
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1))
 def run_worlds(s: Any, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
     """Every world by itself: one thread on the CPU, a block of ``threads`` threads on CUDA."""
     tid = wp.tid()

@@ -15,6 +15,7 @@ lane_int = wp.types.vector(length=LANES, dtype=int)
 
 # Clang's vector extension: what it compiles to is SIMD by construction, not by the optimiser's grace.
 _SIMD = (
+    "\n#if defined(__CUDACC__)\nreturn {};\n#else\n"
     "typedef float V __attribute__((vector_size(64), aligned(4)));"
     "typedef int I __attribute__((vector_size(64), aligned(4)));"
 )
@@ -23,7 +24,7 @@ _SIMD = (
 def _simd(expression: str, *arguments: str) -> str:
     """C++ for a function of lanes: ``expression`` of the arguments' capitals."""
     loads = "".join(f"V {a.upper()} = *(const V*)&{a};" for a in arguments)
-    return f"{_SIMD}{loads} wp::vec_t<16,wp::float32> r; *(V*)&r = {expression}; return r;"
+    return f"{_SIMD}{loads} wp::vec_t<16,wp::float32> r; *(V*)&r = {expression}; return r;\n#endif\n"
 
 
 @wp.func
@@ -113,7 +114,7 @@ def anywhere(a: float):
     return a > 0.0
 
 
-@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;")
+@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;\n#endif\n")
 def anywhere(a: lane) -> bool: ...  # noqa: F811
 
 
@@ -123,7 +124,7 @@ def largest(a: float):
     return a
 
 
-@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_max(A);")
+@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_max(A);\n#endif\n")
 def largest(a: lane) -> float: ...  # noqa: F811
 
 

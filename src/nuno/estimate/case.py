@@ -1,0 +1,84 @@
+"""A case on disk: input.json with the camera, the table and the hand, and the two images that it names."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from nuno.camera.camera import Camera
+from nuno.camera.image import read_image
+from nuno.errors import FileFormatError, InvalidInputError
+from nuno.estimate.pick import estimate_pick
+from nuno.estimate.pick_result import PickResult
+
+NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_position_m")
+
+
+@dataclass(frozen=True, eq=False)
+class PickCase:
+    """What an input.json says, with its images.
+
+    Attributes:
+        camera: The camera of both images.
+        before: (h, w, 3) uint8 RGB.
+        after: (h, w, 3) uint8 RGB.
+        table_height: [m].
+        hand: (3,) float [m].
+        table_half_extents: x, y [m], or None.
+        table_centre: x, y [m], or None.
+        table_thickness: [m].
+    """
+
+    camera: Camera
+    before: np.ndarray
+    after: np.ndarray
+    table_height: float
+    hand: np.ndarray
+    table_half_extents: tuple[float, float] | None
+    table_centre: tuple[float, float] | None
+    table_thickness: float
+
+    def estimate(self, **options: Any) -> PickResult:
+        """Call `nuno.estimate_pick` on this case; ``options`` are that function's keyword arguments."""
+        return estimate_pick(
+            self.before, self.after, camera=self.camera, table_height=self.table_height, hand=self.hand,
+            table_half_extents=self.table_half_extents, table_centre=self.table_centre,
+            table_thickness=self.table_thickness, **options,
+        )  # fmt: skip
+
+
+def read_case(folder: str | os.PathLike[str]) -> PickCase:
+    """Read input.json of a folder and the two images that it names; nothing else there is opened.
+
+    Raises:
+        InvalidInputError: the folder or an entry is missing or not usable.
+        FileFormatError: input.json is not JSON.
+        ImageError: an image cannot be read.
+    """
+    folder = FilePath(folder)
+    path = folder / "input.json"
+    if not path.is_file():
+        raise InvalidInputError(f"{folder} is not a case: there is no input.json in it")
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path} is not JSON: {error}") from error
+    if not isinstance(data, dict):
+        raise FileFormatError(f"{path} must hold an object, got {type(data).__name__}")
+    missing = [name for name in NEEDED if name not in data]
+    if missing:
+        raise InvalidInputError(f"{path} lacks {', '.join(missing)}; it needs {', '.join(NEEDED)}")
+    images = []
+    for name in ("image_before", "image_after"):
+        if not isinstance(data[name], str):
+            raise InvalidInputError(f"{name} in {path} must be a file name, got {data[name]!r}")
+        images.append(read_image(folder / data[name]))
+    return PickCase(
+        Camera.from_dict(data["camera"]), images[0], images[1], data["table_height_m"], data["hand_position_m"],
+        data.get("table_half_extents_xy_m"), data.get("table_centre_xy_m"), data.get("table_thickness_m", 0.04),
+    )  # fmt: skip

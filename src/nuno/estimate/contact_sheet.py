@@ -1,0 +1,100 @@
+"""The picture of an estimate: real images above, the imagined futures of all candidates below (the paper's Fig. 9)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from nuno.estimate.pick_result import PickResult
+
+REAL, IMAGINED, BOTH = (0.91, 0.62, 0.25), (0.25, 0.49, 0.79), (0.93, 0.93, 0.90)
+
+
+def contact_sheet(result: PickResult) -> Figure:
+    """Draw the sheet with Matplotlib, without pyplot: it opens no window and leaves no state behind."""
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpec
+
+    n, m = result.grid if result.grid[0] * result.grid[1] == len(result.labels) else _near_square(len(result.labels))
+    figure = Figure(figsize=(1.75 * max(n, 4), 4.3 + 1.45 * m), layout="constrained", facecolor="white")
+    sheet = GridSpec(2, 1, figure=figure, height_ratios=[3.6, 1.45 * m])
+    above = sheet[0].subgridspec(1, 2)
+    _real(figure.add_subplot(above[0]), result, after=False)
+    _real(figure.add_subplot(above[1]), result, after=True)
+    below = sheet[1].subgridspec(m, n, wspace=0.03, hspace=0.12)
+    x0, y0, x1, y1 = _window(result)
+    for k, label in enumerate(result.labels):
+        row, column = (int(label[1]), int(label[0])) if np.issubdtype(result.labels.dtype, np.integer) else divmod(k, n)
+        axes = figure.add_subplot(below[row, column])
+        _bare(axes)
+        axes.imshow(_compared(result.real.mask, result.masks[k])[y0:y1, x0:x1], interpolation="nearest")
+        rank = int(np.nonzero(result.order == k)[0][0]) + 1
+        name = f"({label[0]}, {label[1]})" if np.issubdtype(result.labels.dtype, np.integer) else f"({label[0]:.2f}, {label[1]:.2f})"
+        weight = "bold" if rank == 1 else "normal"
+        axes.set_title(f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}", fontsize=6.5, weight=weight, pad=2)
+        for spine in axes.spines.values():
+            spine.set(visible=True, color="#b3261e" if rank == 1 else "#cccccc", linewidth=2.5 if rank == 1 else 0.6)
+    i, j = result.best
+    figure.suptitle(
+        f"picked at ({i}, {j}), confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
+        f"{result.rectangle.short_m * 100:.1f} cm\nbelow: real outline orange, imagined blue, both pale;  rank: (i, j)  "
+        f"{result.score_name} | eq. (1)",
+        fontsize=9,
+    )
+    return figure
+
+
+def _near_square(count: int) -> tuple[int, int]:
+    columns = int(np.ceil(np.sqrt(count)))
+    return columns, -(-count // columns)
+
+
+def _bare(axes: Axes) -> None:
+    axes.set(xticks=[], yticks=[])
+
+
+def _window(result: PickResult) -> tuple[int, int, int, int]:
+    """The part of the small image in which any silhouette is, with a margin."""
+    seen = result.masks.any(axis=0) | result.real.mask
+    ys, xs = np.nonzero(seen)
+    h, w = seen.shape
+    return max(xs.min() - 5, 0), max(ys.min() - 5, 0), min(xs.max() + 6, w), min(ys.max() + 6, h)
+
+
+def _compared(real: np.ndarray, imagined: np.ndarray) -> np.ndarray:
+    image = np.ones((*real.shape, 3))
+    image[real & ~imagined], image[imagined & ~real], image[real & imagined] = REAL, IMAGINED, BOTH
+    return image * np.where((real & imagined)[..., None], 0.82, 1.0)
+
+
+def _real(axes: Axes, result: PickResult, *, after: bool) -> None:
+    """An image with the cloth's outline in it; before, also the grid of candidates."""
+    image = result.image_after if after else result.image_before
+    mask = result.mask_after if after else result.mask_before
+    _bare(axes)
+    if image is None:
+        image = np.full((result.camera.height, result.camera.width, 3), 255, np.uint8)
+        if mask is not None:
+            image[mask] = 200
+    axes.imshow(image)
+    axes.set_title("after" if after else "before", fontsize=9)
+    if mask is not None and mask.any() and not mask.all():
+        axes.contour(mask.astype(float), levels=[0.5], colors=["#00e5ff"], linewidths=1.0)
+    if not after:
+        corners = result.rectangle.corners
+        uv = np.asarray(result.labels, dtype=float)
+        if np.issubdtype(result.labels.dtype, np.integer):
+            uv = uv / (np.asarray(result.grid) - 1)
+        points = corners[0] + uv[:, :1] * (corners[1] - corners[0]) + uv[:, 1:] * (corners[3] - corners[0])
+        pixels = result.camera.project(points)
+        axes.plot(pixels[:, 0], pixels[:, 1], ".", color="white", markersize=4, markeredgecolor="black", markeredgewidth=0.4)
+        u, v = pixels[result.order[0]]
+        axes.plot(u, v, "o", color="none", markeredgecolor="#b3261e", markersize=10, markeredgewidth=2)
+        for k, name in ((0, "C00"), (1, "CI"), (3, "CJ")):
+            axes.annotate(name, result.camera.project(corners[k]), color="white", fontsize=8, weight="bold")
+    axes.set(xlim=(-0.5, result.camera.width - 0.5), ylim=(result.camera.height - 0.5, -0.5))

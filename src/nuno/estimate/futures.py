@@ -1,0 +1,211 @@
+"""Imagined picks: one world for every candidate and hypothesis, lifted, let come to rest, and seen by the camera."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nuno.bodies import box, plane, sheet
+from nuno.camera import raster
+from nuno.camera.camera import Camera
+from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.table import Table
+from nuno.camera.view import Region, view
+from nuno.estimate.hypotheses import Discretisation, cell_counts
+from nuno.estimate.similarity import Silhouette, score_masks
+from nuno.materials import Cloth
+from nuno.path import Path
+from nuno.surface import SurfacePoints
+from nuno.world import World
+
+if TYPE_CHECKING:
+    import warp as wp
+
+    from nuno.body import Body
+
+LIFT_SECONDS = 1.5
+"""[s] How long the hand's motion takes where it is not known."""
+SETTLE_SECONDS = 2.5
+"""[s] At most so long the cloth may take to come to rest in the hand."""
+REST_SPEED = 0.03
+"""[m/s] Below this root mean square speed a cloth counts as at rest: under 1 mm between two looks at it."""
+DRAWN_THICKNESS = 0.002
+"""[m] A cloth is seen about as thick as it is, which is less than the distance that contact keeps."""
+BODY_NAME = "cloth"
+
+
+@dataclass
+class Futures:
+    """A batch of imagined picks.
+
+    Attributes:
+        world: The batch; world h * k + c is hypothesis h of candidate c.
+        body: The cloth in it.
+        origin: The single world that it was imagined from.
+        candidates: Number of candidates k.
+        discretisation: The mesh, the step and the hypotheses.
+    """
+
+    world: World
+    body: Body
+    origin: World
+    candidates: int
+    discretisation: Discretisation
+
+    @property
+    def finite(self) -> np.ndarray:
+        """(hypotheses, candidates) bool: which futures' states are numbers."""
+        solver = self.body._dynamics.solver  # type: ignore[union-attr]
+        return solver.finite().reshape(len(self.discretisation.spread), self.candidates)
+
+
+def table_world(
+    rectangle: ClothRectangle, table: Table, cells: tuple[int, int], *, device: str, substeps: int
+) -> tuple[World, Body]:
+    """A world with the table, the floor and the cloth as it lay before; the cloth is static."""
+    world = World(device=device, substeps=substeps)
+    if table.half_extents is not None:
+        half, centre = table.half_extents, table.centre or (0.0, 0.0)
+        size = (2 * half[0], 2 * half[1], table.thickness)
+        world.add(box(size, name="table", position=(*centre, table.height - table.thickness / 2)))
+        world.add(plane(name="floor"))
+    else:
+        world.add(plane(name="table", position=(0.0, 0.0, table.height)))
+    along = rectangle.corners[1] - rectangle.corners[0]
+    cloth = sheet((rectangle.long_m, rectangle.short_m), cells=cells, name=BODY_NAME, position=rectangle.centre)
+    cloth.rotate(math.atan2(along[1], along[0]), (0.0, 0.0, 1.0), wrt="world")
+    world.add(cloth)
+    return world, cloth
+
+
+def is_turned(rectangle: ClothRectangle) -> bool:
+    """Whether CJ lies clockwise of CI seen from above, so that j runs against the sheet's own y."""
+    along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
+    return bool(along[0] * across[1] - along[1] * across[0] < 0)
+
+
+def imagine_picks(
+    rectangle: ClothRectangle,
+    candidates: np.ndarray,
+    grid: tuple[int, int],
+    discretisation: Discretisation,
+    *,
+    table: Table,
+    hand: np.ndarray,
+    rest_height: float,
+    device: str,
+    lift_seconds: float = LIFT_SECONDS,
+) -> Futures:
+    """Pick the cloth at every candidate under every hypothesis, move it to the hand and let it come to rest.
+
+    Args:
+        rectangle: The cloth before.
+        candidates: (k, 2) float, (u, v) in [0, 1] along the longer and shorter side from C00.
+        grid: Candidates along both sides, where they form a grid: the mesh gets vertices there.
+        discretisation: Mesh, step, hypotheses.
+        table: The table.
+        hand: (3,) float, where the picked point ends [m].
+        rest_height: Height of the cloth's middle surface above the table [m].
+        device: Where to simulate.
+        lift_seconds: Duration of the hand's motion [s], on a straight line with minimum jerk.
+    """
+    cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
+    world, cloth = table_world(rectangle, table, cells, device=device, substeps=discretisation.substeps)
+    k, spread = len(candidates), discretisation.spread
+    count = k * len(spread)
+
+    def each(name: str) -> np.ndarray:
+        return np.repeat([getattr(h, name) for h in spread], k)
+
+    futures = world.imagine(count)
+    body = futures.find(cloth.name)
+    for static in ("table", "floor"):
+        if any(b.name == static for b in futures.bodies):
+            # the pair's coefficient is the geometric mean: with equal ones it is the hypothesis's
+            futures.find(static).friction = each("friction")
+    futures.attach(
+        body,
+        Cloth(
+            area_density=each("area_density"), bending_rigidity=each("bending_rigidity"),
+            friction=each("friction"), air_drag=each("air_drag"), thickness=2.0 * rest_height,
+        ),
+    )  # fmt: skip
+    uv = np.array(candidates, dtype=float)
+    if is_turned(rectangle):
+        uv[:, 1] = 1.0 - uv[:, 1]
+    at = uv * cells
+    start = np.asarray(body.vertices)[0]
+    if np.abs(at - np.round(at)).max() < 1e-6:
+        vertex = np.round(at[:, 1]).astype(int) * (cells[0] + 1) + np.round(at[:, 0]).astype(int)
+        where: np.ndarray | SurfacePoints = np.tile(vertex, len(spread))[:, None]
+        begin = start[vertex]
+    else:
+        points = cloth.at(uv[:, 0], uv[:, 1])
+        begin = points.positions(start, np.asarray(body.faces))
+        where = SurfacePoints(np.tile(points.faces, len(spread)), np.tile(points.barycentric, (len(spread), 1))).per_world()
+    ends = np.broadcast_to(np.asarray(hand, dtype=float), begin.shape)
+    path = Path((0.0, lift_seconds), np.tile(np.stack([begin, ends], axis=1), (len(spread), 1, 1)), None, "minimum_jerk")
+    futures.grip(body, where, to=path)
+    futures.run(lift_seconds, progress=False)
+    settled, chunk = 0.0, 0.25
+    while settled < SETTLE_SECONDS:
+        futures.run(chunk, progress=False)
+        settled += chunk
+        if rest_speed(futures, body) < REST_SPEED:
+            break
+    return Futures(futures, body, world, k, discretisation)
+
+
+def rest_speed(world: World, body: Body) -> float:
+    """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
+    solver = body._dynamics.solver  # type: ignore[union-attr]
+    speeds = np.sqrt((solver.velocities() ** 2).sum(axis=-1).mean(axis=-1))
+    return float(np.percentile(speeds, 90))
+
+
+def score_futures(
+    futures: Futures, camera: Camera, real: Silhouette, table: Table, *, keep_masks: bool = False
+) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+    """Draw every future's cloth as the camera would see it, and compare it with the real silhouette.
+
+    Returns:
+        The scores by name, (hypotheses, candidates) each, and where wanted the masks
+        (hypotheses, candidates, h, w) bool.
+    """
+    keys, region = draw_futures(futures, camera, table)
+    scores = score_masks(keys, real, region=region)
+    shape = (len(futures.discretisation.spread), futures.candidates)
+    result = {name: value.reshape(*shape, *value.shape[1:]) for name, value in scores.items()}
+    masks = None
+    if keep_masks:
+        masks = np.zeros((keys.shape[0], camera.height, camera.width), dtype=bool)
+        part = raster.masks_of(keys).numpy()
+        masks[:, region.y0 : region.y0 + region.height, region.x0 : region.x0 + region.width] = part
+        masks = masks.reshape(*shape, camera.height, camera.width)
+    return result, masks
+
+
+def draw_futures(futures: Futures, camera: Camera, table: Table) -> tuple[wp.array, Region]:
+    """Key images of the cloth behind the table's edge, and the part of the image that they hold."""
+    solver = futures.body._dynamics.solver  # type: ignore[union-attr]
+    positions = solver.positions_on_device()
+    corners = positions.numpy().reshape(-1, 3)
+    region = Region.around(camera, corners[np.isfinite(corners).all(axis=1)], margin=4.0)
+    looking = view(camera, region)
+    keys = raster.key_images(positions.shape[0], region, positions.device)
+    layer = raster.key_images(1, region, positions.device)
+    raster.clear(layer)
+    import warp as wp
+
+    for body in futures.origin.bodies:
+        if body.name == "table" and table.half_extents is not None:
+            points = wp.array(np.asarray(body.vertices, np.float32)[None], dtype=wp.vec3, device=positions.device)
+            faces = wp.array(np.asarray(body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
+            raster.draw(layer, points, faces, looking, 1)
+    raster.clear(keys, layer)
+    faces = wp.array(np.asarray(futures.body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
+    raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
+    return keys, region

@@ -1,0 +1,248 @@
+"""At which point was the cloth picked up? Two images, and imagined picks of every candidate (the paper's section on
+the state of a picked-up cloth)."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.camera import Camera
+from nuno.camera.image import check_image, check_mask, read_image
+from nuno.camera.rectangle import ClothRectangle, fit_rectangle
+from nuno.camera.segmentation import segment_after, segment_before
+from nuno.camera.table import Table
+from nuno.device import found_device
+from nuno.errors import EstimationError, ImageError, InvalidInputError
+from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, score_futures
+from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
+from nuno.estimate.pick_result import PickResult
+from nuno.estimate.similarity import SCORES, Silhouette
+from nuno.validation import finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.estimate.futures import Futures
+
+log = logging.getLogger(__name__)
+
+IMAGE_SCALE = 0.5
+"""Silhouettes are compared at half the image's resolution: edges are known to no better than a pixel or two."""
+HAND_MARGIN = 2
+"""[px] of the full image around the hand that count neither as cloth nor as background."""
+
+
+def estimate_pick(
+    before: ArrayLike | str | FilePath | None,
+    after: ArrayLike | str | FilePath | None,
+    *,
+    camera: Camera | Mapping[str, Any],
+    table_height: float,
+    hand: ArrayLike,
+    table_half_extents: Sequence[float] | None = None,
+    table_centre: Sequence[float] | None = None,
+    table_thickness: float = 0.04,
+    candidates: tuple[int, int] | ArrayLike = (6, 6),
+    rest_height: float = 0.0025,
+    hand_radius: float = 0.014,
+    lift_seconds: float = LIFT_SECONDS,
+    before_mask: ArrayLike | None = None,
+    after_mask: ArrayLike | None = None,
+    hint: ArrayLike | None = None,
+    rectangle: ClothRectangle | None = None,
+    discretisations: Sequence[Discretisation] = DISCRETISATIONS,
+    score: str = "chamfer",
+    device: str = "auto",
+    progress: bool | None = None,
+) -> PickResult:
+    """Estimate where a flat cloth was picked up, from an image before and one after.
+
+    The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
+    guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it and
+    compared with the real silhouette. Per candidate and mesh the best guess counts; meshes are averaged.
+
+    Args:
+        before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
+            ``before_mask`` is given.
+        after: RGB image of the cloth in the hand, or its path; None where ``after_mask`` is given.
+        camera: The camera of both images, or the ``camera`` entry of an input.json.
+        table_height: z of the table top [m].
+        hand: (3,) where the picked point is now [m].
+        table_half_extents: Half sizes of the top along x and y [m]; None: it is taken as endless.
+        table_centre: x, y of the top's middle [m].
+        table_thickness: Thickness of the top [m].
+        candidates: A grid (n along the longer side, m along the shorter), or points (k, 2) as fractions (u, v) of the
+            sides from corner C00.
+        rest_height: Height of the cloth's middle surface above the table [m].
+        hand_radius: Radius of what hides the cloth around the hand [m].
+        lift_seconds: Duration of the hand's straight motion with minimum jerk [s].
+        before_mask: (h, w) the cloth before, instead of looking for it.
+        after_mask: (h, w) the cloth after, hand left out, instead of looking for it.
+        hint: A pixel (u, v) on the cloth before, or a box (u0, v0, u1, v1) around it.
+        rectangle: The cloth before, instead of measuring it.
+        discretisations: Meshes, steps and guesses at the material.
+        score: What ranks: "chamfer", "iou" or "eq1".
+        device: "auto", "cpu", "cuda:0" ...
+        progress: Progress bar; None shows one on a terminal.
+
+    Raises:
+        InvalidInputError: a value that cannot be used; the hand behind the camera or out of the image.
+        ImageError: an image that cannot be read or is not of the camera's size.
+        ClothNotFoundError: no cloth in an image.
+        EstimationError: no candidate gave a finite future.
+    """
+    started = time.perf_counter()
+    seconds: dict[str, float] = {}
+    camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
+    table = Table(
+        number("table_height", table_height),
+        None if table_half_extents is None else _pair("table_half_extents", table_half_extents),
+        None if table_centre is None else _pair("table_centre", table_centre),
+        number("table_thickness", table_thickness, above=0.0),
+    )
+    hand_at = finite_array("hand", hand, (3,))
+    _check_hand(camera, hand_at)
+    labels, uv, grid = _candidates(candidates)
+    number("rest_height", rest_height, above=0.0)
+    number("lift_seconds", lift_seconds, above=0.0)
+    if score not in SCORES:
+        raise InvalidInputError(f"score must be one of {', '.join(SCORES)}, got {score!r}")
+    if not discretisations:
+        raise InvalidInputError("at least one discretisation is needed")
+    device = found_device(device)
+
+    image_before, image_after = _image(before, camera, "before"), _image(after, camera, "after")
+    seconds["read"] = time.perf_counter() - started
+    clock = time.perf_counter()
+    mask_before = None if before_mask is None else check_mask(before_mask, camera, "before_mask")
+    if mask_before is None and (rectangle is None or after_mask is None):
+        if image_before is None:
+            raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
+        mask_before = segment_before(image_before, camera, table, hint=hint)
+    if rectangle is None:
+        assert mask_before is not None
+        grey = image_before if image_before is not None else np.repeat(mask_before[..., None] * np.uint8(255), 3, axis=2)
+        rectangle = fit_rectangle(mask_before, grey, camera, table.height + rest_height)
+    if after_mask is None:
+        if image_after is None or image_before is None or mask_before is None:
+            raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
+        mask_after = segment_after(
+            image_after, camera, table, image_before, mask_before, hand_at, hand_radius=hand_radius
+        )
+    else:
+        mask_after = check_mask(after_mask, camera, "after_mask")
+    small, real = _silhouette(mask_after, camera, hand_at, hand_radius)
+    seconds["see"] = time.perf_counter() - clock
+
+    seconds["imagine"] = seconds["compare"] = 0.0
+    distances: list[np.ndarray] = []
+    eq1: list[np.ndarray] = []
+    best: Futures | None = None
+    best_index = 0
+    masks = np.zeros((len(uv), small.height, small.width), dtype=bool)
+    for k, discretisation in enumerate(_bar(discretisations, progress)):
+        clock = time.perf_counter()
+        futures = imagine_picks(
+            rectangle, uv, grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
+            device=device, lift_seconds=lift_seconds,
+        )  # fmt: skip
+        seconds["imagine"] += time.perf_counter() - clock
+        clock = time.perf_counter()
+        values, drawn = score_futures(futures, small, real, table, keep_masks=k == 0)
+        ranked = values[score] if score == "chamfer" else -values[score]
+        finite = futures.finite
+        ranked = np.where(finite, ranked, np.inf)
+        distances.append(ranked.min(axis=0))
+        eq1.append(np.where(finite, values["eq1"], 0.0).max(axis=0))
+        if drawn is not None:
+            guess = ranked.argmin(axis=0)
+            masks = drawn[guess, np.arange(len(uv))]
+            best, best_guess = futures, guess
+        seconds["compare"] += time.perf_counter() - clock
+    mean = np.mean(distances, axis=0)
+    if not np.isfinite(mean).any():
+        raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
+    if score == "chamfer":
+        mean = mean / IMAGE_SCALE
+    order = np.argsort(mean, kind="stable")
+    assert best is not None
+    best_index = int(best_guess[order[0]]) * len(uv) + int(order[0])
+    seconds["total"] = time.perf_counter() - started
+    result = PickResult(
+        labels=labels, order=order, scores=-mean, score_name="negative_chamfer_px" if score == "chamfer" else score,
+        eq1=np.mean(eq1, axis=0), rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
+        best_index=best_index, masks=masks, real=real, image_before=image_before, image_after=image_after,
+        mask_before=mask_before, mask_after=mask_after,
+    )  # fmt: skip
+    for warning in result.warnings:
+        log.warning("%s", warning)
+    return result
+
+
+def _image(image: Any, camera: Camera, name: str) -> np.ndarray | None:
+    if image is None:
+        return None
+    if isinstance(image, str | FilePath):
+        image = read_image(image)
+    return check_image(image, camera, f"the image {name}")
+
+
+def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+    a, b = finite_array(name, value, (2,))
+    return float(a), float(b)
+
+
+def _check_hand(camera: Camera, hand: np.ndarray) -> None:
+    depth = float(camera.depth_of(hand))
+    if depth <= 0:
+        raise InvalidInputError(f"the hand at {hand.tolist()} m is {-depth:.3f} m behind the camera")
+    u, v = camera.project(hand)
+    if not (-camera.width < u < 2 * camera.width and -camera.height < v < 2 * camera.height):
+        raise InvalidInputError(
+            f"the hand at {hand.tolist()} m projects to pixel ({u:.0f}, {v:.0f}), far outside of the "
+            f"{camera.width} x {camera.height} image"
+        )
+
+
+def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+    """Labels (k, 2), fractions (k, 2) of the sides, and the grid that the mesh's vertices should lie on."""
+    if isinstance(candidates, tuple) and len(candidates) == 2 and all(isinstance(c, int) for c in candidates):
+        n, m = candidates
+        if n < 2 or m < 2:
+            raise InvalidInputError(f"a grid of candidates needs at least 2 x 2 points, got {n} x {m}")
+        ij = np.stack(np.meshgrid(np.arange(n), np.arange(m), indexing="ij"), axis=-1).reshape(-1, 2)
+        return ij, ij / (n - 1, m - 1), (n, m)
+    uv = finite_array("candidates", candidates, ("k", 2))
+    if len(uv) < 1 or uv.min() < 0 or uv.max() > 1:
+        raise InvalidInputError("candidates must be fractions (u, v) of the cloth's sides, each from 0 to 1")
+    return uv, uv, (2, 2)
+
+
+def _silhouette(
+    mask: np.ndarray, camera: Camera, hand: np.ndarray, radius: float
+) -> tuple[Camera, Silhouette]:
+    """The real silhouette at the resolution of comparison, without the hand's pixels."""
+    import cv2
+
+    small = camera.scaled(IMAGE_SCALE)
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    centre = camera.project(hand)
+    reach = radius * max(camera.fx, camera.fy) / camera.depth_of(hand) + HAND_MARGIN
+    hidden = (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
+
+    def shrink(image: np.ndarray) -> np.ndarray:
+        return cv2.resize(image.astype(np.float32), (small.width, small.height), interpolation=cv2.INTER_AREA)
+
+    if not (mask & ~hidden).any():
+        raise ImageError("the mask after is empty but for the hand, so there is no silhouette to compare with")
+    return small, Silhouette(shrink(mask & ~hidden) >= 0.5, shrink(hidden) > 0.25)
+
+
+def _bar(items: Sequence[Any], progress: bool | None) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(items, desc="imagining", unit="mesh", leave=False, disable=None if progress is None else not progress)

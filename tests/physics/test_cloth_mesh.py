@@ -1,0 +1,119 @@
+"""Cloth of any triangles against the sheet, and curved rest shapes."""
+
+import numpy as np
+import pytest
+from elastica import drop_over_reach, rigidity_ratio
+from scipy.spatial import Delaunay
+from world_with import GRAVITY, attached
+
+import nuno
+
+
+def irregular(size, cells, seed=2):
+    """Return a rectangle (n, 2) in irregular triangles (m, 3): a staggered grid, jittered, its corners kept."""
+    random = np.random.default_rng(seed)
+    nx, ny = cells
+    h = np.array([size[0] / nx, size[1] / ny])
+    points = []
+    for j in range(ny + 1):
+        inner = (np.arange(nx) + 0.5 if j % 2 else np.arange(1, nx)) * h[0]
+        points += [(x, j * h[1]) for x in np.r_[0.0, inner, size[0]]]
+    points = np.array(points)
+    jitter = random.uniform(-0.15, 0.15, points.shape) * h
+    on_x = (points[:, 0] < 1e-9) | (points[:, 0] > size[0] - 1e-9)
+    on_y = (points[:, 1] < 1e-9) | (points[:, 1] > size[1] - 1e-9)
+    jitter[on_x, 0] = jitter[on_y, 1] = 0.0
+    jitter[on_x & on_y] = 0.0
+    points += jitter
+    faces = Delaunay(points).simplices
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > 0.02 * h.prod()]
+    return points, faces
+
+
+def test_two_cloth_meshes_keep_their_own_elements():
+    """Each mesh is simulated with its own vertices and faces, also where one came before it."""
+    for n in (2, 3):
+        points, faces = irregular((0.1 * n, 0.1), (n, 2))
+        body = nuno.cloth_mesh(np.column_stack([points, np.ones(len(points))]), faces)
+        world, body = attached(body, nuno.Cloth(air_drag=0.0))
+        world.run(0.1)
+        assert body.vertices.shape == (len(points), 3)
+        # free fall, and the Euler step's g t dt / 2
+        np.testing.assert_allclose(body.vertices[:, 2], 1 - 0.5 * GRAVITY * 0.01, atol=1e-3)
+
+
+@pytest.mark.parametrize(("cells", "load"), [(20, 10.0), (20, 30.0)])
+def test_an_irregular_strip_bends_by_its_rigidity(cells, load):
+    """Elastica, for a strip of irregular triangles 4 across; hinges of such meshes are known to be less exact."""
+    length, h = 0.2, 0.2 / cells
+    points, faces = irregular((length + h, 4 * h), (cells + 1, 4))
+    points[:, 0] -= h
+    nominal = 0.2 * GRAVITY * length**3 / load
+    material = nuno.Cloth(bending_rigidity=nominal, air_drag=8.0, thickness=1e-3)
+    body = nuno.cloth_mesh(np.column_stack([points, np.ones(len(points))]), faces)
+    world, body = attached(body, material, substeps=250)
+    held, tip = np.flatnonzero(points[:, 0] < 0.2 * h), points[:, 0] > length - 1e-6
+    world.grip(body, held, to=body.vertices[held].mean(axis=0))
+    world.run(3.0)
+    x = body.vertices
+    clamp = points[held, 0].max()
+    ratio = (1.0 - x[tip, 2].mean()) / (x[tip, 0].mean() - clamp)
+    # the clamp lies within a cell (5 % of the length, 15 % of G), and hinge weights on irregular triangles are
+    # off by 10 % in the mean (Grinspun et al. 2006, fig. 4, report more)
+    assert rigidity_ratio(load, ratio) == pytest.approx(1.0, abs=0.25)
+    assert ratio == pytest.approx(drop_over_reach(load), rel=0.2)
+
+
+def test_an_irregular_mesh_hangs_like_a_sheet():
+    """Invariance: a square hung by two corners has the same outline in irregular triangles as in a grid."""
+    size, n = 0.4, 16
+    material = nuno.Cloth(air_drag=3.0, thickness=0.002, bending_rigidity=5e-5)
+    reach = []
+    points, faces = irregular((size, size), (n, n))
+    for body in (
+        nuno.sheet((size, size), cells=(n, n), position=(size / 2, size / 2, 1)),
+        nuno.cloth_mesh(np.column_stack([points, np.ones(len(points))]), faces),
+    ):
+        world, body = attached(body, material)
+        x = body.vertices
+        corners = [int(np.argmin(np.linalg.norm(x[:, :2] - c, axis=1))) for c in [(0, 0), (size, 0), (0, size), (size, size)]]
+        for corner, goal in zip(corners[:2], [(0.06, 0, 1), (size - 0.06, 0, 1)], strict=True):
+            path = nuno.Path([0.0, 1.0], [x[corner], goal], interpolation="minimum_jerk")
+            world.grip(body, corner, to=path)
+        world.run(8.0)
+        x = body.vertices
+        middle = int(np.argmin(np.linalg.norm(x[:, :2] * [1, 0] - [size / 2, 0], axis=1) + 9 * (1 - x[:, 2]).clip(0) * 0))
+        reach.append([1 - x[corners[2], 2], 1 - x[corners[3], 2], 1 - x[:, 2].mean()])
+        assert middle >= 0
+    # strain of up to 1 % at default substeps in each, and folds that the two meshes lay differently
+    np.testing.assert_allclose(reach[0], reach[1], rtol=0.05)
+
+
+def test_a_curved_rest_shape_is_kept_without_gravity():
+    """A half cylinder that is nowhere strained stays as it is, and comes back after a knock."""
+    radius, n, m = 0.1, 16, 8
+    angle = np.linspace(0, np.pi, n + 1)
+    i, j = (c.ravel() for c in np.meshgrid(np.arange(n + 1), np.arange(m + 1), indexing="xy"))
+    x = np.stack([radius * np.cos(angle[i]), 0.02 * j, radius * np.sin(angle[i])], axis=1)
+    a, b = (c.ravel() for c in np.meshgrid(np.arange(n), np.arange(m), indexing="xy"))
+    a = b * (n + 1) + a
+    faces = np.concatenate([np.stack([a, a + 1, a + n + 2], 1), np.stack([a, a + n + 2, a + n + 1], 1)])
+    material = nuno.Cloth(bending_rigidity=1e-3, air_drag=3.0, thickness=0.002)
+    world, body = attached(nuno.cloth_mesh(x, faces), material, gravity=(0, 0, 0), substeps=40)
+    world.run(1.0)
+    np.testing.assert_allclose(body.vertices, x, atol=1e-4)  # float32 rest curvatures
+    force = np.zeros_like(x)
+    force[:, 2] = -2e-4 * np.sin(angle[i])
+    world.push(body, force, duration=0.2)
+    world.run(0.2)
+    assert np.abs(body.vertices - x).max() > 2e-3
+    world.run(8.0)
+    # drag has stopped it somewhere: compare the shape, the distances from end to end and from crown to ends
+    end = body.vertices
+    for p, q in ((0, n), (0, n // 2), (n // 2, n)):
+        row = m // 2 * (n + 1)
+        assert np.linalg.norm(end[row + p] - end[row + q]) == pytest.approx(
+            np.linalg.norm(x[row + p] - x[row + q]), rel=0.01
+        )  # bending alone brings it back, and drag slows the last per cent of it
