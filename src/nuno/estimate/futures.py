@@ -130,7 +130,9 @@ def imagine_picks(
         body,
         Cloth(
             area_density=each("area_density"), bending_rigidity=each("bending_rigidity"),
-            friction=each("friction"), air_drag=each("air_drag"), thickness=2.0 * rest_height,
+            stretch_stiffness=each("stretch_stiffness"), shear_stiffness=each("shear_stiffness"),
+            friction=each("friction"), air_drag=each("air_drag"),
+            thickness=np.repeat([h.thickness or 2.0 * rest_height for h in spread], k),
         ),
     )  # fmt: skip
     uv = np.array(candidates, dtype=float)

@@ -17,12 +17,13 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_after, segment_before
 from nuno.camera.table import Table
-from nuno.device import found_device
+from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, ImageError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, score_futures
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.pick_result import PickResult
-from nuno.estimate.similarity import SCORES, Silhouette
+from nuno.estimate.ranking import RANKINGS, rank
+from nuno.estimate.similarity import Silhouette
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def estimate_pick(
     hint: ArrayLike | None = None,
     rectangle: ClothRectangle | None = None,
     discretisations: Sequence[Discretisation] = DISCRETISATIONS,
-    score: str = "chamfer",
+    score: str = "evidence",
     device: str = "auto",
     progress: bool | None = None,
 ) -> PickResult:
@@ -63,7 +64,7 @@ def estimate_pick(
 
     The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
     guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it and
-    compared with the real silhouette. Per candidate and mesh the best guess counts; meshes are averaged.
+    compared with the real silhouette. What counts is how likely the silhouette is, averaged over all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -85,7 +86,7 @@ def estimate_pick(
         hint: A pixel (u, v) on the cloth before, or a box (u0, v0, u1, v1) around it.
         rectangle: The cloth before, instead of measuring it.
         discretisations: Meshes, steps and guesses at the material.
-        score: What ranks: "chamfer", "iou" or "eq1".
+        score: What ranks: "evidence", "chamfer", "iou" or "eq1" (see `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
         progress: Progress bar; None shows one on a terminal.
 
@@ -109,11 +110,11 @@ def estimate_pick(
     labels, uv, grid = _candidates(candidates)
     number("rest_height", rest_height, above=0.0)
     number("lift_seconds", lift_seconds, above=0.0)
-    if score not in SCORES:
-        raise InvalidInputError(f"score must be one of {', '.join(SCORES)}, got {score!r}")
+    if score not in RANKINGS:
+        raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
     if not discretisations:
         raise InvalidInputError("at least one discretisation is needed")
-    device = found_device(device)
+    device = found_device(checked_device(device))
 
     image_before, image_after = _image(before, camera, "before"), _image(after, camera, "after")
     seconds["read"] = time.perf_counter() - started
@@ -139,12 +140,11 @@ def estimate_pick(
     seconds["see"] = time.perf_counter() - clock
 
     seconds["imagine"] = seconds["compare"] = 0.0
-    distances: list[np.ndarray] = []
-    eq1: list[np.ndarray] = []
+    tables: list[dict[str, np.ndarray]] = []
     best: Futures | None = None
-    best_index = 0
+    guess = np.zeros(len(uv), dtype=int)
     masks = np.zeros((len(uv), small.height, small.width), dtype=bool)
-    for k, discretisation in enumerate(_bar(discretisations, progress)):
+    for discretisation in _bar(discretisations, progress):
         clock = time.perf_counter()
         futures = imagine_picks(
             rectangle, uv, grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
@@ -152,29 +152,23 @@ def estimate_pick(
         )  # fmt: skip
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
-        values, drawn = score_futures(futures, small, real, table, keep_masks=k == 0)
-        ranked = values[score] if score == "chamfer" else -values[score]
-        finite = futures.finite
-        ranked = np.where(finite, ranked, np.inf)
-        distances.append(ranked.min(axis=0))
-        eq1.append(np.where(finite, values["eq1"], 0.0).max(axis=0))
+        values, drawn = score_futures(futures, small, real, table, keep_masks=best is None)
+        values["finite"] = futures.finite
+        values["chamfer"] = values["chamfer"] / IMAGE_SCALE
+        tables.append(values)
         if drawn is not None:
-            guess = ranked.argmin(axis=0)
+            best, guess = futures, rank([values], score).guess
             masks = drawn[guess, np.arange(len(uv))]
-            best, best_guess = futures, guess
         seconds["compare"] += time.perf_counter() - clock
-    mean = np.mean(distances, axis=0)
-    if not np.isfinite(mean).any():
+    ranked = rank(tables, score)
+    if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    if score == "chamfer":
-        mean = mean / IMAGE_SCALE
-    order = np.argsort(mean, kind="stable")
     assert best is not None
-    best_index = int(best_guess[order[0]]) * len(uv) + int(order[0])
+    order = np.argsort(-ranked.scores, kind="stable")
+    best_index = int(guess[order[0]]) * len(uv) + int(order[0])
     seconds["total"] = time.perf_counter() - started
     result = PickResult(
-        labels=labels, order=order, scores=-mean, score_name="negative_chamfer_px" if score == "chamfer" else score,
-        eq1=np.mean(eq1, axis=0), rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
+        labels=labels, order=order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
         best_index=best_index, masks=masks, real=real, image_before=image_before, image_after=image_after,
         mask_before=mask_before, mask_after=mask_after,
     )  # fmt: skip
