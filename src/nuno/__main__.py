@@ -6,6 +6,7 @@ import argparse
 import logging
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
 
@@ -45,8 +46,11 @@ def _pick(options: argparse.Namespace) -> int:
     from nuno.errors import InvalidInputError
 
     parts = options.candidates.lower().split("x")
-    if len(parts) != 2 or not all(part.isdigit() for part in parts):
+    if len(parts) != 2 or not all(part.isdecimal() for part in parts):
         raise InvalidInputError(f"--candidates must be two numbers such as 6x6, got {options.candidates!r}")
+    out = Path(options.out)
+    if out.exists() and not out.is_dir():  # now, and not when the work is done
+        raise InvalidInputError(f"--out must be a folder, or the name of one to make; {out} is a file")
     from nuno.estimate.case import read_case
 
     case = read_case(options.case)
@@ -65,8 +69,7 @@ def _quiet_warp() -> None:
     """Let Warp say nothing but errors: a command's output is its answer."""
     import warp as wp
 
-    wp.config.quiet = True
-    wp.config.log_level = getattr(wp, "LOG_ERROR", 40)
+    wp.config.log_level = wp.LOG_ERROR
 
 
 def _failed(error: BaseException, status: int) -> int:

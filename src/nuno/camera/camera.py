@@ -66,8 +66,9 @@ class Camera:
         if missing:
             raise InvalidInputError(f"the camera lacks {', '.join(missing)}; it needs {', '.join(names)}")
         try:
+            fx, fy, cx, cy = (float(data[k]) for k in ("fx", "fy", "cx", "cy"))
             return cls(
-                int(data["width"]), int(data["height"]), *(float(data[k]) for k in ("fx", "fy", "cx", "cy")),
+                int(data["width"]), int(data["height"]), fx, fy, cx, cy,
                 camera_to_world=np.asarray(data["camera_to_world"], dtype=float), distortion=data.get("distortion"),
             )  # fmt: skip
         except (TypeError, ValueError) as error:
@@ -108,7 +109,7 @@ class Camera:
 
             flat = np.concatenate([xy.reshape(-1, 2), np.ones((xy.size // 2, 1))], axis=1)
             pixels = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), self.matrix, self.distortion)[0]
-            return pixels.reshape(points.shape[:-1] + (2,))
+            return pixels.reshape((*points.shape[:-1], 2))
         return xy * (self.fx, self.fy) + (self.cx, self.cy)
 
     def rays(self, pixels: ArrayLike) -> np.ndarray:
@@ -120,7 +121,7 @@ class Camera:
             xy = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion).reshape(pixels.shape)
         else:
             xy = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
-        local = np.concatenate([xy, np.ones(xy.shape[:-1] + (1,))], axis=-1)
+        local = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
         return local @ self.camera_to_world[:3, :3].T
 
     def back_project(self, pixels: ArrayLike, height: float) -> np.ndarray:

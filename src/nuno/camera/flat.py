@@ -72,8 +72,8 @@ def first_look(
 def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.ndarray:
     """How many standard deviations of the table's own colour each pixel differs from it.
 
-    The table's colours are those of its rim (h, w) bool and of all that is like them on its surface (h, w) bool. Of the
-    rim only the half nearest to its median counts at first, so that a cloth may cover much of it.
+    The table's colours are those of its rim (h, w) bool and of all that is like them on its surface (h, w)
+    bool. Of the rim only the half nearest to its median counts at first: a cloth may cover much of it.
     """
     centre = np.median(flat[rim], axis=0)
     values = flat[rim]

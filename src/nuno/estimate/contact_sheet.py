@@ -34,16 +34,22 @@ def contact_sheet(result: PickResult) -> Figure:
         _bare(axes)
         axes.imshow(_compared(result.real.mask, result.masks[k])[y0:y1, x0:x1], interpolation="nearest")
         rank = int(np.nonzero(result.order == k)[0][0]) + 1
-        name = f"({label[0]}, {label[1]})" if np.issubdtype(result.labels.dtype, np.integer) else f"({label[0]:.2f}, {label[1]:.2f})"
+        name = (
+            f"({label[0]}, {label[1]})"
+            if np.issubdtype(result.labels.dtype, np.integer)
+            else f"({label[0]:.2f}, {label[1]:.2f})"
+        )
         weight = "bold" if rank == 1 else "normal"
-        axes.set_title(f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}", fontsize=6.5, weight=weight, pad=2)
+        axes.set_title(
+            f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}", fontsize=6.5, weight=weight, pad=2
+        )
         for spine in axes.spines.values():
             spine.set(visible=True, color="#b3261e" if rank == 1 else "#cccccc", linewidth=2.5 if rank == 1 else 0.6)
     i, j = result.best
     figure.suptitle(
         f"picked at ({i}, {j}), confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
-        f"{result.rectangle.short_m * 100:.1f} cm\nbelow: real outline orange, imagined blue, both pale;  rank: (i, j)  "
-        f"{result.score_name} | eq. (1)",
+        f"{result.rectangle.short_m * 100:.1f} cm\nbelow: real outline orange, imagined blue, both pale;  "
+        f"rank: (i, j)  {result.score_name} | eq. (1)",
         fontsize=9,
     )
     return figure
@@ -92,9 +98,11 @@ def _real(axes: Axes, result: PickResult, *, after: bool) -> None:
             uv = uv / (np.asarray(result.grid) - 1)
         points = corners[0] + uv[:, :1] * (corners[1] - corners[0]) + uv[:, 1:] * (corners[3] - corners[0])
         pixels = result.camera.project(points)
-        axes.plot(pixels[:, 0], pixels[:, 1], ".", color="white", markersize=4, markeredgecolor="black", markeredgewidth=0.4)
+        axes.plot(
+            pixels[:, 0], pixels[:, 1], ".", color="white", markersize=4, markeredgecolor="black", markeredgewidth=0.4
+        )
         u, v = pixels[result.order[0]]
         axes.plot(u, v, "o", color="none", markeredgecolor="#b3261e", markersize=10, markeredgewidth=2)
         for k, name in ((0, "C00"), (1, "CI"), (3, "CJ")):
-            axes.annotate(name, result.camera.project(corners[k]), color="white", fontsize=8, weight="bold")
+            axes.annotate(name, tuple(result.camera.project(corners[k])), color="white", fontsize=8, weight="bold")
     axes.set(xlim=(-0.5, result.camera.width - 0.5), ylim=(result.camera.height - 0.5, -0.5))

@@ -147,9 +147,16 @@ def imagine_picks(
     else:
         points = cloth.at(uv[:, 0], uv[:, 1])
         begin = points.positions(start, np.asarray(body.faces))
-        where = SurfacePoints(np.tile(points.faces, len(spread)), np.tile(points.barycentric, (len(spread), 1))).per_world()
+        where = SurfacePoints(
+            np.tile(points.faces, len(spread)), np.tile(points.barycentric, (len(spread), 1))
+        ).per_world()
     ends = np.broadcast_to(np.asarray(hand, dtype=float), begin.shape)
-    path = Path((0.0, lift_seconds), np.tile(np.stack([begin, ends], axis=1), (len(spread), 1, 1)), None, "minimum_jerk")
+    path = Path(
+        np.array((0.0, lift_seconds)),
+        np.tile(np.stack([begin, ends], axis=1), (len(spread), 1, 1)),
+        None,
+        "minimum_jerk",
+    )
     futures.grip(body, where, to=path)
     futures.run(lift_seconds, progress=False)
     settled, chunk = 0.0, 0.25
@@ -204,10 +211,12 @@ def draw_futures(futures: Futures, camera: Camera, table: Table) -> tuple[wp.arr
 
     for body in futures.origin.bodies:
         if body.name == "table" and table.half_extents is not None:
-            points = wp.array(np.asarray(body.vertices, np.float32)[None], dtype=wp.vec3, device=positions.device)
-            faces = wp.array(np.asarray(body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
-            raster.draw(layer, points, faces, looking, 1)
+            table_points: wp.array = wp.array(
+                np.asarray(body.vertices, np.float32)[None], dtype=wp.vec3, device=positions.device
+            )
+            table_faces: wp.array = wp.array(np.asarray(body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
+            raster.draw(layer, table_points, table_faces, looking, 1)
     raster.clear(keys, layer)
-    faces = wp.array(np.asarray(futures.body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
+    faces: wp.array = wp.array(np.asarray(futures.body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
     raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
     return keys, region

@@ -1,5 +1,7 @@
-"""At which point was the cloth picked up? Two images, and imagined picks of every candidate (the paper's section on
-the state of a picked-up cloth)."""
+"""At which point was the cloth picked up? Two images, and imagined picks of every candidate.
+
+The experiment is that of Ueda et al. on the state of a picked-up cloth, its eq. (1) among the scores.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,7 @@ from nuno.errors import EstimationError, ImageError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, score_futures
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.pick_result import PickResult
-from nuno.estimate.ranking import RANKINGS, rank
+from nuno.estimate.ranking import RANKINGS, Comparison, rank
 from nuno.estimate.similarity import Silhouette
 from nuno.validation import finite_array, number
 
@@ -63,8 +65,8 @@ def estimate_pick(
     """Estimate where a flat cloth was picked up, from an image before and one after.
 
     The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
-    guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it and
-    compared with the real silhouette. What counts is how likely the silhouette is, averaged over all guesses.
+    guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it
+    and compared with the real silhouette. What counts is how likely the silhouette is, averaged over all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -85,7 +87,8 @@ def estimate_pick(
         after_mask: (h, w) the cloth after, hand left out, instead of looking for it.
         hint: A pixel (u, v) on the cloth before, or a box (u0, v0, u1, v1) around it.
         rectangle: The cloth before, instead of measuring it.
-        discretisations: Meshes, steps and guesses at the material.
+        discretisations: Meshes, steps and guesses at the material, in the order in which they are run; the first
+            one must look at all candidates.
         score: What ranks: "evidence", "chamfer", "iou" or "eq1" (see `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
         progress: Progress bar; None shows one on a terminal.
@@ -112,8 +115,8 @@ def estimate_pick(
     number("lift_seconds", lift_seconds, above=0.0)
     if score not in RANKINGS:
         raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
-    if not discretisations:
-        raise InvalidInputError("at least one discretisation is needed")
+    if not discretisations or discretisations[0].best is not None:
+        raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
     device = found_device(checked_device(device))
 
     image_before, image_after = _image(before, camera, "before"), _image(after, camera, "after")
@@ -126,7 +129,9 @@ def estimate_pick(
         mask_before = segment_before(image_before, camera, table, hint=hint)
     if rectangle is None:
         assert mask_before is not None
-        grey = image_before if image_before is not None else np.repeat(mask_before[..., None] * np.uint8(255), 3, axis=2)
+        grey = (
+            image_before if image_before is not None else np.repeat(mask_before[..., None] * np.uint8(255), 3, axis=2)
+        )
         rectangle = fit_rectangle(mask_before, grey, camera, table.height + rest_height)
     if after_mask is None:
         if image_after is None or image_before is None or mask_before is None:
@@ -140,41 +145,56 @@ def estimate_pick(
     seconds["see"] = time.perf_counter() - clock
 
     seconds["imagine"] = seconds["compare"] = 0.0
-    tables: list[dict[str, np.ndarray]] = []
-    best: Futures | None = None
-    guess = np.zeros(len(uv), dtype=int)
+    comparisons: list[Comparison] = []
+    batches: list[Futures] = []
     masks = np.zeros((len(uv), small.height, small.width), dtype=bool)
     for discretisation in _bar(discretisations, progress):
         clock = time.perf_counter()
+        chosen = np.arange(len(uv))
+        if comparisons and discretisation.best is not None:
+            chosen = np.sort(rank(comparisons, score, len(uv)).order[: discretisation.best])
         futures = imagine_picks(
-            rectangle, uv, grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
+            rectangle, uv[chosen], grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
             device=device, lift_seconds=lift_seconds,
         )  # fmt: skip
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
-        values, drawn = score_futures(futures, small, real, table, keep_masks=best is None)
-        values["finite"] = futures.finite
-        values["chamfer"] = values["chamfer"] / IMAGE_SCALE
-        tables.append(values)
+        values, drawn = score_futures(futures, small, real, table, keep_masks=not comparisons)
+        comparison = Comparison(chosen, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite)
         if drawn is not None:
-            best, guess = futures, rank([values], score).guess
-            masks = drawn[guess, np.arange(len(uv))]
+            masks = drawn[comparison.error(score).argmin(axis=0), np.arange(len(uv))]
+        comparisons.append(comparison)
+        batches.append(futures)
         seconds["compare"] += time.perf_counter() - clock
-    ranked = rank(tables, score)
+    ranked = rank(comparisons, score, len(uv))
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    assert best is not None
-    order = np.argsort(-ranked.scores, kind="stable")
-    best_index = int(guess[order[0]]) * len(uv) + int(order[0])
+    best, best_index = _best_world(comparisons, batches, int(ranked.order[0]), score)
     seconds["total"] = time.perf_counter() - started
     result = PickResult(
-        labels=labels, order=order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
+        labels=labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name,
+        eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
         best_index=best_index, masks=masks, real=real, image_before=image_before, image_after=image_after,
         mask_before=mask_before, mask_after=mask_after,
     )  # fmt: skip
     for warning in result.warnings:
         log.warning("%s", warning)
     return result
+
+
+def _best_world(
+    comparisons: Sequence[Comparison], batches: Sequence[Futures], candidate: int, score: str
+) -> tuple[Futures, int]:
+    """The batch, and the world in it, in which a candidate looks most like the image."""
+    found: list[tuple[float, int, int]] = []
+    for k, comparison in enumerate(comparisons):
+        at = np.nonzero(comparison.candidates == candidate)[0]
+        if len(at):
+            error = comparison.error(score)[:, at[0]]
+            guess = int(error.argmin())
+            found.append((float(error[guess]), k, guess * len(comparison.candidates) + int(at[0])))
+    _, k, world = min(found)
+    return batches[k], world
 
 
 def _image(image: Any, camera: Camera, name: str) -> np.ndarray | None:
@@ -216,9 +236,7 @@ def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int
     return uv, uv, (2, 2)
 
 
-def _silhouette(
-    mask: np.ndarray, camera: Camera, hand: np.ndarray, radius: float
-) -> tuple[Camera, Silhouette]:
+def _silhouette(mask: np.ndarray, camera: Camera, hand: np.ndarray, radius: float) -> tuple[Camera, Silhouette]:
     """The real silhouette at the resolution of comparison, without the hand's pixels."""
     import cv2
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from nuno.estimate.futures import Futures
     from nuno.world import World
 
+WORST = -1.0e9
+
 LOW_CONFIDENCE = 0.7
 """Of generated cases below this a third was wrong, of those above a thirtieth (docs/performance.md)."""
 
@@ -41,7 +43,7 @@ class PickResult:
         camera: The camera.
         grid: Candidates along both sides; (2, 2) where points were given.
         seconds: Wall time by stage [s].
-        futures: The first discretisation's batch of imagined picks.
+        futures: The batch of imagined picks in which the best one is.
         best_index: The world of ``futures`` that is nearest to what was seen.
         masks: (k, h, w) bool, each candidate's best imagined silhouette, at the resolution of ``real``.
         real: The silhouette that was seen.
@@ -110,7 +112,8 @@ class PickResult:
         return {
             "format": 1,
             "pick": list(self.best),
-            "ranking": [list(entry) for entry in self.ranking],
+            # JSON has no infinity: a future that diverged counts as worse than any other
+            "ranking": [[i, j, max(score, WORST)] for i, j, score in self.ranking],
             "score_name": self.score_name,
             "eq1": [float(self.eq1[k]) for k in self.order],
             "confidence": self.confidence,

@@ -20,6 +20,33 @@ OVERLAP_WEIGHT = 10.0
 
 
 @dataclass(frozen=True, eq=False)
+class Comparison:
+    """What one mesh's futures look like beside the real silhouette, (guesses, c) each.
+
+    Attributes:
+        candidates: (c,) int, which candidates were looked at.
+        chamfer: Symmetric mean contour distance [px of the full image].
+        iou: Intersection over union.
+        eq1: The paper's eq. (1).
+        finite: Whether the future's state is a number.
+    """
+
+    candidates: np.ndarray
+    chamfer: np.ndarray
+    iou: np.ndarray
+    eq1: np.ndarray
+    finite: np.ndarray
+
+    def error(self, score: str) -> np.ndarray:
+        """(guesses, c) float, lower is better; infinite where the future is not finite."""
+        if score == "evidence":
+            error = CONTOUR_WEIGHT * np.log1p(self.chamfer) + OVERLAP_WEIGHT * (1.0 - self.iou)
+        else:
+            error = self.chamfer if score == "chamfer" else 1.0 - getattr(self, score)
+        return np.where(self.finite, error, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
 class Ranked:
     """Scores of the candidates.
 
@@ -27,42 +54,52 @@ class Ranked:
         name: What the scores are: "log_evidence", "negative_chamfer_px", "iou" or "eq1".
         scores: (k,) float, higher is better; -inf where no future stayed finite.
         eq1: (k,) float, the paper's similarity: the best guess of each mesh, averaged over meshes.
-        guess: (k,) int, each candidate's best guess on the first mesh.
     """
 
     name: str
     scores: np.ndarray
     eq1: np.ndarray
-    guess: np.ndarray
+
+    @property
+    def order(self) -> np.ndarray:
+        """(k,) int, candidates from best to worst."""
+        return np.argsort(-self.scores, kind="stable")
 
 
-def rank(tables: Sequence[dict[str, np.ndarray]], score: str) -> Ranked:
+def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
     """Combine the comparisons of all meshes.
 
+    The evidence of a candidate that a mesh did not look at takes a likelihood of zero from it: such a mesh looks at
+    the best only, and the others stay behind them. The other scores take the best guess of each mesh and average
+    over the meshes that looked at the candidate.
+
     Args:
-        tables: By mesh, arrays (guesses, k): "chamfer" [px of the full image], "iou", "eq1", and "finite".
-        score: One of `RANKINGS`. All but "evidence" take the best guess of each mesh and average over meshes.
+        comparisons: One for each mesh.
+        score: One of `RANKINGS`.
+        count: Number of candidates.
     """
-    errors = [np.where(table["finite"], _error(table, score), np.inf) for table in tables]
-    similar = [np.where(table["finite"], table["eq1"], 0.0).max(axis=0) for table in tables]
-    if score == "evidence":
-        likelihood = np.concatenate(errors)
-        lowest = likelihood.min(axis=0)
-        offset = np.where(np.isfinite(lowest), lowest, 0.0)
-        with np.errstate(divide="ignore"):
-            scores = np.log(np.exp(offset - likelihood).mean(axis=0)) - offset
-        name = "log_evidence"
-    else:
-        scores = -np.mean([error.min(axis=0) for error in errors], axis=0)
-        name = "negative_chamfer_px" if score == "chamfer" else score
-        scores = scores if score == "chamfer" else 1.0 + scores
-    return Ranked(name, scores, np.mean(similar, axis=0), errors[0].argmin(axis=0))
-
-
-def _error(table: dict[str, np.ndarray], score: str) -> np.ndarray:
-    if score == "evidence":
-        return CONTOUR_WEIGHT * np.log1p(table["chamfer"]) + OVERLAP_WEIGHT * (1.0 - table["iou"])
-    return table["chamfer"] if score == "chamfer" else 1.0 - table[score]
+    looked, similar = np.zeros(count), np.zeros(count)
+    total, guesses = np.zeros(count), 0
+    errors = np.zeros(count)
+    # scaled by the best of all, for exp would underflow far from it
+    offset = min(
+        (e[np.isfinite(e)].min(initial=np.inf) for e in (c.error("evidence") for c in comparisons)), default=0.0
+    )
+    offset = offset if np.isfinite(offset) else 0.0
+    for comparison in comparisons:
+        at = comparison.candidates
+        looked[at] += 1
+        similar[at] += np.where(comparison.finite, comparison.eq1, 0.0).max(axis=0)
+        guesses += len(comparison.chamfer)
+        total[at] += np.exp(offset - comparison.error("evidence")).sum(axis=0)
+        errors[at] += comparison.error(score).min(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if score == "evidence":
+            return Ranked("log_evidence", np.log(total / guesses) - offset, similar / looked)
+        mean = errors / looked
+        if score == "chamfer":
+            return Ranked("negative_chamfer_px", -mean, similar / looked)
+        return Ranked(score, 1.0 - mean, similar / looked)
 
 
 def confidence(name: str, first: float, second: float) -> float:

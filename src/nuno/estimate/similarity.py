@@ -86,13 +86,9 @@ class Silhouette:
 def _image(mask: ArrayLike, name: str) -> np.ndarray:
     image = np.asarray(mask)
     if image.ndim != 2 or image.size == 0 or image.dtype.kind not in "biuf":
-        raise InvalidInputError(
-            f"the {name} must be a (h, w) image of numbers, got {image.dtype} {image.shape}"
-        )
+        raise InvalidInputError(f"the {name} must be a (h, w) image of numbers, got {image.dtype} {image.shape}")
     if max(image.shape) >= 1 << 14:
-        raise InvalidInputError(
-            f"the {name} is {image.shape[1]} x {image.shape[0]} px; at most 16383 are supported"
-        )
+        raise InvalidInputError(f"the {name} is {image.shape[1]} x {image.shape[0]} px; at most 16383 are supported")
     return image != 0
 
 
@@ -279,10 +275,7 @@ def score_masks(
     region = Region(0, 0, width, height) if region is None else region
     keys = _keys(keys)
     if keys.shape[1:] != (region.height, region.width) or (
-        region.x0 < 0
-        or region.y0 < 0
-        or region.x0 + region.width > width
-        or region.y0 + region.height > height
+        region.x0 < 0 or region.y0 < 0 or region.x0 + region.width > width or region.y0 + region.height > height
     ):
         raise InvalidInputError(
             f"masks of {keys.shape[2]} x {keys.shape[1]} px and {region} do not fit a real mask of "
@@ -368,9 +361,7 @@ def similarity(
         raise UnknownNameError("score", score, [*SCORES, "all"])
     if isinstance(real_mask, Silhouette):
         if ignore is not None:
-            raise InvalidInputError(
-                "a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead"
-            )
+            raise InvalidInputError("a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead")
         real = real_mask
     else:
         real = Silhouette(real_mask, ignore)
