@@ -18,7 +18,7 @@ from nuno.mesh.primitives import MeshArrays
 from nuno.validation import count, finite_array, index_array, number
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """Root of all shapes."""
 

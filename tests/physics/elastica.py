@@ -43,22 +43,24 @@ def rigidity_ratio(g: float, ratio: float) -> float:
 
 
 def cantilever(
-    loads: list[float], cells: int, *, length: float = 0.2, across: int = 1, along: str = "warp", seconds: float = 3.0,
-    substeps: int | None = None, area_density: float = 0.2, stretch_stiffness: float = 1000.0,
+    loads: list[float], cells: int, *, length: float = 0.2, across: int = 1, along: str = "warp",
+    seconds: float = 3.0, substeps: int | None = None, area_density: float = 0.2,
+    stretch_stiffness: float = 1000.0,
 ) -> tuple[np.ndarray, np.ndarray, int]:  # fmt: skip
-    """Return H/W of strips clamped along one end at rest, one for each G, the G that they feel, and the substeps.
+    """Return H/W of strips clamped at one end, one for each G, the G that they feel, and the substeps.
 
     Both rows of vertices of the first cell are held. The clamp is where the strip is known to be level, the
     middle of that cell, and the free length, from there to the tip, is ``cells`` and a half. The drag is 1.5
-    times the lowest eigenfrequency 3.516 sqrt(B / (m L^4)), so that the strip creeps to rest without ringing; being implicit it takes c dt off the weight, which is why G is returned.
+    times the lowest eigenfrequency 3.516 sqrt(B / (m L^4)), so that the strip creeps to rest without ringing;
+    being implicit it takes c dt off the weight, which is why G is returned.
     """
     h = length / (cells + 0.5)
     g = np.asarray(loads, dtype=float)
     weight = area_density * GRAVITY
     rigidity = weight * length**3 / g
     material = nuno.Cloth(
-        area_density=area_density, bending_rigidity=rigidity, stretch_stiffness=stretch_stiffness, thickness=1e-3,
-        air_drag=1.5 * 3.516 * np.sqrt(rigidity / (area_density * length**4)), damping=0.0,
+        area_density=area_density, bending_rigidity=rigidity, stretch_stiffness=stretch_stiffness,
+        thickness=1e-3, air_drag=1.5 * 3.516 * np.sqrt(rigidity / (area_density * length**4)), damping=0.0,
     )  # fmt: skip
     size, grid = ((cells + 1) * h, across * h), (cells + 1, across)
     if along == "weft":

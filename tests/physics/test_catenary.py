@@ -20,7 +20,9 @@ def catenary(q):
 @pytest.fixture(scope="module")
 def hanging():
     """Strips whose right end was brought nearer and is then held softly; spans and vertices (worlds, ...)."""
-    material = nuno.Cloth(area_density=DENSITY, bending_rigidity=0.0, stretch_stiffness=2e4, air_drag=4.0, thickness=1e-3)
+    material = nuno.Cloth(
+        area_density=DENSITY, bending_rigidity=0.0, stretch_stiffness=2e4, air_drag=4.0, thickness=1e-3
+    )
     sheet = nuno.sheet((LENGTH, WIDTH), cells=(CELLS, 1), position=(0, 0, 2))
     world, body = attached(sheet, material, worlds=len(SLACK), substeps=100)
     ends = [0, CELLS + 1], [CELLS, 2 * CELLS + 1]
@@ -42,8 +44,8 @@ def test_the_sag_is_the_catenarys(hanging):
     x, _ = hanging
     span = x[:, -1, 0] - x[:, 0, 0]
     sag = (0.5 * (x[:, 0, 2] + x[:, -1, 2]) - x[:, CELLS // 2, 2]) / span
-    # the ends give by up to 0.3 mm: the span is the measured one. A polygon of 50 sides, and a strain below 0.1 %
-    # (which at length / span 1.05 is 0.2 % of the sag)
+    # the ends give by up to 0.3 mm: the span is the measured one. A polygon of 50 sides, and a strain below
+    # 0.1 % (which at length / span 1.05 is 0.2 % of the sag)
     expected = [catenary(LENGTH / s)[0] for s in span]
     np.testing.assert_allclose(sag, expected, rtol=0.01)
 
@@ -53,5 +55,6 @@ def test_the_pull_at_the_ends_is_the_catenarys_tension(hanging):
     x, pull = hanging
     span = x[:, -1, 0] - x[:, 0, 0]
     tension = pull / (DENSITY * GRAVITY * WIDTH * span)
-    # as above; the tension falls by 1 % for 2 % of slack at length / span 1.05, and each end's last digits count
+    # as above; the tension falls by 1 % for 2 % of slack at length / span 1.05, and each end's last digits
+    # count
     np.testing.assert_allclose(tension, [catenary(LENGTH / s)[1] for s in span], rtol=0.02)

@@ -31,7 +31,7 @@ def test_a_cloth_over_a_table_s_edge_hangs():
     start = body.vertices
     held = np.flatnonzero(start[:, 0] < -0.29)
     # pulled 10 cm over the edge, and held there
-    goal = start[held].mean(axis=0) + [0.1, 0, -0.009]
+    goal = start[held].mean(axis=0) + np.array([0.1, 0, -0.009])
     path = nuno.Path([0.0, 1.0], [start[held].mean(axis=0), goal], interpolation="minimum_jerk")
     world.grip(body, held, to=path)
     world.run(4.0)
@@ -67,7 +67,7 @@ def test_a_fast_cloth_does_not_pass_a_thin_plate(speed):
 
 
 def test_a_cloth_pushed_onto_a_thin_plate_by_a_gale_does_not_pass():
-    """Invariant: a push of 20 times its weight drives it onto a plate narrower than itself, and not through."""
+    """Invariant: a push of 20 times its weight drives it onto a narrower plate, and not through."""
     size, at = (0.2, 0.2, 0.01), np.array([0.0, 0, -0.005])
     sheet = nuno.sheet((0.3, 0.3), cells=(15, 15), position=(0, 0, 0.1))
     world, body = attached(sheet, nuno.Cloth(thickness=0.002), nuno.box(size, position=at))
@@ -82,7 +82,7 @@ def test_a_cloth_pushed_onto_a_thin_plate_by_a_gale_does_not_pass():
 
 
 def signed(beyond):
-    """Return the signed distances of points that are ``beyond`` (n, k) [m] along each axis of a convex corner."""
+    """Return signed distances of points that are ``beyond`` (n, k) [m] each face of a convex corner."""
     return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
 
 

@@ -42,7 +42,7 @@ def test_gripped_vertices_turn_with_the_path():
 
 
 def test_a_gripped_point_between_vertices_follows_closely():
-    """A stiff grip on a surface point is the last of a substep's constraints but for contact: within 0.1 mm."""
+    """A stiff grip on a surface point is the last constraint but for contact: within 0.1 mm."""
     world, body = lifted()
     point = body.at(0.37, 0.61)
 
@@ -50,7 +50,7 @@ def test_a_gripped_point_between_vertices_follows_closely():
         return (body.vertices[body.faces[point.faces[0]]] * point.barycentric[0][:, None]).sum(axis=0)
 
     start = where()
-    path = nuno.Path([0.0, 0.5], [start, start + [0.1, 0, 0.2]], interpolation="minimum_jerk")
+    path = nuno.Path([0.0, 0.5], [start, start + np.array([0.1, 0, 0.2])], interpolation="minimum_jerk")
     world.grip(body, point, to=path)
     for _ in range(8):
         world.run(0.1)
@@ -74,7 +74,7 @@ def test_release_gives_a_vertex_its_mass_back():
 
 
 def test_a_soft_grip_gives_by_its_load_times_compliance():
-    """Closed form F / k: one point that carries the whole cloth sinks by weight x compliance below its goal."""
+    """Closed form F / k: one point that carries the whole cloth sinks by weight x compliance."""
     material = nuno.Cloth(air_drag=8.0)
     world, body = attached(nuno.sheet((0.2, 0.2), cells=(8, 8), position=(0, 0, 1)), material)
     compliance = 0.25  # [m/N]
@@ -96,7 +96,7 @@ def test_a_grip_led_by_a_body_follows_it():
     for _ in range(10):
         hand.translate((0.002, 0, 0.005))
         world.step()
-    np.testing.assert_allclose(body.vertices[[0, 1]], start + [0.02, 0, 0.05], atol=1e-6)  # float32
+    np.testing.assert_allclose(body.vertices[[0, 1]], start + np.array([0.02, 0, 0.05]), atol=1e-6)  # float32
 
 
 def test_each_world_s_grip_is_its_own():

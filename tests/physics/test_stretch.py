@@ -52,11 +52,13 @@ def test_a_wide_sheet_stretches_like_a_narrow_strip():
 
 
 @pytest.mark.parametrize("cells", [10, 20, 40])
-def test_a_stiff_cloth_hung_at_default_substeps_sags_little(cells):
-    """The rule of ``default_substeps``: no strain beyond w L / Et by more than 1 %."""
-    y, z = hung("warp", (1000.0, 1000.0), cells=cells, seconds=3.0, drag=10.0)
-    strain = np.diff(z, axis=1) / y[1] - 1
-    assert strain.max() < 0.2 * GRAVITY * y[-1] / 1000.0 + 0.01
+def test_a_stiff_strip_stretches_as_its_stiffness_says_at_default_substeps(cells):
+    """Closed form w L^2 / (2 Et) for 1000 N/m, 0.4 mm in 0.4 m."""
+    stiffness = np.array([300.0, 1000.0])
+    y, z = hung("warp", (stiffness, stiffness), cells=cells, seconds=3.0, drag=10.0)
+    # implicit drag takes c dt off the weight, 1.4 % at the 12 substeps of 10 cells
+    expected = 0.2 * GRAVITY * y[-1] ** 2 / (2 * stiffness)
+    np.testing.assert_allclose(z[:, -1] - y[-1], expected, rtol=0.02)
 
 
 def test_pure_shear_follows_the_shear_stiffness():
@@ -81,6 +83,7 @@ def test_pure_shear_follows_the_shear_stiffness():
     u = 0.5 * (x[:, :-1, 1:] - x[:, :-1, :-1] + x[:, 1:, 1:] - x[:, 1:, :-1]) / h
     v = 0.5 * (x[:, 1:, :-1] - x[:, :-1, :-1] + x[:, 1:, 1:] - x[:, :-1, 1:]) / h
     shear = (u * v).sum(axis=-1)
-    # one pass a substep adds up to dt^2 / (rho h^2) to 1 / S, 1.8 % of it at S = 300; the second order in gamma is 4e-4
+    # one pass a substep adds up to dt^2 / (rho h^2) to 1 / S, 1.8 % of it at S = 300; the second order in
+    # gamma is 4e-4
     np.testing.assert_allclose(shear.mean(axis=(1, 2)), traction / stiffness, rtol=0.02)
     np.testing.assert_allclose(shear.std(axis=(1, 2)), 0.0, atol=0.02 * traction / stiffness.min())
