@@ -76,9 +76,7 @@ def recorded(folder: Path, known: bool):
             "labelled": True,
         }
         images = read_image(case / data["image_before"]), read_image(case / data["image_after"])
-        yield measure(
-            case.name, Camera.from_dict(data["camera"]), table, *images, data["hand_position_m"], true
-        )
+        yield measure(case.name, Camera.from_dict(data["camera"]), table, *images, data["hand_position_m"], true)
 
 
 def synthetic(count: int, seed: int, known: bool):

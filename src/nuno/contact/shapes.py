@@ -9,6 +9,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.solver.lanes import add, mul, sub  # noqa: F401
 from nuno.solver.lanes import (
     choose,
     fill,

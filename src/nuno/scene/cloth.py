@@ -1,4 +1,4 @@
-"""A cloth's elements: what stretches, shears and bends, and the blocks that self-contact looks through.
+"""A cloth's elements: what stretches, shears and bends.
 
 Everything here depends on the rest shape alone; materials come in as compliances when a solver is made.
 """
@@ -6,13 +6,13 @@ Everything here depends on the rest shape alone; materials come in as compliance
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, MeshError
+from nuno.scene.blocks import Blocks, make_blocks
 from nuno.scene.colouring import by_colour, colour
 
 
@@ -59,117 +59,6 @@ def _none(width: int, **extra: tuple[int, ...]) -> Elements:
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
-    """Elements grouped by small blocks of neighbouring vertices, for the broad phase of self-contact.
-
-    Each face and edge belongs to the block of its lowest vertex in block order. Vertices nearer than ``ring`` [m] at
-    rest are neighbours; elements with neighbouring vertices but none in common are listed beforehand, vertices with
-    triangles (m, 4) and edges with edges (m, 4).
-    """
-
-    vertex: np.ndarray
-    vertex_start: np.ndarray
-    face: np.ndarray
-    face_start: np.ndarray
-    face_reach: np.ndarray
-    edge: np.ndarray
-    edge_start: np.ndarray
-    edge_reach: np.ndarray
-    ring: float
-    ring_triangle: np.ndarray
-    ring_edge: np.ndarray
-
-    @property
-    def contact_reach(self) -> float:
-        """How far apart [m] the nearest vertices of two touching elements can be, both stretched by 10 %."""
-        return max(2.0 * float(self.edge_reach.max()), float(self.face_reach.max()))
-
-    @property
-    def count(self) -> int:
-        """Number of blocks."""
-        return len(self.vertex_start) - 1
-
-
-def make_blocks(rest: np.ndarray, faces: np.ndarray, edges: np.ndarray, size: int = 4) -> Blocks:
-    """Halve the rest shape again and again along its axes until at most ``size`` vertices are left in a block."""
-    count = len(rest)
-    levels = max(0, int(np.ceil(np.log2(max(1.0, count / size)))))
-    group = np.zeros(count, dtype=np.int64)
-    extent = np.ptp(rest, axis=0)
-    axes = np.argsort(-extent)[:2]
-    span = extent[axes].astype(float)
-    for _ in range(levels):
-        k = int(np.argmax(span))
-        order = np.lexsort((rest[:, axes[k]], group))
-        start = np.searchsorted(group[order], np.arange(group.max() + 2))
-        rank = np.empty(count, dtype=np.int64)
-        rank[order] = np.arange(count) - start[group[order]]
-        half = (np.diff(start) + 1) // 2
-        group = 2 * group + (rank >= half[group])
-        group = np.unique(group, return_inverse=True)[1]
-        span[k] /= 2
-    order = np.argsort(group, kind="stable")
-    place = np.empty(count, dtype=np.int64)
-    place[order] = np.arange(count)
-    blocks = int(group.max()) + 1
-
-    def sort(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        owner = group[elements[np.arange(len(elements)), np.argmin(place[elements], axis=1)]]
-        by_owner = np.argsort(owner, kind="stable")
-        return elements[by_owner], np.searchsorted(owner[by_owner], np.arange(blocks + 1))
-
-    face, face_start = sort(faces)
-    edge, edge_start = sort(edges)
-    corners = rest[face]
-    # 10 % more than at rest: what a stretched element may reach
-    face_reach = 1.1 * np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-    edge_reach = 0.55 * np.linalg.norm(rest[edge[:, 0]] - rest[edge[:, 1]], axis=1)
-    vertex_start = np.searchsorted(group[order], np.arange(blocks + 1))
-    ring = 1.2 * max(float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()), 1e-9)
-    return Blocks(
-        order, vertex_start, face, face_start, face_reach, edge, edge_start, edge_reach, ring,
-        *_ring_pairs(rest, faces, edges, ring),
-    )  # fmt: skip
-
-
-def _ring_pairs(rest: np.ndarray, faces: np.ndarray, edges: np.ndarray, ring: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex-triangle and edge-edge pairs that share no vertex but have vertices within ``ring`` of each other."""
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(rest).query_pairs(ring * (1 - 1e-9), output_type="ndarray")
-    near = np.concatenate([near, near[:, ::-1], np.repeat(np.arange(len(rest))[:, None], 2, axis=1)])
-    near = near[np.argsort(near[:, 0], kind="stable")]
-    start = np.searchsorted(near[:, 0], np.arange(len(rest) + 1))
-
-    def incident(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        order = np.argsort(elements.ravel(), kind="stable")
-        return order // elements.shape[1], np.searchsorted(elements.ravel()[order], np.arange(len(rest) + 1))
-
-    def expand(left: np.ndarray, right: np.ndarray, items: np.ndarray, starts: np.ndarray) -> np.ndarray:
-        """Pairs (left[k], item) for every item of vertex right[k]."""
-        counts = starts[right + 1] - starts[right]
-        rows = np.repeat(np.arange(len(right)), counts)
-        offset = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return np.stack([left[rows], items[starts[right[rows]] + offset]], axis=1)
-
-    def unique(pairs: np.ndarray) -> np.ndarray:
-        width = int(pairs.max(initial=0)) + 1
-        key = np.unique(pairs[:, 0].astype(np.int64) * width + pairs[:, 1])
-        return np.stack([key // width, key % width], axis=1)
-
-    pairs = unique(expand(near[:, 0], near[:, 1], *incident(faces)))
-    pairs = pairs[~(faces[pairs[:, 1]] == pairs[:, :1]).any(axis=1)]
-    triangle = np.concatenate([pairs[:, :1], faces[pairs[:, 1]]], axis=1)
-    items, starts = incident(edges)
-    left = expand(np.arange(len(edges)).repeat(2), edges.ravel(), near[:, 1], start)
-    pairs = unique(expand(left[:, 0], left[:, 1], items, starts))
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    shared = (edges[pairs[:, 0]][:, :, None] == edges[pairs[:, 1]][:, None]).any(axis=(1, 2))
-    pairs = pairs[~shared]
-    return triangle.astype(np.int32), np.concatenate([edges[pairs[:, 0]], edges[pairs[:, 1]]], axis=1).astype(np.int32)
-
-
-@dataclass(frozen=True, eq=False)
 class ClothTopology:
     """Everything about a cloth that does not depend on its material or state.
 
@@ -195,14 +84,6 @@ class ClothTopology:
     hinges: Elements
     blocks: Blocks
     device_arrays: dict[str, Any] = field(default_factory=dict, repr=False)
-
-    @cached_property
-    def altitude(self) -> float:
-        """The smallest altitude of a triangle at rest [m]."""
-        x = self.rest[self.faces]
-        double = np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
-        longest = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
-        return float((double / longest).min())
 
     @property
     def vertex_count(self) -> int:
@@ -269,10 +150,9 @@ class ClothTopology:
         hinges = _elements(
             corners, dx * dy / 2, 2, own, parity, weight=twist, rest=np.zeros(len(corners))
         )  # fmt: skip
-        seams = edges.vertices
         return cls(
             rest, faces, area, nx * ny, min(dx, dy), float(np.hypot(*size)), edges, cells_,
-            _none(3, u=(3,), v=(3,), area=()), lines, hinges, make_blocks(rest, faces, seams),
+            _none(3, u=(3,), v=(3,), area=()), lines, hinges, make_blocks(rest, faces, edges.vertices, _creases(index)),
         )  # fmt: skip
 
     @classmethod
@@ -324,8 +204,39 @@ class ClothTopology:
         extent = float(np.linalg.norm(np.ptp(rest3, axis=0)))
         return cls(
             rest3, faces, area, len(faces), float(lengths.min()), extent, _none(2, rest=()), _none(4, quarter=()),
-            triangles, _none(3), hinges, make_blocks(rest3, faces, edges),
+            triangles, _none(3), hinges, make_blocks(rest3, faces, edges, np.zeros((0, 4), int)),
         )  # fmt: skip
+
+
+def _creases(index: np.ndarray) -> np.ndarray:
+    """Pairs of edges (c, 4) that only a crease through a cell brings together: diagonals with what is next to them.
+
+    A sheet's diagonals are left out of the edges that collide, for layers meet along grid lines just as well. Where
+    the cloth is creased sharply at one of the two corners off the diagonal, though, the diagonal can go through the
+    cells around that corner while no vertex does.
+
+    Args:
+        index: (ny + 1, nx + 1) int, the vertices of the grid.
+    """
+    ny, nx = index.shape[0] - 1, index.shape[1] - 1
+    padded = np.pad(index, 1, constant_values=-1)
+    j, i = np.meshgrid(np.arange(ny), np.arange(nx), indexing="ij")
+    at = lambda p, q: padded[q + 1, p + 1]  # noqa: E731
+    diagonal = np.stack([at(i, j), at(i + 1, j + 1)], axis=-1)
+    # the two seams that leave each off corner (p, q), and the diagonals of the other cells around it
+    others = []
+    for p, q, (a, b) in ((i + 1, j, (1, -1)), (i, j + 1, (-1, 1))):
+        others.append((at(p, q), at(p + a, q)))
+        others.append((at(p, q), at(p, q + b)))
+        others.extend((at(p + c, q + d), at(p + c + 1, q + d + 1)) for c, d in ((0, 0), (-1, -1), (a // 2, b // 2)))
+    first = np.tile(diagonal[None], (len(others), 1, 1, 1)).reshape(-1, 2)
+    second = np.stack([np.stack(pair, axis=-1) for pair in others]).reshape(-1, 2)
+    shared = (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
+    keep = ~shared & (second >= 0).all(axis=1)
+    pairs = np.sort(np.stack([first[keep], second[keep]], axis=1), axis=2)
+    swap = pairs[:, 0, 0] > pairs[:, 1, 0]
+    pairs[swap] = pairs[swap, ::-1]
+    return np.unique(pairs.reshape(-1, 4), axis=0)
 
 
 def _mesh_hinges(rest: np.ndarray, faces: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, Elements]:

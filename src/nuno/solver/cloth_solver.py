@@ -11,11 +11,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.pair_lists import GROUP
 from nuno.scene.cloth import ClothTopology, Elements
-from nuno.solver.frame import run_worlds
+from nuno.scene.yarns import string_yarns
+from nuno.solver.frame import run_lanes, run_worlds
 from nuno.solver.lanes import LANES, lane, lane_int
-from nuno.solver.large import LargePlan
-from nuno.solver.state import NOTES, ORIGIN, SCALARS, SPEED, TRAVEL, Settings, Shapes, Sizes, StateFloat, StateLanes, Topology
+from nuno.solver.large import CELLS, HINGES, LINES, TRIANGLES, YARNS, LargePlan
+from nuno.solver.shared import SHARED_PARTICLES, run_blocks, run_blocks_shared
+from nuno.solver.state import (
+    NOTES,
+    ORIGIN,
+    SCALARS,
+    SPEED,
+    TRAVEL,
+    Settings,
+    Shapes,
+    Sizes,
+    StateFloat,
+    StateLanes,
+    Topology,
+)
+from nuno.solver.wide import run_wide, widen_topology
 
 if TYPE_CHECKING:
     from nuno.grip import GripSpec
@@ -26,12 +42,12 @@ BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
-SAG = 0.01
-"""Edge strain that the default number of substeps allows a cloth hanging from its end (see default_substeps)."""
-
-OVER_RELAXATION = 1.0
-"""What one pass lacks in stretch: the mass term of an edge's update is divided by this (the compliance is not), which
-nearly halves the strain that a hanging cloth keeps at the same number of substeps."""
+SAG, MESH_SAG = 0.01, 0.0025
+"""Strain scale 2 g L dt^2 / h^2 that the default number of substeps allows a sheet and a cloth mesh."""
+BENDING_STEP = 1.8
+"""The default number of substeps keeps B dt^2 / (rho h^4) at or under one over this."""
+FEWEST, MOST_SUBSTEPS = 10, 240
+"""Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
 
 _threads: ThreadPoolExecutor | None = None
 
@@ -44,14 +60,31 @@ def _pool() -> ThreadPoolExecutor:
     return _threads
 
 
-def default_substeps(topology: ClothTopology, gravity: float, frame: float) -> int:
-    """Substeps a frame from the cell size: one pass a substep leaves a hanging cloth a strain of 2 g L dt^2 / h^2.
+def default_substeps(
+    topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0
+) -> int:
+    """Substeps a frame from the cell size h and the cloth's extent L [m], its density rho and rigidity B.
 
-    L is the cloth's extent and h its cell size [m]; the rule bounds that strain by ``SAG``. Physical stretch
-    compliance comes on top. At least 10, so that contact is looked at every 1.7 ms at 60 frames a second.
+    In-plane, one pass a substep leaves a hanging cloth strains of the order 2 g L dt^2 / h^2. Held at ``SAG``, the 99th
+    percentile of the strain of sheets of 16 to 64 cells a side (0.3 and 1 m, 300 to 1000 N/m) that hang by two
+    corners is 0 to 0.2 % of strain above its value at 160 substeps or more, which itself is 0.4 to 1.8 %; at 5000 N/m
+    it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
+    the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip
+    then hangs within 10 % of its rigidity; one so stiff that this asks for more than `MOST_SUBSTEPS` comes out softer.
+
+    Args:
+        topology: The cloth's elements.
+        gravity: Size of gravity [m/s2].
+        frame: Length of a frame [s].
+        density: Smallest area density [kg/m2].
+        rigidity: Largest bending rigidity [N m].
     """
-    step = topology.cell_size * math.sqrt(SAG / (2.0 * max(gravity, 1.0) * topology.extent))
-    return max(10, math.ceil(frame / step))
+    h = topology.cell_size
+    allowed = SAG if len(topology.edges) else MESH_SAG
+    step = h * math.sqrt(allowed / (2.0 * max(gravity, 1.0) * topology.extent))
+    if rigidity > 0.0:
+        step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
+    return min(max(FEWEST, math.ceil(frame / step)), MOST_SUBSTEPS)
 
 
 class ClothSolver:
@@ -68,10 +101,11 @@ class ClothSolver:
         substeps: Substeps a frame; None takes `default_substeps`.
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
         self_contact: Whether the cloth collides with itself.
-        plan: "auto", "fused" (a thread, or a block, per world), or "large" (a launch per phase).
+        plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
+            the CPU by sixteen elements at a time) or "large" (a launch per phase).
 
-    Limitations: one pass a substep, so that stiffness beyond m / dt^2 acts as an inextensible limit and not as the
-    stated value; damping acts on stretch along edges and on bending, not on shear or general triangles.
+    Limitations: one pass a substep, so that what is stiffer than m / dt^2 comes out softer than stated, except along
+    a sheet's yarns, which are solved exactly; damping acts on bending alone.
     """
 
     def __init__(
@@ -94,22 +128,29 @@ class ClothSolver:
         self.world_count, self.particle_count = positions.shape[:2]
         self.gravity = np.asarray(gravity, dtype=float)
         down = float(np.linalg.norm(self.gravity))
-        self.substeps = int(substeps) if substeps else default_substeps(topology, down, 1.0 / frame_rate)
+        values = material.resolved(self.world_count, topology.element_count)
+        rigidity = max(float(values[f"bending_rigidity_{side}"].max()) for side in ("warp", "weft"))
+        rule = (down, 1.0 / frame_rate, float(values["area_density"].min()), rigidity)
+        self.substeps = int(substeps) if substeps else default_substeps(topology, *rule)
         self.self_contact = self_contact
         self._cuda = self.device.startswith("cuda")
-        self.lanes = LANES if not self._cuda and self.world_count > 1 else 1
+        # the large plan keeps one world after the other, also where it is tried out on the CPU
+        self.lanes = LANES if not self._cuda and self.world_count > 1 and plan != "large" else 1
+        self.shared_memory = True
         self.group_count = -(-self.world_count // self.lanes)
         self._number: Any = lane if self.lanes > 1 else float
         self._integer: Any = lane_int if self.lanes > 1 else int
         if plan == "auto":
-            plan = "large" if self._cuda and self.particle_count > BLOCK_PARTICLES else "fused"
+            one = "vector" if not self._cuda and self.world_count == 1 else "fused"
+            plan = "large" if self._cuda and self.particle_count > BLOCK_PARTICLES else one
         self.plan = plan
-        self._build(material, friction)
+        self._build(values, friction)
         self.set_state(positions, velocities)
         self.set_colliders(None)
         self.set_grips(())
         self.set_forces(None)
         self._large: LargePlan | None = None
+        self._wide: Any = None
 
     # -- arrays: worlds are the leading axis outside, lanes the innermost inside
 
@@ -133,9 +174,8 @@ class ClothSolver:
             values = values.reshape(self.group_count, count, self.lanes).transpose(0, 2, 1)
         return values.reshape(-1, count)[: self.world_count]
 
-    def _build(self, material: Cloth, friction: float | np.ndarray | None) -> None:
+    def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count
-        values = material.resolved(worlds, topology.element_count)
         state = StateLanes() if self.lanes > 1 else StateFloat()
         size = Sizes()
         topo = Topology()
@@ -143,7 +183,6 @@ class ClothSolver:
         for name, value in shared.items():
             setattr(topo, name, value)
         topo.particles, topo.blocks = n, topology.blocks.count
-        topo.ring_sq, topo.contact_reach = topology.blocks.ring**2, topology.blocks.contact_reach
         self._size, self._state, self._topology = size, state, topo
 
         def table(which: tuple[str, ...]) -> tuple[list[np.ndarray], bool]:
@@ -165,6 +204,7 @@ class ClothSolver:
                         state.stretch_soft, size.stretch_soft = self._put(1.0 / both[0]), both[0].shape[1]
                     topo.triangle_soft = wp.array(np.stack([u, v, w], 1).astype(np.int32), dtype=wp.vec3i, device=self.device)
                 else:
+                    soft = np.ascontiguousarray(soft[string_yarns(topology.edges)[0]])
                     topo.edge_soft = wp.array(soft, dtype=int, device=self.device)
         shear, per_element = table(("shear_stiffness",))
         elements = topology.cells if len(topology.cells) else topology.triangles
@@ -215,32 +255,54 @@ class ClothSolver:
         areas = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
         face_mass = np.repeat(density, per_face, axis=1) * areas / 3
         mass = np.zeros((self.world_count, self.particle_count))
+        shares = np.broadcast_to(face_mass, (self.world_count, len(areas))).T
         for k in range(3):
-            np.add.at(mass, (slice(None), topology.faces[:, k]), np.broadcast_to(face_mass, (self.world_count, len(areas))))
+            np.add.at(mass.T, topology.faces[:, k], shares)
         return mass
+
+    @property
+    def _whole(self) -> int:
+        """Numbers in a world's array, up to a whole vector where particles are taken by sixteen."""
+        n = self.particle_count
+        return -(-n // LANES) * LANES if self.plan == "vector" else n
 
     def _allocate(self) -> None:
         """Room for what the kernels keep for themselves."""
         state, size, n, groups = self._state, self._size, self.particle_count, self.group_count
-        blocks = self.topology.blocks.count
-        size.blocks = blocks
+        blocks = self.topology.blocks
+        # boxes of blocks, and of groups of blocks, six numbers each
+        size.blocks = 6 * (blocks.count + -(-blocks.count // GROUP))
+        size.listed = 3 * n + 6 if self.self_contact else 1
+        size.middle = 4 * (len(blocks.face) + len(blocks.edge)) if self.self_contact else 1
         # candidates seen in crumpled cloths: under 3 a vertex (vertex-triangle) and 8 a vertex (edge-edge)
         size.vertex_triangle, size.edge_edge = 6 * n + 64, 16 * n + 128
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
-        size.moved = 4 * n if self._cuda else 1
+        size.moved = 4 * n if self._cuda or self.plan == "large" else 1
 
         def empty(count: int, dtype: Any) -> wp.array:
             return wp.zeros(groups * count, dtype=dtype, device=self.device)
 
         for name in ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w"):
-            setattr(state, name, empty(n, self._number))
+            setattr(state, name, empty(self._whole, self._number)[: groups * n])
+        size.edges = max(1, len(self.topology.edges))
+        for name in ("yarn_gain", "yarn_pull", "yarn_inverse"):
+            setattr(state, name, empty(size.edges, self._number))
         state.notes = empty(NOTES, self._number)
-        state.bounds = empty(6 * blocks, self._number)
+        state.bounds = empty(size.blocks, self._number)
+        state.listed = empty(size.listed, self._number)
+        state.middle = empty(size.middle, self._number)
         state.box = empty(6, self._number)
         state.vertex_triangle = empty(4 * size.vertex_triangle, self._integer)
         state.edge_edge = empty(4 * size.edge_edge, self._integer)
         state.pair_count = empty(2, self._integer)
+        if self.plan == "large":  # solves all listed pairs, which a whole device looks at in no time
+            state.touch_triangle, state.touch_edge = state.vertex_triangle, state.edge_edge
+            state.touch_count = state.pair_count
+        else:
+            state.touch_triangle = empty(4 * size.vertex_triangle, self._integer)
+            state.touch_edge = empty(4 * size.edge_edge, self._integer)
+            state.touch_count = empty(2, self._integer)
         state.moved = empty(size.moved, int)
         state.worlds = self.world_count
 
@@ -336,7 +398,8 @@ class ClothSolver:
     def memory_bytes(self) -> int:
         """Bytes of device memory that this cloth holds, elements shared by all worlds included."""
         total = 0
-        for holder in (self._state, self._topology):
+        holders: tuple[Any, ...] = (self._state, self._topology)
+        for holder in holders:
             for name in holder._cls.vars:
                 value = getattr(holder, name)
                 total += value.capacity if isinstance(value, wp.array) else 0
@@ -370,7 +433,10 @@ class ClothSolver:
         else:
             self._size.forces = self.particle_count
             for k, name in enumerate(("fx", "fy", "fz")):
-                setattr(s, name, self._put(np.asarray(forces)[..., k]))
+                values = self._put(np.asarray(forces)[..., k])
+                held = wp.zeros(self.group_count * self._whole, dtype=self._number, device=self.device)
+                wp.copy(held, values, count=len(values))
+                setattr(s, name, held[: len(values)])
         self._large = None
 
     def set_grips(self, grips: Sequence[GripSpec]) -> None:
@@ -417,7 +483,10 @@ class ClothSolver:
         s.grip_weight, s.grip_corner = self._put(weight), self._put(corner, integer=True)
         wp.copy(s.w, self._put(mass))
         self._grip_count, self._grip_keys = len(entries), keys
-        put = lambda values, dtype: wp.array(values, dtype=dtype, device=self.device)  # noqa: E731
+
+        def put(values: np.ndarray, dtype: Any) -> wp.array:
+            return wp.array(values, dtype=dtype, device=self.device)
+
         self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
         self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
         self._grip_soft = np.array([e["compliance"] for e in entries] or [0.0])
@@ -449,9 +518,8 @@ class ClothSolver:
         run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
         # candidates within a third of a cell: few enough to look at, and good for several substeps
         run.margin = 0.35 * self.topology.cell_size
-        run.slack = 1.2 * run.margin / self.topology.altitude
+        run.reach = 0.25 * self.topology.cell_size
         run.frame = self.substeps
-        run.relax = 1.0 / OVER_RELAXATION
         run.grips, run.keys = self._grip_count, self._grip_keys
         run.grip_time = wp.array((self._grip_times - time).ravel(), dtype=float, device=self.device)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
@@ -463,24 +531,41 @@ class ClothSolver:
         self._reset_clock()
         if self.plan == "large":
             if self._large is None:
-                self._large = LargePlan(self._state, self._topology, self._size, self._shapes, self.device)
-            self._large.run(run, substeps, self.world_count)
+                self._large = self._large_plan()
+            self._large.run(run, substeps)
             return
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
+            fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
             wp.launch(
-                run_worlds, dim=self.group_count * BLOCK_THREADS, inputs=[*common, 0, substeps, BLOCK_THREADS],
-                device=self.device, block_dim=BLOCK_THREADS,
+                run_blocks_shared if fits else run_blocks, dim=self.group_count * BLOCK_THREADS,
+                inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
             )  # fmt: skip
             return
 
+        if self.plan == "vector":
+            if self._wide is None:
+                self._wide = widen_topology(self.topology, self._topology)
+            inputs = [self._state, self._topology, self._wide, self._size, run, self._shapes, substeps]
+            wp.launch(run_wide, dim=1, inputs=inputs, device=self.device)
+            return
+
         def group(first: int) -> None:
-            wp.launch(run_worlds, dim=1, inputs=[*common, first, substeps, 1], device=self.device)
+            kernel = run_lanes if self.lanes > 1 else run_worlds
+            wp.launch(kernel, dim=1, inputs=[*common, first, substeps, 1], device=self.device)
 
         if self.group_count == 1:
             group(0)
         else:
             list(_pool().map(group, range(self.group_count)))
+
+    def _large_plan(self) -> LargePlan:
+        topology = self.topology
+        kinds = {HINGES: topology.hinges, LINES: topology.lines, CELLS: topology.cells}
+        colours = {kind: elements.offsets for kind, elements in kinds.items()}
+        colours |= {TRIANGLES: topology.triangles.offsets, YARNS: self._topology.yarn_kind.numpy()}
+        parts = (self._state, self._topology, self._size, self._shapes)
+        return LargePlan(*parts, self.device, self.world_count, colours)
 
     def _reset_clock(self) -> None:
         from nuno.solver.pack import reset_clock
@@ -499,9 +584,11 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)
 
     t, b = topology, topology.blocks
+    order, starts, kinds = string_yarns(t.edges)
     made = dict(
-        edge=put(t.edges.vertices, wp.vec2i), edge_rest=put(t.edges.extra["rest"], float),
-        edge_scale=put(t.edges.scale, float), edge_colour=put(t.edges.offsets, int), edge_soft=put(t.edges.axis, int),
+        edge=put(t.edges.vertices[order], wp.vec2i), edge_rest=put(t.edges.extra["rest"][order], float),
+        edge_scale=put(t.edges.scale[order], float), edge_soft=put(t.edges.axis[order], int),
+        yarn=put(starts, int), yarn_kind=put(kinds, int),
         cell=put(t.cells.vertices, wp.vec4i), cell_scale=put(t.cells.extra["quarter"], float),
         cell_colour=put(t.cells.offsets, int), cell_soft=put(t.cells.axis, int),
         triangle=put(t.triangles.vertices, wp.vec3i), triangle_u=put(t.triangles.extra["u"], wp.vec3),
@@ -515,9 +602,9 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         hinge_colour=put(t.hinges.offsets, int), hinge_soft=put(t.hinges.axis, int),
         block_vertex=put(b.vertex, int), block_vertex_start=put(b.vertex_start, int),
         block_face=put(b.face, wp.vec3i), block_face_start=put(b.face_start, int),
-        block_face_reach=put(b.face_reach, float), block_edge=put(b.edge, wp.vec2i),
-        block_edge_start=put(b.edge_start, int), block_edge_reach=put(b.edge_reach, float),
-        rest=put(t.rest, wp.vec3), ring_triangle=put(b.ring_triangle, wp.vec4i), ring_edge=put(b.ring_edge, wp.vec4i),
+        block_edge=put(b.edge, wp.vec2i), block_edge_start=put(b.edge_start, int),
+        block_corner=put(b.corner, int), block_corner_start=put(b.corner_start, int),
+        crease=put(b.crease, wp.vec4i),
     )  # fmt: skip
     topology.device_arrays[device] = made
     return made

@@ -9,23 +9,16 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.self_contact import (
-    bound_blocks,
-    find_pairs,
-    take_moves,
-    touch_edge_edge,
-    touch_vertex_triangle,
-)
+from nuno.contact.pair_lists import find_contacts
+from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
 from nuno.solver.bending import bend_hinge, bend_line
 from nuno.solver.grips import hold_vertices, pull_points
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
-from nuno.solver.lanes import barrier, fill, largest
-from nuno.solver.membrane import shear_cell, shear_triangle, stretch, stretch_triangle
+from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
+from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.state import (
     DAMPING,
-    LISTINGS,
-    TRAVEL,
     Settings,
     Shapes,
     Sizes,
@@ -34,77 +27,85 @@ from nuno.solver.state import (
     Topology,
     view,
 )
+from nuno.solver.vector import at, corner, scaled, spread
 
 
 @wp.func
-def bend_lines(t: Any, topo: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+def bend_lines(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The line bends of one colour."""
     rate = 1.0 / (run.dt * run.dt)
-    gamma = t.scalars[DAMPING] * (1.0 / run.dt)
+    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
-        bend_line(t, topo.line[k], t.bend_soft[topo.line_soft[k]] * (topo.line_scale[k] * rate), run.damped, gamma)
+        alpha = scaled(at(t.bend_soft, table.line_soft[k]), table.line_scale[k] * rate)
+        a = corner(table.line, k, 0, 3)
+        b = corner(table.line, k, 1, 3)
+        c = corner(table.line, k, 2, 3)
+        bend_line(t, a, b, c, alpha, run.damped, spread(alpha, damping))
 
 
 @wp.func
-def bend_hinges(t: Any, topo: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+def bend_hinges(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The hinges and cell twists of one colour."""
     rate = 1.0 / (run.dt * run.dt)
-    gamma = t.scalars[DAMPING] * (1.0 / run.dt)
+    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
-        alpha = t.bend_soft[topo.hinge_soft[k]] * (topo.hinge_scale[k] * rate)
-        bend_hinge(t, topo.hinge[k], topo.hinge_weight[k], topo.hinge_rest[k], alpha, run.damped, gamma)
+        alpha = scaled(at(t.bend_soft, table.hinge_soft[k]), table.hinge_scale[k] * rate)
+        a = corner(table.hinge, k, 0, 4)
+        b = corner(table.hinge, k, 1, 4)
+        c = corner(table.hinge, k, 2, 4)
+        d = corner(table.hinge, k, 3, 4)
+        ka = corner(table.hinge_weight, k, 0, 4)
+        kb = corner(table.hinge_weight, k, 1, 4)
+        kc = corner(table.hinge_weight, k, 2, 4)
+        kd = corner(table.hinge_weight, k, 3, 4)
+        gamma = spread(alpha, damping)
+        bend_hinge(t, a, b, c, d, ka, kb, kc, kd, table.hinge_rest[k], alpha, run.damped, gamma)
 
 
 @wp.func
-def shear_cells(t: Any, topo: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The cell shears of one colour; 4 scale is 1 / area."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
-        scale = topo.cell_scale[k]
-        shear_cell(t, topo.cell[k], scale, t.shear_soft[topo.cell_soft[k]] * (4.0 * scale * rate))
+        scale = table.cell_scale[k]
+        alpha = scaled(at(t.shear_soft, table.cell_soft[k]), scale * 4.0 * rate)
+        a = corner(table.cell, k, 0, 4)
+        b = corner(table.cell, k, 1, 4)
+        c = corner(table.cell, k, 2, 4)
+        d = corner(table.cell, k, 3, 4)
+        shear_cell(t, a, b, c, d, scale, alpha)
 
 
 @wp.func
-def strain_triangles(t: Any, topo: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The triangles of one colour: shear, then stretch along weft and warp."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
-        tri = topo.triangle[k]
-        u = topo.triangle_u[k]
-        v = topo.triangle_v[k]
-        soft = topo.triangle_soft[k]
-        scale = rate / topo.triangle_area[k]
-        shear_triangle(t, tri, u, v, t.shear_soft[soft[2]] * scale)
-        stretch_triangle(t, tri, v, t.stretch_soft[soft[1]] * scale)
-        stretch_triangle(t, tri, u, t.stretch_soft[soft[0]] * scale)
+        area = table.triangle_area[k]
+        scale = over(fill(area, rate), area)
+        a = corner(table.triangle, k, 0, 3)
+        b = corner(table.triangle, k, 1, 3)
+        c = corner(table.triangle, k, 2, 3)
+        shear_triangle(t, table, k, a, b, c, scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale))
+        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
+        ka = corner(table.triangle_v, k, 0, 3)
+        kb = corner(table.triangle_v, k, 1, 3)
+        kc = corner(table.triangle_v, k, 2, 3)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha)
+        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
+        ka = corner(table.triangle_u, k, 0, 3)
+        kb = corner(table.triangle_u, k, 1, 3)
+        kc = corner(table.triangle_u, k, 2, 3)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha)
 
 
 @wp.func
-def stretch_edges(t: Any, topo: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The edges of one colour."""
+def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The yarns of one direction."""
     rate = 1.0 / (run.dt * run.dt)
-    gamma = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
-        e = topo.edge[k]
-        alpha = t.stretch_soft[topo.edge_soft[k]] * (topo.edge_scale[k] * rate)
-        stretch(t, e[0], e[1], topo.edge_rest[k], alpha, run.relax, run.damped, gamma)
-
-
-@wp.func
-def find_contacts(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
-    """List self-contact pairs anew where what moved since may have used up the margin."""
-    # the coming substep counts too, at up to twice the present speed
-    if 2.0 * largest(t.notes[TRAVEL]) + 0.25 * run.margin > run.margin:
-        barrier(threads)
-        if thread == 0:
-            t.pair_count[0] = t.pair_count[0] * 0
-            t.pair_count[1] = t.pair_count[1] * 0
-            t.notes[TRAVEL] = fill(t.x[0], 0.0)
-            t.notes[LISTINGS] = t.notes[LISTINGS] + fill(t.x[0], 1.0)
-        bound_blocks(t, topo, thread, threads)
-        barrier(threads)
-        find_pairs(t, topo, run.margin, run.slack, thread, threads)
-        barrier(threads)
+        start = table.yarn[k]
+        stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
@@ -122,8 +123,8 @@ def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
     for c in range(topo.triangle_colour.shape[0] - 1):
         strain_triangles(t, topo, run, topo.triangle_colour[c], topo.triangle_colour[c + 1], thread, threads)
         barrier(threads)
-    for c in range(topo.edge_colour.shape[0] - 1):
-        stretch_edges(t, topo, run, topo.edge_colour[c], topo.edge_colour[c + 1], thread, threads)
+    for c in range(topo.yarn_kind.shape[0] - 1):
+        stretch_yarns(t, topo, run, topo.yarn_kind[c], topo.yarn_kind[c + 1], thread, threads)
         barrier(threads)
 
 
@@ -148,9 +149,11 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
     for k in range(substeps):
         if k % run.frame == 0:
             near_shapes(t, n, run, shapes, thread, threads)
+        # before the listing, which asks how far anything went in the substep before
+        tick(t, run, thread)
+        barrier(threads)
         if run.touching != 0:
             find_contacts(t, topo, run, thread, threads)
-        tick(t, run, thread)
         predict(t, n, run, thread, threads)
         barrier(threads)
         hold_vertices(t, run, thread, threads)
@@ -159,8 +162,8 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         pull_points(t, run, thread, threads)
         barrier(threads)
         if run.touching != 0:
-            touch_edge_edge(t, n, run.dt, thread, threads)
-            touch_vertex_triangle(t, n, run.dt, thread, threads)
+            touch_edge_edge(t, n, run, thread, threads)
+            touch_vertex_triangle(t, n, run, thread, threads)
             barrier(threads)
             take_moves(t, n, thread, threads)
             barrier(threads)
@@ -172,14 +175,23 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         barrier(threads)
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, 1))
-def run_worlds(s: Any, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
-    """Every world by itself: one thread on the CPU, a block of ``threads`` threads on CUDA."""
-    tid = wp.tid()
-    group = first + tid / threads
-    t = view(s, group, topo.particles, size)
+@wp.func
+def run_share(s: Any, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, tid: int, threads: int):  # noqa: E501
+    """What thread ``tid`` does: its share of the world, or of the sixteen worlds, that is its block's."""
+    t = view(s, first + tid / threads, topo.particles, size)
     advance(t, topo, run, shapes, substeps, tid % threads, threads)
 
 
-wp.overload(run_worlds, [StateFloat, Topology, Sizes, Settings, Shapes, int, int, int])
-wp.overload(run_worlds, [StateLanes, Topology, Sizes, Settings, Shapes, int, int, int])
+# A module each, so that only the kind that is run is compiled.
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_worlds")
+def run_worlds(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
+    """Every world by itself: one thread on the CPU, a block of ``threads`` threads on CUDA."""
+    run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_lanes")
+def run_lanes(s: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
+    """Sixteen worlds at once, by one thread on the CPU."""
+    run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)

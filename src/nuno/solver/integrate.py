@@ -4,8 +4,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import choose, fill, largest, most, over, times
-from nuno.solver.state import CLOCK, DRAG, SPEED, TRAVEL, Settings
+from nuno.solver.lanes import add, choose, fill, largest, most, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings
 
 
 @wp.func
@@ -49,19 +49,21 @@ def predict(t: Any, n: int, run: Settings, thread: int, threads: int):
 def raise_speed(notes: wp.array(dtype=float), value: float, threads: int):
     """Keep the largest squared speed."""
     if threads > 1:
-        wp.atomic_max(notes, SPEED, value)
+        # most values are below what is there already; only the others queue up for the atomic
+        if value > notes[SPEED]:
+            wp.atomic_max(notes, SPEED, value)
     else:
         notes[SPEED] = most(notes[SPEED], value)
 
 
 @wp.func
-def raise_speed(notes: wp.array(dtype=Any), value: Any, threads: int):  # noqa: F811
+def raise_speed(notes: wp.array(dtype=Any), value: Any, threads: int):
     notes[SPEED] = most(notes[SPEED], value)
 
 
 @wp.func
 def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
-    """v = (x - p) / dt, and the largest speed.
+    """Velocities (x - p) / dt, and the largest speed.
 
     Written as the predicted velocity plus what the constraints moved, so that rounding of the large coordinates
     does not enter a free particle's velocity.
@@ -92,4 +94,5 @@ def tick(t: Any, run: Settings, thread: int):
     """Advance the run's clock and the distance that anything may have gone since the pairs were listed."""
     if thread == 0:
         t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], run.dt)
+        t.notes[PICKED] = t.notes[PICKED] + root(t.notes[SPEED]) * run.dt
         t.notes[TRAVEL] = t.notes[TRAVEL] + wp.sqrt(largest(t.notes[SPEED])) * fill(t.x[0], run.dt)

@@ -13,18 +13,42 @@ LANES = 16
 lane = wp.types.vector(length=LANES, dtype=float)
 lane_int = wp.types.vector(length=LANES, dtype=int)
 
+_LANE = "wp::vec_t<16,wp::float32>"
 # Clang's vector extension: what it compiles to is SIMD by construction, not by the optimiser's grace.
 _SIMD = (
-    "\n#if defined(__CUDACC__)\nreturn {};\n#else\n"
     "typedef float V __attribute__((vector_size(64), aligned(4)));"
     "typedef int I __attribute__((vector_size(64), aligned(4)));"
+    "const I OWN = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};"
 )
+
+
+def _native(body: str, result: str = "{}") -> str:
+    """C++ for the CPU; CUDA's compiler sees these functions where a module holds both kinds, but never calls them."""
+    return f"\n#if defined(__CUDACC__)\nreturn {result};\n#else\n{_SIMD}{body}\n#endif\n"
 
 
 def _simd(expression: str, *arguments: str) -> str:
     """C++ for a function of lanes: ``expression`` of the arguments' capitals."""
     loads = "".join(f"V {a.upper()} = *(const V*)&{a};" for a in arguments)
-    return f"{_SIMD}{loads} wp::vec_t<16,wp::float32> r; *(V*)&r = {expression}; return r;\n#endif\n"
+    return _native(f"{loads} {_LANE} r; *(V*)&r = {expression}; return r;")
+
+
+# Warp takes add, sub and mul for the operators + - * where a module imports them by these names. Its own loop over
+# the elements of a vector, which would be compiled twice as slowly to much the same code, is left to the rest.
+@wp.func_native(_simd("A + B", "a", "b"))
+def add(a: lane, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A - B", "a", "b"))
+def sub(a: lane, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A * b", "a"))
+def mul(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("a * B", "b"))
+def mul(a: float, b: lane) -> lane: ...  # noqa: F811
 
 
 @wp.func
@@ -63,9 +87,8 @@ def fill(like: float, value: float):
     return value
 
 
-@wp.func
-def fill(like: lane, value: float):  # noqa: F811
-    return lane(value)
+@wp.func_native(_simd("(V){} + value"))
+def fill(like: lane, value: float) -> lane: ...  # noqa: F811
 
 
 @wp.func
@@ -114,7 +137,7 @@ def anywhere(a: float):
     return a > 0.0
 
 
-@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;\n#endif\n")
+@wp.func_native(_native("V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;"))
 def anywhere(a: lane) -> bool: ...  # noqa: F811
 
 
@@ -124,7 +147,7 @@ def largest(a: float):
     return a
 
 
-@wp.func_native(_SIMD + "V A = *(const V*)&a; return __builtin_reduce_max(A);\n#endif\n")
+@wp.func_native(_native("V A = *(const V*)&a; return __builtin_reduce_max(A);"))
 def largest(a: lane) -> float: ...  # noqa: F811
 
 
@@ -145,8 +168,22 @@ def gather(x: wp.array(dtype=float), i: int):
     return x[i]
 
 
-@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = x.data[i[l]][l]; return r;")
+@wp.func_native(
+    _native(f"""{_LANE} r;
+#if defined(__AVX512F__)
+V R = {{}};
+*(V*)&r = (V)__builtin_ia32_gathersiv16sf(R, x.data, *(const I*)&i * 16 + OWN, (unsigned short)0xffff, 4);
+#else
+for (int l = 0; l < 16; ++l) r[l] = x.data[i[l]][l];
+#endif
+return r;""")
+)
 def gather(x: wp.array(dtype=lane), i: lane_int) -> lane: ...  # noqa: F811
+
+
+@wp.func
+def gather(x: wp.array(dtype=lane), i: int):  # noqa: F811
+    return x[i]
 
 
 @wp.func
@@ -155,7 +192,14 @@ def place(x: wp.array(dtype=float), i: int, value: float):
     x[i] = value
 
 
-@wp.func_native("for (int l=0; l<16; ++l) x.data[i[l]][l] = value[l];")
+@wp.func_native(
+    _native("""
+#if defined(__AVX512F__)
+__builtin_ia32_scattersiv16sf(x.data, (unsigned short)0xffff, *(const I*)&i * 16 + OWN, *(const V*)&value, 4);
+#else
+for (int l = 0; l < 16; ++l) x.data[i[l]][l] = value[l];
+#endif""", "")
+)
 def place(x: wp.array(dtype=lane), i: lane_int, value: lane): ...  # noqa: F811
 
 
@@ -165,7 +209,7 @@ def known(like: float, i: int):
     return wp.where(i < 0, 0.0, 1.0)
 
 
-@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = i[l] < 0 ? 0.f : 1.f; return r;")
+@wp.func_native(_simd("(V)((*(const I*)&i >= 0) & (I)((V){} + 1.f))"))
 def known(like: lane, i: lane_int) -> lane: ...  # noqa: F811
 
 
@@ -175,7 +219,7 @@ def within(like: float, k: int, count: int):
     return wp.where(k < count, 1.0, 0.0)
 
 
-@wp.func_native("wp::vec_t<16,wp::float32> r; for (int l=0; l<16; ++l) r[l] = k < count[l] ? 1.f : 0.f; return r;")
+@wp.func_native(_simd("(V)((*(const I*)&count > k) & (I)((V){} + 1.f))"))
 def within(like: lane, k: int, count: lane_int) -> lane: ...  # noqa: F811
 
 

@@ -1,110 +1,181 @@
 """In-plane elasticity: stretch along warp and weft, and shear (XPBD, Macklin et al. 2016).
 
-Each function projects one constraint once. ``soft`` is the compliance alpha / dt^2 without the element's geometry;
-lambda starts at zero in every substep and there is one pass, so that the update is
-d lambda = -(C + gamma grad C . (x - p)) / ((1 + gamma) grad C . W grad C + alpha / dt^2), gamma = damping / dt.
+Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep
+and there is one pass, so that the update is d lambda = -C / (grad C . W grad C + alpha). An index may be an int, or a
+vector of sixteen where sixteen elements are projected at once (`nuno.solver.vector`).
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import fill, over, root, times
+from nuno.solver.lanes import add, fill, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.vector import at, corner, put, scaled, spread
 
 
 @wp.func
-def stretch(t: Any, i: int, j: int, rest: float, alpha: Any, relax: float, damped: int, gamma: Any):
-    """An edge along warp or weft: C = |x_i - x_j| - rest."""
-    dx = t.x[i] - t.x[j]
-    dy = t.y[i] - t.y[j]
-    dz = t.z[i] - t.z[j]
-    length = root(times(dx, dx) + times(dy, dy) + times(dz, dz) + fill(dx, 1.0e-20))
-    wi = t.w[i]
-    wj = t.w[j]
-    weight = wi + wj
-    violation = length - fill(dx, rest)
-    if damped != 0:
-        ux = dx - t.px[i] + t.px[j]
-        uy = dy - t.py[i] + t.py[j]
-        uz = dz - t.pz[i] + t.pz[j]
-        rate = over(times(dx, ux) + times(dy, uy) + times(dz, uz), length)
-        violation = violation + times(gamma, rate)
-        weight = weight + times(gamma, weight)
-    s = over(violation, times(weight * relax + alpha + fill(dx, 1.0e-12), length))
-    si = times(s, wi)
-    sj = times(s, wj)
-    t.x[i] = t.x[i] - times(dx, si)
-    t.y[i] = t.y[i] - times(dy, si)
-    t.z[i] = t.z[i] - times(dz, si)
-    t.x[j] = t.x[j] + times(dx, sj)
-    t.y[j] = t.y[j] + times(dy, sj)
-    t.z[j] = t.z[j] + times(dz, sj)
+def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
+    """Move particle i by s (dx, dy, dz)."""
+    put(t.x, i, at(t.x, i) + times(dx, s))
+    put(t.y, i, at(t.y, i) + times(dy, s))
+    put(t.z, i, at(t.z, i) + times(dz, s))
 
 
 @wp.func
-def shear_cell(t: Any, cell: wp.vec4i, scale: float, alpha: Any):
+def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float):
+    """All edges of a yarn at once: C_k = |x_k - x_k+1| - rest_k.
+
+    Linear in its lambdas, a yarn has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and beside it -w_k times the
+    cosine between the edges that meet at vertex k. Elimination forth and substitution back solve it exactly, so that
+    a force runs the whole length of a yarn in one substep. (The direct solution of a chain of XPBD constraints: Deul
+    et al. 2018, "Direct Position-Based Solver for Stiff Rods".)
+
+    Args:
+        t: The world's state.
+        table: The edges, each yarn's one after the other.
+        gains: Room for a number an edge; so are ``pulls`` and ``inverses``.
+        pulls: See ``gains``.
+        inverses: See ``gains``.
+        first: The yarn's first edge.
+        last: One past its last.
+        rate: 1 / dt^2 [1/s2].
+    """
+    head = corner(table.edge, first, 0, 2)
+    ax = at(t.x, head)
+    ay = at(t.y, head)
+    az = at(t.z, head)
+    wa = at(t.w, head)
+    one = fill(ax, 1.0)
+    zero = fill(ax, 0.0)
+    tiny = fill(ax, 1.0e-20)
+    ex = zero
+    ey = zero
+    ez = zero
+    pivot = zero
+    pull = zero
+    for k in range(first, last):
+        j = corner(table.edge, k, 1, 2)
+        bx = at(t.x, j)
+        by = at(t.y, j)
+        bz = at(t.z, j)
+        wb = at(t.w, j)
+        dx = ax - bx
+        dy = ay - by
+        dz = az - bz
+        length = root(times(dx, dx) + times(dy, dy) + times(dz, dz) + tiny)
+        inverse = over(one, length)
+        dx = times(dx, inverse)
+        dy = times(dy, inverse)
+        dz = times(dz, inverse)
+        # minus the entry beside the diagonal, shared with the edge before
+        beside = times(wa, times(ex, dx) + times(ey, dy) + times(ez, dz))
+        gain = times(beside, pivot)
+        if k > first:
+            gains[k - 1] = gain
+        alpha = scaled(at(t.stretch_soft, table.edge_soft[k]), table.edge_scale[k] * rate)
+        pivot = over(one, wa + wb + alpha + fill(ax, 1.0e-12) - times(beside, gain))
+        pull = times(spread(ax, table.edge_rest[k]) - length + times(beside, pull), pivot)
+        pulls[k] = pull
+        inverses[k] = inverse
+        ax = bx
+        ay = by
+        az = bz
+        wa = wb
+        ex = dx
+        ey = dy
+        ez = dz
+    # pull is now the last edge's lambda, and a the last vertex
+    fx = zero
+    fy = zero
+    fz = zero
+    for back in range(last - first):
+        k = last - 1 - back
+        i = corner(table.edge, k, 0, 2)
+        j = corner(table.edge, k, 1, 2)
+        if back > 0:
+            pull = pulls[k] + times(gains[k], pull)
+        bx = at(t.x, i)
+        by = at(t.y, i)
+        bz = at(t.z, i)
+        s = times(pull, inverses[k])
+        dx = times(bx - ax, s)
+        dy = times(by - ay, s)
+        dz = times(bz - az, s)
+        wj = at(t.w, j)
+        put(t.x, j, ax + times(wj, fx - dx))
+        put(t.y, j, ay + times(wj, fy - dy))
+        put(t.z, j, az + times(wj, fz - dz))
+        ax = bx
+        ay = by
+        az = bz
+        fx = dx
+        fy = dy
+        fz = dz
+    shift(t, head, fx, fy, fz, at(t.w, head))
+
+
+@wp.func
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
     """A rectangular cell: C = F_u . F_v = (|d1|^2 - |d2|^2) / (4 area), d1 and d2 its diagonals.
 
     ``scale`` is 1 / (4 area).
     """
-    a = cell[0]
-    b = cell[1]
-    c = cell[2]
-    d = cell[3]
-    d1x = t.x[d] - t.x[a]
-    d1y = t.y[d] - t.y[a]
-    d1z = t.z[d] - t.z[a]
-    d2x = t.x[b] - t.x[c]
-    d2y = t.y[b] - t.y[c]
-    d2z = t.z[b] - t.z[c]
+    ax = at(t.x, a)
+    ay = at(t.y, a)
+    az = at(t.z, a)
+    bx = at(t.x, b)
+    by = at(t.y, b)
+    bz = at(t.z, b)
+    cx = at(t.x, c)
+    cy = at(t.y, c)
+    cz = at(t.z, c)
+    dx = at(t.x, d)
+    dy = at(t.y, d)
+    dz = at(t.z, d)
+    d1x = dx - ax
+    d1y = dy - ay
+    d1z = dz - az
+    d2x = bx - cx
+    d2y = by - cy
+    d2z = bz - cz
     q1 = times(d1x, d1x) + times(d1y, d1y) + times(d1z, d1z)
     q2 = times(d2x, d2x) + times(d2y, d2y) + times(d2z, d2z)
-    wa = t.w[a]
-    wb = t.w[b]
-    wc = t.w[c]
-    wd = t.w[d]
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
+    wd = at(t.w, d)
     gradient = times(wa + wd, q1) + times(wb + wc, q2)
-    s = over((q1 - q2) * scale, (gradient * (4.0 * scale * scale)) + alpha + fill(q1, 1.0e-12)) * (2.0 * scale)
+    weight = scaled(gradient, scaled(scale * 4.0, scale)) + alpha + fill(q1, 1.0e-12)
+    s = scaled(over(scaled(q1 - q2, scale), weight), scale * 2.0)
     sa = times(s, wa)
     sb = times(s, wb)
     sc = times(s, wc)
     sd = times(s, wd)
-    t.x[a] = t.x[a] + times(d1x, sa)
-    t.y[a] = t.y[a] + times(d1y, sa)
-    t.z[a] = t.z[a] + times(d1z, sa)
-    t.x[d] = t.x[d] - times(d1x, sd)
-    t.y[d] = t.y[d] - times(d1y, sd)
-    t.z[d] = t.z[d] - times(d1z, sd)
-    t.x[b] = t.x[b] + times(d2x, sb)
-    t.y[b] = t.y[b] + times(d2y, sb)
-    t.z[b] = t.z[b] + times(d2z, sb)
-    t.x[c] = t.x[c] - times(d2x, sc)
-    t.y[c] = t.y[c] - times(d2y, sc)
-    t.z[c] = t.z[c] - times(d2z, sc)
+    put(t.x, a, ax + times(d1x, sa))
+    put(t.y, a, ay + times(d1y, sa))
+    put(t.z, a, az + times(d1z, sa))
+    put(t.x, d, dx - times(d1x, sd))
+    put(t.y, d, dy - times(d1y, sd))
+    put(t.z, d, dz - times(d1z, sd))
+    put(t.x, b, bx + times(d2x, sb))
+    put(t.y, b, by + times(d2y, sb))
+    put(t.z, b, bz + times(d2z, sb))
+    put(t.x, c, cx - times(d2x, sc))
+    put(t.y, c, cy - times(d2y, sc))
+    put(t.z, c, cz - times(d2z, sc))
 
 
 @wp.func
-def shift(t: Any, i: int, dx: Any, dy: Any, dz: Any, s: Any):
-    """Move particle i by s (dx, dy, dz)."""
-    t.x[i] = t.x[i] + times(dx, s)
-    t.y[i] = t.y[i] + times(dy, s)
-    t.z[i] = t.z[i] + times(dz, s)
-
-
-@wp.func
-def stretch_triangle(t: Any, tri: wp.vec3i, k: wp.vec3, alpha: Any):
+def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any):
     """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i."""
-    a = tri[0]
-    b = tri[1]
-    c = tri[2]
-    fx = t.x[a] * k[0] + t.x[b] * k[1] + t.x[c] * k[2]
-    fy = t.y[a] * k[0] + t.y[b] * k[1] + t.y[c] * k[2]
-    fz = t.z[a] * k[0] + t.z[b] * k[1] + t.z[c] * k[2]
+    fx = scaled(at(t.x, a), ka) + scaled(at(t.x, b), kb) + scaled(at(t.x, c), kc)
+    fy = scaled(at(t.y, a), ka) + scaled(at(t.y, b), kb) + scaled(at(t.y, c), kc)
+    fz = scaled(at(t.z, a), ka) + scaled(at(t.z, b), kb) + scaled(at(t.z, c), kc)
     length = root(times(fx, fx) + times(fy, fy) + times(fz, fz) + fill(fx, 1.0e-20))
-    wa = t.w[a] * k[0]
-    wb = t.w[b] * k[1]
-    wc = t.w[c] * k[2]
-    weight = wa * k[0] + wb * k[1] + wc * k[2]
+    wa = scaled(at(t.w, a), ka)
+    wb = scaled(at(t.w, b), kb)
+    wc = scaled(at(t.w, c), kc)
+    weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc)
     s = over(fill(fx, 1.0) - length, times(weight + alpha + fill(fx, 1.0e-12), length))
     shift(t, a, fx, fy, fz, times(s, wa))
     shift(t, b, fx, fy, fz, times(s, wb))
@@ -112,25 +183,46 @@ def stretch_triangle(t: Any, tri: wp.vec3i, k: wp.vec3, alpha: Any):
 
 
 @wp.func
-def shear_triangle(t: Any, tri: wp.vec3i, u: wp.vec3, v: wp.vec3, alpha: Any):
+def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
+    """The squared gradient |u F_v + v F_u|^2 at a corner with weights u and v."""
+    return scaled(vv, scaled(u, u)) + scaled(uv, scaled(u * 2.0, v)) + scaled(uu, scaled(v, v))
+
+
+@wp.func
+def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any):
     """A triangle's shear: C = F_u . F_v."""
-    a = tri[0]
-    b = tri[1]
-    c = tri[2]
-    ux = t.x[a] * u[0] + t.x[b] * u[1] + t.x[c] * u[2]
-    uy = t.y[a] * u[0] + t.y[b] * u[1] + t.y[c] * u[2]
-    uz = t.z[a] * u[0] + t.z[b] * u[1] + t.z[c] * u[2]
-    vx = t.x[a] * v[0] + t.x[b] * v[1] + t.x[c] * v[2]
-    vy = t.y[a] * v[0] + t.y[b] * v[1] + t.y[c] * v[2]
-    vz = t.z[a] * v[0] + t.z[b] * v[1] + t.z[c] * v[2]
+    ua = corner(table.triangle_u, k, 0, 3)
+    ub = corner(table.triangle_u, k, 1, 3)
+    uc = corner(table.triangle_u, k, 2, 3)
+    va = corner(table.triangle_v, k, 0, 3)
+    vb = corner(table.triangle_v, k, 1, 3)
+    vc = corner(table.triangle_v, k, 2, 3)
+    ux = scaled(at(t.x, a), ua) + scaled(at(t.x, b), ub) + scaled(at(t.x, c), uc)
+    uy = scaled(at(t.y, a), ua) + scaled(at(t.y, b), ub) + scaled(at(t.y, c), uc)
+    uz = scaled(at(t.z, a), ua) + scaled(at(t.z, b), ub) + scaled(at(t.z, c), uc)
+    vx = scaled(at(t.x, a), va) + scaled(at(t.x, b), vb) + scaled(at(t.x, c), vc)
+    vy = scaled(at(t.y, a), va) + scaled(at(t.y, b), vb) + scaled(at(t.y, c), vc)
+    vz = scaled(at(t.z, a), va) + scaled(at(t.z, b), vb) + scaled(at(t.z, c), vc)
     uu = times(ux, ux) + times(uy, uy) + times(uz, uz)
     vv = times(vx, vx) + times(vy, vy) + times(vz, vz)
     uv = times(ux, vx) + times(uy, vy) + times(uz, vz)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
     weight = fill(ux, 1.0e-12) + alpha
-    for k in range(3):
-        q = vv * (u[k] * u[k]) + uv * (2.0 * u[k] * v[k]) + uu * (v[k] * v[k])
-        weight = weight + times(t.w[tri[k]], q)
+    weight = weight + times(wa, shear_gradient(ua, va, uu, vv, uv))
+    weight = weight + times(wb, shear_gradient(ub, vb, uu, vv, uv))
+    weight = weight + times(wc, shear_gradient(uc, vc, uu, vv, uv))
     s = over(-uv, weight)
-    for k in range(3):
-        i = tri[k]
-        shift(t, i, vx * u[k] + ux * v[k], vy * u[k] + uy * v[k], vz * u[k] + uz * v[k], times(s, t.w[i]))
+    shift_sheared(t, a, ua, va, ux, uy, uz, vx, vy, vz, times(s, wa))
+    shift_sheared(t, b, ub, vb, ux, uy, uz, vx, vy, vz, times(s, wb))
+    shift_sheared(t, c, uc, vc, ux, uy, uz, vx, vy, vz, times(s, wc))
+
+
+@wp.func
+def shift_sheared(t: Any, i: Any, u: Any, v: Any, ux: Any, uy: Any, uz: Any, vx: Any, vy: Any, vz: Any, s: Any):
+    """Move particle i by s (u F_v + v F_u)."""
+    dx = scaled(vx, u) + scaled(ux, v)
+    dy = scaled(vy, u) + scaled(uy, v)
+    dz = scaled(vz, u) + scaled(uz, v)
+    shift(t, i, dx, dy, dz, s)

@@ -13,15 +13,18 @@ SCALARS = 7
 a coordinate's step is 1e-7 m, a tenth of what gravity moves a vertex in a substep."""
 # Per-world figures that the solver keeps for itself in `State.notes`.
 TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
-NOTES = 4
+# How far anything may have gone since the pairs that may touch were picked, and how far it may go [m].
+PICKED, PICK_REACH = 4, 5
+NOTES = 6
 
 
 def _state_fields(number: type, integer: type) -> dict[str, Any]:
     """The fields of a State whose numbers are floats or lanes of floats."""
     numbers = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w", "fx", "fy", "fz")
-    numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box")
+    numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
+    numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight")
-    integers = ("grip_corner", "vertex_triangle", "edge_edge", "pair_count")
+    integers = ("grip_corner", "vertex_triangle", "edge_edge", "pair_count", "touch_triangle", "touch_edge", "touch_count")
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
     return fields | {"moved": wp.array(dtype=int), "near": wp.array(dtype=int), "group": int, "worlds": int}
@@ -47,7 +50,8 @@ class Topology:
     edge_rest: wp.array(dtype=float)
     edge_scale: wp.array(dtype=float)
     edge_soft: wp.array(dtype=int)
-    edge_colour: wp.array(dtype=int)
+    yarn: wp.array(dtype=int)
+    yarn_kind: wp.array(dtype=int)
     cell: wp.array(dtype=wp.vec4i)
     cell_scale: wp.array(dtype=float)
     cell_soft: wp.array(dtype=int)
@@ -74,16 +78,11 @@ class Topology:
     block_vertex_start: wp.array(dtype=int)
     block_face: wp.array(dtype=wp.vec3i)
     block_face_start: wp.array(dtype=int)
-    block_face_reach: wp.array(dtype=float)
     block_edge: wp.array(dtype=wp.vec2i)
     block_edge_start: wp.array(dtype=int)
-    block_edge_reach: wp.array(dtype=float)
-    # pairs of elements of neighbouring cells, and how near vertices are at rest to count as neighbours
-    rest: wp.array(dtype=wp.vec3)
-    ring_sq: float
-    contact_reach: float
-    ring_triangle: wp.array(dtype=wp.vec4i)
-    ring_edge: wp.array(dtype=wp.vec4i)
+    block_corner: wp.array(dtype=int)
+    block_corner_start: wp.array(dtype=int)
+    crease: wp.array(dtype=wp.vec4i)
 
 
 @wp.struct
@@ -93,12 +92,15 @@ class Sizes:
     stretch_soft: int
     shear_soft: int
     bend_soft: int
+    edges: int
     forces: int
     keys: int
     grips: int
     blocks: int
     vertex_triangle: int
     edge_edge: int
+    listed: int
+    middle: int
     moved: int
     near: int
 
@@ -111,10 +113,9 @@ class Settings:
     gravity: wp.vec3
     pushed: int
     damped: int
-    relax: float
     touching: int
     margin: float
-    slack: float
+    reach: float
     frame: int
     grips: int
     keys: int
@@ -158,9 +159,14 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.shear_soft = window(s.shear_soft, group * size.shear_soft, size.shear_soft)
     t.bend_soft = window(s.bend_soft, group * size.bend_soft, size.bend_soft)
     t.scalars = window(s.scalars, group * 7, 7)
-    t.notes = window(s.notes, group * 4, 4)
-    t.bounds = window(s.bounds, group * 6 * size.blocks, 6 * size.blocks)
+    t.notes = window(s.notes, group * 6, 6)
+    t.bounds = window(s.bounds, group * size.blocks, size.blocks)
+    t.listed = window(s.listed, group * size.listed, size.listed)
+    t.middle = window(s.middle, group * size.middle, size.middle)
     t.box = window(s.box, group * 6, 6)
+    t.yarn_gain = window(s.yarn_gain, group * size.edges, size.edges)
+    t.yarn_pull = window(s.yarn_pull, group * size.edges, size.edges)
+    t.yarn_inverse = window(s.yarn_inverse, group * size.edges, size.edges)
     t.grip_x = window(s.grip_x, group * size.keys, size.keys)
     t.grip_y = window(s.grip_y, group * size.keys, size.keys)
     t.grip_z = window(s.grip_z, group * size.keys, size.keys)
@@ -168,6 +174,9 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
     t.vertex_triangle = window(s.vertex_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
     t.edge_edge = window(s.edge_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
+    t.touch_triangle = window(s.touch_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
+    t.touch_edge = window(s.touch_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
+    t.touch_count = window(s.touch_count, group * 2, 2)
     t.pair_count = window(s.pair_count, group * 2, 2)
     t.moved = window(s.moved, group * size.moved, size.moved)
     t.near = window(s.near, group * size.near, size.near)

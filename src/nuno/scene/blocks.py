@@ -1,0 +1,95 @@
+"""A cloth's elements grouped into blocks of neighbouring vertices: what self-contact looks through.
+
+Blocks come from halving the rest shape again and again, so that blocks with neighbouring numbers are neighbours too,
+and groups of consecutive blocks can be passed over together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+BLOCK_VERTICES = 4
+"""Vertices of a block, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Vertices, triangles and edges sorted by block; each belongs to one block.
+
+    Attributes:
+        vertex: (n,) int, vertex indices sorted by block.
+        vertex_start: (count + 1,) int, where each block's vertices start.
+        face: (m, 3) int, triangles sorted by block.
+        face_start: (count + 1,) int.
+        edge: (e, 2) int, edges sorted by block.
+        edge_start: (count + 1,) int.
+        corner: (k,) int, all vertices that a block's own elements have, sorted by block.
+        corner_start: (count + 1,) int.
+        crease: (c, 4) int, further pairs of edges that collide, with each other only.
+    """
+
+    vertex: np.ndarray
+    vertex_start: np.ndarray
+    face: np.ndarray
+    face_start: np.ndarray
+    edge: np.ndarray
+    edge_start: np.ndarray
+    corner: np.ndarray
+    corner_start: np.ndarray
+    crease: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return len(self.vertex_start) - 1
+
+
+def make_blocks(
+    rest: np.ndarray, faces: np.ndarray, edges: np.ndarray, crease: np.ndarray, size: int = BLOCK_VERTICES
+) -> Blocks:
+    """Halve the rest shape again and again along its axes until at most ``size`` vertices are left in a block.
+
+    Args:
+        rest: (n, 3) float, rest shape [m].
+        faces: (m, 3) int, triangles.
+        edges: (e, 2) int, the edges that collide.
+        crease: (c, 4) int, further pairs of edges that collide, with each other only.
+        size: Vertices of a block, at most.
+    """
+    count = len(rest)
+    levels = max(0, int(np.ceil(np.log2(max(1.0, count / size)))))
+    group = np.zeros(count, dtype=np.int64)
+    extent = np.ptp(rest, axis=0)
+    axes = np.argsort(-extent)[:2]
+    span = extent[axes].astype(float)
+    for _ in range(levels):
+        k = int(np.argmax(span))
+        order = np.lexsort((rest[:, axes[k]], group))
+        start = np.searchsorted(group[order], np.arange(group.max() + 2))
+        rank = np.empty(count, dtype=np.int64)
+        rank[order] = np.arange(count) - start[group[order]]
+        half = (np.diff(start) + 1) // 2
+        group = 2 * group + (rank >= half[group])
+        group = np.unique(group, return_inverse=True)[1]
+        span[k] /= 2
+    order = np.argsort(group, kind="stable")
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    blocks = int(group.max()) + 1
+
+    def sort(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        owner = group[elements[np.arange(len(elements)), np.argmin(place[elements], axis=1)]]
+        by_owner = np.argsort(owner, kind="stable")
+        return elements[by_owner], np.searchsorted(owner[by_owner], np.arange(blocks + 1)), owner[by_owner]
+
+    face, face_start, face_owner = sort(faces)
+    edge, edge_start, edge_owner = sort(edges)
+    own = np.concatenate([group * count + np.arange(count), (face_owner[:, None] * count + face).ravel()])
+    own = np.unique(np.concatenate([own, (edge_owner[:, None] * count + edge).ravel()]))
+    starts = np.arange(blocks + 1)
+    return Blocks(
+        order, np.searchsorted(group[order], starts), face, face_start, edge, edge_start,
+        own % count, np.searchsorted(own // count, starts), crease,
+    )  # fmt: skip

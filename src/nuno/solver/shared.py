@@ -1,0 +1,62 @@
+"""The CUDA plan for worlds that fit a block: a block per world, positions in shared memory where they fit."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from nuno.solver.frame import advance
+from nuno.solver.lanes import barrier
+from nuno.solver.state import Settings, Shapes, Sizes, StateFloat, Topology, view
+
+SHARED_FLOATS = 12032
+"""Floats in a static buffer: 48 KB less the 1 KB that Warp takes for itself."""
+SHARED_PARTICLES = SHARED_FLOATS // 4
+"""Particles whose coordinates and inverse masses fit."""
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__shared__ float buffer[12032];
+return (wp::uint64)buffer;
+#else
+return 0;
+#endif
+""")
+def shared_buffer() -> wp.uint64:
+    """Address of the block's own memory."""
+    ...
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1))
+def run_blocks(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int):
+    """Every world by a block of ``threads`` threads."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    advance(t, topo, run, shapes, substeps, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1))
+def run_blocks_shared(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int):  # noqa: E501
+    """The same with x, y, z and w in shared memory for as long as the launch takes."""
+    tid = wp.tid()
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    buffer = shared_buffer()
+    step = wp.uint64(n) * wp.uint64(4)
+    t.x = wp.array(ptr=buffer, shape=(n,), dtype=float)
+    t.y = wp.array(ptr=buffer + step, shape=(n,), dtype=float)
+    t.z = wp.array(ptr=buffer + step * wp.uint64(2), shape=(n,), dtype=float)
+    t.w = wp.array(ptr=buffer + step * wp.uint64(3), shape=(n,), dtype=float)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+    barrier(threads)
+    advance(t, topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]

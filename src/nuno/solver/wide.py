@@ -1,0 +1,204 @@
+"""The plan for one world alone on the CPU: sixteen elements of a colour, or sixteen particles, at a time.
+
+The tables repeat the cloth's elements by groups of sixteen. A group that would be short repeats its last element,
+which then is written several times with the same values. The phases are those of `nuno.solver.frame`, in the same
+order, so that a world gives the same bits here as in the lanes of a batch.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from nuno.contact.pair_lists import find_contacts
+from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.shapes import touch_shapes
+from nuno.solver.frame import (
+    bend_hinges,
+    bend_lines,
+    near_shapes,
+    shear_cells,
+    strain_triangles,
+)
+from nuno.solver.grips import hold_vertices, pull_points
+from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.lanes import LANES, fill, lane, lane_int, largest
+from nuno.solver.membrane import stretch_yarn
+from nuno.solver.state import NOTES, SCALARS, SPEED, Settings, Shapes, Sizes, StateFloat, StateLanes, Topology, view
+
+
+@wp.struct
+class Wide:
+    """The elements by groups of sixteen, under the names that `Topology` has for them; room for the yarns."""
+
+    edge: wp.array(dtype=lane_int)
+    edge_rest: wp.array(dtype=lane)
+    edge_scale: wp.array(dtype=lane)
+    edge_soft: wp.array(dtype=lane_int)
+    yarn: wp.array(dtype=int)
+    yarn_kind: wp.array(dtype=int)
+    cell: wp.array(dtype=lane_int)
+    cell_scale: wp.array(dtype=lane)
+    cell_soft: wp.array(dtype=lane_int)
+    cell_colour: wp.array(dtype=int)
+    triangle: wp.array(dtype=lane_int)
+    triangle_u: wp.array(dtype=lane)
+    triangle_v: wp.array(dtype=lane)
+    triangle_area: wp.array(dtype=lane)
+    triangle_soft: wp.array(dtype=lane_int)
+    triangle_colour: wp.array(dtype=int)
+    line: wp.array(dtype=lane_int)
+    line_scale: wp.array(dtype=lane)
+    line_soft: wp.array(dtype=lane_int)
+    line_colour: wp.array(dtype=int)
+    hinge: wp.array(dtype=lane_int)
+    hinge_weight: wp.array(dtype=lane)
+    hinge_rest: wp.array(dtype=lane)
+    hinge_scale: wp.array(dtype=lane)
+    hinge_soft: wp.array(dtype=lane_int)
+    hinge_colour: wp.array(dtype=int)
+    yarn_gain: wp.array(dtype=lane)
+    yarn_pull: wp.array(dtype=lane)
+    yarn_inverse: wp.array(dtype=lane)
+    scalars: wp.array(dtype=lane)
+    notes: wp.array(dtype=lane)
+
+
+@wp.func
+def as_lanes(a: wp.array(dtype=float), count: int):
+    """``a`` as ``count`` vectors of sixteen; its memory must reach that far."""
+    return wp.array(ptr=a.ptr, shape=(count,), dtype=lane)
+
+
+@wp.func
+def by_sixteen(t: StateFloat, wide: Wide, m: int):
+    """The particles of one world as m vectors of sixteen, for the loops over particles."""
+    p = StateLanes()
+    p.group = t.group
+    p.worlds = t.worlds
+    p.x = as_lanes(t.x, m)
+    p.y = as_lanes(t.y, m)
+    p.z = as_lanes(t.z, m)
+    p.px = as_lanes(t.px, m)
+    p.py = as_lanes(t.py, m)
+    p.pz = as_lanes(t.pz, m)
+    p.vx = as_lanes(t.vx, m)
+    p.vy = as_lanes(t.vy, m)
+    p.vz = as_lanes(t.vz, m)
+    p.w = as_lanes(t.w, m)
+    p.fx = as_lanes(t.fx, m)
+    p.fy = as_lanes(t.fy, m)
+    p.fz = as_lanes(t.fz, m)
+    p.scalars = wide.scalars
+    p.notes = wide.notes
+    p.near = t.near
+    for k in range(SCALARS):
+        p.scalars[k] = fill(p.x[0], t.scalars[k])
+    return p
+
+
+@wp.func
+def elastic_wide(t: StateFloat, wide: Wide, run: Settings):
+    """One pass over the elastic constraints: `nuno.solver.frame.elastic` by sixteen."""
+    for c in range(wide.hinge_colour.shape[0] - 1):
+        bend_hinges(t, wide, run, wide.hinge_colour[c], wide.hinge_colour[c + 1], 0, 1)
+    for c in range(wide.line_colour.shape[0] - 1):
+        bend_lines(t, wide, run, wide.line_colour[c], wide.line_colour[c + 1], 0, 1)
+    for c in range(wide.cell_colour.shape[0] - 1):
+        shear_cells(t, wide, run, wide.cell_colour[c], wide.cell_colour[c + 1], 0, 1)
+    for c in range(wide.triangle_colour.shape[0] - 1):
+        strain_triangles(t, wide, run, wide.triangle_colour[c], wide.triangle_colour[c + 1], 0, 1)
+    rate = 1.0 / (run.dt * run.dt)
+    for k in range(wide.yarn_kind[wide.yarn_kind.shape[0] - 1]):
+        start = wide.yarn[k]
+        stretch_yarn(t, wide, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, wide.yarn[k + 1], rate)
+
+
+@wp.kernel(enable_backward=False)
+def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settings, shapes: Shapes, substeps: int):
+    """One world by one thread: `nuno.solver.frame.advance` with its loops by sixteen."""
+    n = topo.particles
+    m = (n + LANES - 1) / LANES
+    t = view(s, wp.tid(), n, size)
+    p = by_sixteen(t, wide, m)
+    for k in range(substeps):
+        if k % run.frame == 0:
+            near_shapes(t, n, run, shapes, 0, 1)
+        tick(t, run, 0)
+        if run.touching != 0:
+            find_contacts(t, topo, run, 0, 1)
+        predict(p, m, run, 0, 1)
+        hold_vertices(t, run, 0, 1)
+        elastic_wide(t, wide, run)
+        pull_points(t, run, 0, 1)
+        if run.touching != 0:
+            touch_edge_edge(t, n, run, 0, 1)
+            touch_vertex_triangle(t, n, run, 0, 1)
+            take_moves(t, n, 0, 1)
+        touch_shapes(p, m, shapes, run.dt, 0, 1)
+        reset_speed(p, 0)
+        read_velocities(p, m, run, 0, 1)
+        t.notes[SPEED] = largest(p.notes[SPEED])
+
+
+def widen_topology(topology: Any, arrays: Any) -> Any:
+    """Return `Wide` for one world on the CPU.
+
+    Args:
+        topology: `ClothTopology`, for where the colours start.
+        arrays: The solver's `Topology`, whose compliance indices are set.
+    """
+    wide = Wide()
+
+    def groups(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of sixteen elements, colour by colour, and where each colour starts among the rows."""
+        rows, starts = [], [0]
+        for first, last in pairwise(offsets.tolist()):
+            count = -(-(last - first) // LANES)
+            rows.append(np.minimum(first + np.arange(count * LANES), last - 1).reshape(count, LANES))
+            starts.append(starts[-1] + count)
+        return np.concatenate(rows or [np.zeros((0, LANES), int)]).astype(int), np.array(starts, dtype=np.int32)
+
+    def gathered(values: np.ndarray, rows: np.ndarray) -> wp.array:
+        """The columns of an array by rows of sixteen: (rows * columns) vectors."""
+        whole = np.issubdtype(values.dtype, np.integer)
+        table = values.reshape(len(values), math.prod(values.shape[1:]))[rows].transpose(0, 2, 1).reshape(-1, LANES)
+        table = np.ascontiguousarray(table, dtype=np.int32 if whole else np.float32)
+        return wp.array(table, dtype=lane_int if whole else lane, device="cpu")
+
+    kinds = {"cell": ("scale", "soft"), "line": ("scale", "soft"), "hinge": ("weight", "rest", "scale", "soft")}
+    kinds["triangle"] = ("u", "v", "area", "soft")
+    for name, columns in kinds.items():
+        rows, starts = groups(getattr(topology, name + "s").offsets)
+        setattr(wide, name + "_colour", wp.array(starts, dtype=int, device="cpu"))
+        setattr(wide, name, gathered(getattr(arrays, name).numpy(), rows))
+        for column in columns:
+            setattr(wide, f"{name}_{column}", gathered(getattr(arrays, f"{name}_{column}").numpy(), rows))
+    _widen_yarns(wide, arrays, gathered)
+    wide.scalars = wp.zeros(SCALARS, dtype=lane, device="cpu")
+    wide.notes = wp.zeros(NOTES, dtype=lane, device="cpu")
+    return wide
+
+
+def _widen_yarns(wide: Any, arrays: Any, gathered: Any) -> None:
+    """Sixteen yarns of one direction and length side by side."""
+    starts, kinds = arrays.yarn.numpy(), arrays.yarn_kind.numpy()
+    rows, firsts, groups = [], [0], [0]
+    for low, high in pairwise(kinds.tolist()):
+        for first in range(low, high, LANES):
+            yarns = np.minimum(first + np.arange(LANES), high - 1)
+            length = starts[yarns[0] + 1] - starts[yarns[0]]
+            rows.append(starts[yarns][None] + np.arange(length)[:, None])
+            firsts.append(firsts[-1] + length)
+        groups.append(len(rows))
+    table = np.concatenate(rows or [np.zeros((0, LANES), int)]).astype(int)
+    wide.yarn = wp.array(np.array(firsts, np.int32), dtype=int, device="cpu")
+    wide.yarn_kind = wp.array(np.array(groups, np.int32), dtype=int, device="cpu")
+    for name in ("edge", "edge_rest", "edge_scale", "edge_soft"):
+        setattr(wide, name, gathered(getattr(arrays, name).numpy(), table))
+    for name in ("yarn_gain", "yarn_pull", "yarn_inverse"):
+        setattr(wide, name, wp.zeros(max(1, len(table)), dtype=lane, device="cpu"))

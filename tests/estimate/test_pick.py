@@ -1,0 +1,203 @@
+"""Estimating a pick from masks: a cloth picked by the engine itself, on another mesh than the estimator's."""
+
+import json
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno import ImageError, InvalidInputError
+from nuno.estimate.hypotheses import SPREAD, Discretisation
+
+TOP = 0.72  # [m] height of the table top
+REST_HEIGHT = 0.0025  # [m]
+SIZE = np.array((0.5, 0.35))  # [m]
+CENTRE, YAW = np.array((0.05, 0.02, TOP + REST_HEIGHT)), 0.35  # [m], [rad]
+UV = (0.8, 0.2)  # the picked point on the sheet: a grid point of 6 x 6
+HALF = (0.45, 0.6)  # [m] of the table top
+FINE = Discretisation(15, 12, SPREAD[::2])  # tells neighbouring points of a 6 x 6 grid apart
+QUICK = Discretisation(10, 10, SPREAD[::3])  # and this one does not
+
+
+def make_camera():
+    """A small camera 1 m before the table and 0.5 m above it, looking 25 degrees down."""
+    down, pose = np.deg2rad(25.0), np.eye(4)
+    pose[:3, :3] = [[0, -np.sin(down), np.cos(down)], [-1, 0, 0], [0, -np.cos(down), -np.sin(down)]]
+    pose[:3, 3] = (-0.95, 0.0, TOP + 0.5)
+    return nuno.Camera(320, 240, 250.0, 250.0, 159.5, 119.5, pose)
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """The masks before and after, the hand, and what the label rule says of the picked point."""
+    camera = make_camera()
+    world = nuno.World(device="cpu", substeps=18)
+    world.add(nuno.box((2 * HALF[0], 2 * HALF[1], 0.04), name="table", position=(0, 0, TOP - 0.02)))
+    cloth = world.add(nuno.sheet(SIZE, cells=(15, 10), position=CENTRE)).rotate(YAW, "z", wrt="world")
+    corners = cloth.vertices[[0, 15, 175, 160]]  # u, v = (0, 0), (1, 0), (1, 1), (0, 1)
+    before = world.masks(camera, cloth).numpy()
+    world.attach(cloth, nuno.Cloth(bending_rigidity=3e-4, area_density=0.3, thickness=2 * REST_HEIGHT))
+    point = cloth.at(*UV)
+    start = point.positions(cloth.vertices, cloth.faces)[0]
+    hand = start + np.array((0.04, -0.03, 0.4))
+    world.grip(cloth, point, to=nuno.Path([0.0, 1.5], [start, hand], interpolation="minimum_jerk"))
+    world.run(3.5)
+    after = world.masks(camera, cloth).numpy()
+    # C00 is the corner nearest to pixel (0, 0); the sheet's x is the longer side, so u runs from or to C00
+    first = int(np.linalg.norm(camera.project(corners), axis=1).argmin())
+    from_end = ((0, 1, 1, 0)[first], (0, 0, 1, 1)[first])
+    u, v = (1 - a if end else a for a, end in zip(UV, from_end, strict=True))
+    true = (round(u * 5), round(v * 5))
+    return {"before_mask": before, "after_mask": after, "hand": hand}, true, (u, v), corners[first]
+
+
+def options(seen, **changes):
+    """Arguments of estimate_pick for what was seen, with changes."""
+    given = dict(camera=make_camera(), table_height=TOP, table_half_extents=HALF, table_centre=(0, 0))
+    return given | seen[0] | dict(discretisations=[QUICK], device="cpu", progress=False) | changes
+
+
+@pytest.fixture(scope="module")
+def result(seen):
+    """The estimate with the 6 x 6 grid."""
+    return nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE]))
+
+
+def test_the_picked_point_is_found(result, seen):
+    """The best of 36 is the point that was picked, and the rest are ranked behind it."""
+    assert result.best == seen[1]
+    assert result.labels.shape == (36, 2) and sorted(result.order) == list(range(36))
+    assert result.ranking[0][:2] == result.best
+    assert (np.diff(result.scores[result.order]) <= 0).all() and 0 < result.confidence <= 1
+    # eq. (1) counts the pixels that agree, of which most are empty: all are high, the best among the highest
+    assert result.eq1[result.order[0]] >= np.sort(result.eq1)[-3] > 0.95
+
+
+def test_the_cloth_is_measured(result, seen):
+    """Corners in the label rule's order, within half a pixel's 2 to 3 mm; the long side first."""
+    np.testing.assert_allclose(result.rectangle.corners[0], seen[3], atol=4e-3)
+    np.testing.assert_allclose((result.rectangle.long_m, result.rectangle.short_m), SIZE, atol=5e-3)
+
+
+def test_stages_are_timed_and_futures_kept(result):
+    """Seconds by stage add up; the futures are a batch of guesses x candidates."""
+    stages = result.seconds
+    assert set(stages) == {"read", "see", "imagine", "compare", "total"}
+    assert sum(stages.values()) - stages["total"] == pytest.approx(stages["total"], rel=0.1)  # the rest
+    assert result.futures.world.world_count == 36 * len(FINE.spread)
+    assert result.masks.shape == (36, 120, 160) and result.real.mask.shape == (120, 160)
+
+
+@pytest.fixture
+def small(seen):
+    """The estimate with a 3 x 2 grid, anew for every test."""
+    return nuno.estimate_pick(None, None, **options(seen, candidates=(3, 2)))
+
+
+def test_the_same_input_gives_the_same_answer(small, seen):
+    """Every score, bit for bit; also where the rectangle is given instead of the mask that it came from."""
+    again = nuno.estimate_pick(None, None, **options(seen, candidates=(3, 2)))
+    given = options(seen, candidates=(3, 2), rectangle=small.rectangle, before_mask=None)
+    measured = nuno.estimate_pick(None, None, **given)
+    assert measured.rectangle is small.rectangle and measured.mask_before is None
+    for other in (again, measured):
+        np.testing.assert_array_equal(other.scores, small.scores)
+        np.testing.assert_array_equal(other.eq1, small.eq1)
+
+
+def test_adopt_gives_the_best_future(small, seen):
+    """The single world becomes what the best future is, and can be run on."""
+    result = small
+    futures = result.futures.world
+    expected = futures.find("cloth").vertices[result.best_index]
+    world = result.adopt()
+    cloth = world.find("cloth")
+    np.testing.assert_array_equal(cloth.vertices, expected)
+    assert world.world_count == 1 and cloth.is_dynamic and world.time == futures.time
+    assert result.best_index % 6 == result.order[0]
+    highest = cloth.vertices[:, 2].argmax()
+    np.testing.assert_allclose(cloth.vertices[highest], seen[0]["hand"], atol=5e-3)  # it hangs in the hand
+    world.run(0.1)
+    assert np.isfinite(cloth.vertices).all()
+
+
+def test_another_grid(seen):
+    """3 x 4 candidates: the nearest grid point to the picked one is among the best two."""
+    result = nuno.estimate_pick(None, None, **options(seen, candidates=(3, 4)))
+    assert result.grid == (3, 4) and len(result.ranking) == 12
+    nearest = tuple(round(a * (n - 1)) for a, n in zip(seen[2], (3, 4), strict=True))
+    assert nearest in [entry[:2] for entry in result.ranking[:2]]
+
+
+def test_points_instead_of_a_grid(result, seen):
+    """Fractions of the sides, on no vertex of the mesh: the nearest to the picked one wins."""
+    opposite = np.clip(1 - np.array(seen[2]), 0.07, 0.93)
+    points = np.array([(0.03, 0.5), (0.5, 0.97), seen[2], (0.33, 0.41), opposite])
+    found = nuno.estimate_pick(None, None, **options(seen, candidates=points, rectangle=result.rectangle))
+    assert found.best == pytest.approx(seen[2])
+    np.testing.assert_array_equal(found.labels, points)
+    assert all(isinstance(value, float) for value in found.best)
+
+
+@pytest.mark.parametrize(("score", "name"), [("iou", "iou"), ("eq1", "eq1")])
+def test_other_scores(score, name, result, seen):
+    """They rank by another measure; the paper's is what eq1 reports."""
+    given = options(seen, score=score, rectangle=result.rectangle, candidates=(3, 2))
+    found = nuno.estimate_pick(None, None, **given)
+    assert found.score_name == name and (found.scores <= 1).all() and (found.scores >= 0).all()
+    if score == "eq1":
+        np.testing.assert_array_equal(found.scores, found.eq1)
+
+
+def test_an_endless_table(result, seen):
+    """Without extents the table is a plane at its height."""
+    endless = dict(table_half_extents=None, table_centre=None)
+    given = options(seen, candidates=(2, 2), rectangle=result.rectangle, **endless)
+    found = nuno.estimate_pick(None, None, **given)
+    assert [body.name for body in found.world.bodies] == ["table", "cloth"]
+
+
+def test_save_and_figure(result, tmp_path):
+    """result.json holds to_dict; the picture has an axes for both images and every candidate."""
+    result.save(tmp_path / "a" / "b")
+    folder = tmp_path / "a" / "b"
+    assert json.loads((folder / "result.json").read_text()) == json.loads(json.dumps(result.to_dict()))
+    assert (folder / "result.png").stat().st_size > 10_000
+    assert len(result.figure().axes) == 2 + 36
+    result.save(tmp_path / "c", picture=False)
+    assert [path.name for path in (tmp_path / "c").iterdir()] == ["result.json"]
+
+
+BAD = {
+    "no image": (dict(before_mask=None), InvalidInputError, "image before"),
+    "no image after": (dict(after_mask=None), InvalidInputError, "both images|image before"),
+    "mask of another size": (dict(after_mask=np.ones((10, 10), bool)), ImageError, "240, 320"),
+    "empty mask after": (dict(after_mask=np.zeros((240, 320), bool)), ImageError, "empty"),
+    "empty mask before": (dict(before_mask=np.zeros((240, 320), bool)), nuno.ClothNotFoundError, "empty"),
+    "a hand of two": (dict(hand=(0, 1)), InvalidInputError, "hand"),
+    "a hand of nan": (dict(hand=(0, 1, np.nan)), InvalidInputError, "hand"),
+    "a hand behind the camera": (dict(hand=(-3, 0, 1)), InvalidInputError, "behind"),
+    "a hand out of view": (dict(hand=(0, 9, 1)), InvalidInputError, "outside"),
+    "one candidate": (dict(candidates=(1, 6)), InvalidInputError, "2 x 2"),
+    "a point off the cloth": (dict(candidates=[(0.5, 1.2)]), InvalidInputError, "fractions"),
+    "no points": (dict(candidates=np.zeros((0, 2))), InvalidInputError, "candidates"),
+    "points of three": (dict(candidates=[(0, 0, 0)]), InvalidInputError, "candidates"),
+    "an unknown score": (dict(score="best"), InvalidInputError, "chamfer"),
+    "no mesh": (dict(discretisations=[]), InvalidInputError, "discretisation"),
+    "no such device": (dict(device="gpu"), InvalidInputError, "device"),
+    "a camera without entries": (dict(camera={}), InvalidInputError, "width"),
+    "a table of nan": (dict(table_height=np.nan), InvalidInputError, "table_height"),
+    "a table of no thickness": (dict(table_thickness=0.0), InvalidInputError, "table_thickness"),
+    "a rest height below the table": (dict(rest_height=-0.01), InvalidInputError, "rest_height"),
+    "a lift of no time": (dict(lift_seconds=0.0), InvalidInputError, "lift_seconds"),
+    "no image file": (dict(before="nothing.png", before_mask=None), ImageError, "nothing.png"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_inputs(name, seen):
+    """Each raises its named error, which says what is valid."""
+    changes, error, words = BAD[name]
+    given = options(seen, **changes)
+    with pytest.raises(error, match=words):
+        nuno.estimate_pick(given.pop("before", None), None, **given)

@@ -1,0 +1,242 @@
+"""The launch plans: whichever runs a cloth, the same phases in the same order give the same bits."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+import nuno
+from nuno.scene.cloth import ClothTopology
+from nuno.scene.colliders import Colliders
+from nuno.solver.bending import bend_hinge, bend_line
+from nuno.solver.cloth_solver import ClothSolver, default_substeps
+from nuno.solver.lanes import LANES, lane, lane_int
+from nuno.solver.membrane import shear_cell, stretch_triangle
+from nuno.solver.state import StateFloat, StateLanes
+
+CELLS = (13, 9)  # no multiple of a vector's length, so that every group has an end
+
+
+def topology(kind):
+    """A sheet, or the same rectangle as a triangle mesh."""
+    sheet = ClothTopology.sheet(CELLS, (0.39, 0.27))
+    return sheet if kind == "sheet" else ClothTopology.mesh(sheet.rest[:, :2], sheet.faces)
+
+
+class Grip:
+    """Two corners that go round, with a spring at one more point."""
+
+    def __init__(self, positions, rigid=True):
+        worlds = len(positions)
+        self.vertices = np.tile([0, CELLS[0]] if rigid else [60], (worlds, 1))
+        start = positions[np.arange(worlds)[:, None], self.vertices]
+        self.corners = self.barycentric = None
+        self.times = [0.0, 0.2, 0.4]
+        self.positions = start[:, :, None] + [[0, 0, 0], [0.05, 0.05, 0.1], [0.1, 0.1, -0.02]]
+        self.interpolation, self.compliance = "minimum_jerk", 0.0 if rigid else 1e-3
+
+
+def solver(kind, plan, worlds=1, *, self_contact=False, device="cpu", damping=0.001):
+    """A cloth over a ball and a table, held at two corners and pushed, its rest shape wrinkled."""
+    cloth = topology(kind)
+    wrinkles = np.random.default_rng(1).normal(scale=0.003, size=cloth.rest.shape)
+    positions = np.repeat((cloth.rest + wrinkles + [0, 0, 0.1])[None], worlds, axis=0)
+    made = ClothSolver(
+        cloth, nuno.Cloth(damping=damping, thickness=0.004), positions, np.zeros_like(positions), device=device,
+        substeps=12, self_contact=self_contact, plan=plan,
+    )  # fmt: skip
+    shapes = [nuno.box((1, 1, 0.02), position=(0, 0, -0.01)), nuno.sphere(0.04, position=(0.05, 0, 0.03))]
+    made.set_colliders(Colliders.from_bodies(shapes, worlds, device))
+    made.set_grips([Grip(positions), Grip(positions, rigid=False)])
+    made.set_forces(np.full(positions.shape, 1e-4))
+    return made
+
+
+def outcome(made, seconds=0.5):
+    """Positions and velocities of the first world."""
+    made.run(0.0, seconds)
+    return made.local_positions()[0], made.velocities()[0]
+
+
+@pytest.mark.parametrize("self_contact", [False, True])
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_scalar_vector_and_lanes_give_the_same_bits(kind, self_contact):
+    """Promise: one source, three layouts, no bit of difference."""
+    expected = outcome(solver(kind, "fused", self_contact=self_contact))
+    for plan, worlds in (("vector", 1), ("fused", 3)):
+        found = outcome(solver(kind, plan, worlds, self_contact=self_contact))
+        np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_the_large_plan_gives_the_bits_of_the_fused_one(kind, worlds):
+    """Promise: without self-contact, whose sums are in fixed point, the colours' order is all that counts."""
+    expected = outcome(solver(kind, "fused", worlds))
+    np.testing.assert_array_equal(outcome(solver(kind, "large", worlds)), expected)
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_the_large_plan_lists_the_pairs_of_the_fused_one(worlds):
+    """Invariant: the listing by many threads finds as many pairs; none touches yet, so that all else is equal."""
+    made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "large")]
+    for each in made:
+        each.run(0.0, 1.0 / 60.0 / 12.0)
+    assert made[0].pair_counts.max() > 0
+    np.testing.assert_array_equal(made[0].pair_counts, made[1].pair_counts)
+
+
+def test_the_large_plan_keeps_layers_apart():
+    """A sheet folded onto itself rests as two layers, at most 10 % of the thickness nearer than in the fused plan.
+
+    Contacts that share a particle are averaged instead of taken one after the other, so the bits differ.
+    """
+    gaps = []
+    for plan in ("fused", "large"):
+        cloth = ClothTopology.sheet((12, 6), (0.24, 0.12))
+        x = cloth.rest.copy()
+        over = x[:, 0] > 0
+        x[:, 2] = np.where(over, 0.01, 0.002)
+        x[over, 0] *= -1
+        made = ClothSolver(
+            cloth, nuno.Cloth(thickness=0.004, air_drag=5.0), x[None], np.zeros((1, *x.shape)), substeps=20, plan=plan
+        )
+        made.set_colliders(Colliders.from_bodies([nuno.plane()], 1, "cpu"))
+        made.run(0.0, 0.5)
+        z = made.positions()[0, :, 2]
+        gaps.append(z[over & (x[:, 0] < -0.03)].min() - z[~over].min())
+    assert gaps[1] > gaps[0] - 0.0004
+
+
+def test_a_run_in_pieces_is_the_run_in_one():
+    """Invariant: whole frames one at a time, under settings made anew, change no bit in any plan."""
+    for plan in ("vector", "large"):
+        whole, pieces = solver("sheet", plan), solver("sheet", plan)
+        whole.run(0.0, 0.1)
+        for k in range(6):
+            pieces.run(k / 60.0, 1.0 / 60.0)
+        # the clock starts anew in each piece and rounds otherwise: a grip is off by an ulp of a second times its speed
+        np.testing.assert_allclose(pieces.local_positions(), whole.local_positions(), atol=2e-6)
+
+
+def test_more_rigid_and_finer_cloth_takes_more_substeps():
+    """The rule of ``default_substeps``: dt in proportion to h in plane, to h^2 in bending."""
+    coarse, fine = (ClothTopology.sheet((n, n), (1.0, 1.0)) for n in (16, 32))
+    frame = 1.0 / 60.0
+    assert default_substeps(fine, 9.81, frame) == pytest.approx(2 * default_substeps(coarse, 9.81, frame), abs=1)
+    stiff = [default_substeps(t, 9.81, frame, 0.2, b) for t, b in ((coarse, 5.0), (fine, 5.0 / 16))]
+    assert stiff[1] == pytest.approx(stiff[0], abs=1) and stiff[0] > default_substeps(coarse, 9.81, frame)
+
+
+# One constraint at a time: as floats, as sixteen worlds, and as sixteen elements of one world.
+
+SIZE = 64
+
+
+@wp.kernel(enable_backward=False)
+def project_floats(t: StateFloat, which: int, tables: StateFloat):
+    """Sixteen elements one after the other."""
+    for k in range(LANES):
+        a, b, c, d = 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3
+        alpha = tables.x[k]
+        if which == 0:
+            bend_line(t, a, b, c, alpha, 1, tables.y[k])
+        elif which == 1:
+            bend_hinge(t, a, b, c, d, 1.0, -1.0, -1.0, 1.0, 0.1, alpha, 1, tables.y[k])
+        elif which == 2:
+            shear_cell(t, a, b, c, d, 0.7, alpha)
+        else:
+            stretch_triangle(t, a, b, c, -1.3, 0.6, 0.7, alpha)
+
+
+@wp.kernel(enable_backward=False)
+def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int), alphas: wp.array(dtype=lane)):
+    """The same sixteen at once."""
+    a, b, c, d = index[0], index[1], index[2], index[3]
+    alpha = alphas[0]
+    gamma = alphas[1]
+    one = lane(1.0)
+    if which == 0:
+        bend_line(t, a, b, c, alpha, 1, gamma)
+    elif which == 1:
+        bend_hinge(t, a, b, c, d, one, -one, -one, one, lane(0.1), alpha, 1, gamma)
+    elif which == 2:
+        shear_cell(t, a, b, c, d, lane(0.7), alpha)
+    else:
+        stretch_triangle(t, a, b, c, lane(-1.3), lane(0.6), lane(0.7), alpha)
+
+
+@wp.kernel(enable_backward=False)
+def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
+    """One element of sixteen worlds."""
+    alpha = alphas[0]
+    gamma = alphas[1]
+    if which == 0:
+        bend_line(t, 0, 1, 2, alpha, 1, gamma)
+    elif which == 1:
+        bend_hinge(t, 0, 1, 2, 3, 1.0, -1.0, -1.0, 1.0, 0.1, alpha, 1, gamma)
+    elif which == 2:
+        shear_cell(t, 0, 1, 2, 3, 0.7, alpha)
+    else:
+        stretch_triangle(t, 0, 1, 2, -1.3, 0.6, 0.7, alpha)
+
+
+def filled(kind, values, dtype):
+    """A state whose positions and inverse masses are set."""
+    t = kind()
+    for name, column in values.items():
+        setattr(t, name, wp.array(column, dtype=dtype, device="cpu"))
+    return t
+
+
+@pytest.mark.parametrize("which", range(4), ids=["line", "hinge", "cell", "triangle"])
+def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
+    """Promise: float, sixteen worlds and sixteen elements are one function."""
+    random = np.random.default_rng(which)
+    values = {name: random.normal(size=SIZE).astype(np.float32) for name in ("x", "y", "z", "px", "py", "pz")}
+    values["w"] = random.uniform(0.5, 2.0, SIZE).astype(np.float32)
+    alphas = random.uniform(0.1, 1.0, (2, LANES)).astype(np.float32)
+    floats, elements = (filled(StateFloat, values, float) for _ in range(2))
+    tables = filled(StateFloat, {"x": alphas[0], "y": alphas[1]}, float)
+    worlds = filled(StateLanes, {n: v.reshape(LANES, 4).T.copy() for n, v in values.items()}, lane)
+    wide = wp.array(alphas, dtype=lane, device="cpu")
+    index = wp.array(np.arange(SIZE, dtype=np.int32).reshape(LANES, 4).T.copy(), dtype=lane_int, device="cpu")
+    wp.launch(project_floats, dim=1, inputs=[floats, which, tables], device="cpu")
+    wp.launch(project_elements, dim=1, inputs=[elements, which, index, wide], device="cpu")
+    wp.launch(project_worlds, dim=1, inputs=[worlds, which, wide], device="cpu")
+    for name in ("x", "y", "z"):
+        expected = getattr(floats, name).numpy()
+        assert (expected != values[name]).sum() > LANES  # it did something
+        np.testing.assert_array_equal(getattr(elements, name).numpy(), expected)
+        np.testing.assert_array_equal(getattr(worlds, name).numpy().T.ravel(), expected)
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("plan", ["fused", "large"])
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
+    """The same phases; fused multiply-adds round otherwise, and a swinging cloth makes 1e-7 m grow to millimetres."""
+    expected, _ = outcome(solver(kind, "fused"), 0.2)
+    found, _ = outcome(solver(kind, plan, device="cuda:0"), 0.2)
+    np.testing.assert_allclose(found, expected, atol=2e-3)
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("plan", ["fused", "large"])
+def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
+    """Promise: same input, same bits, in any place of a batch, self-contact included."""
+    alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
+    for worlds in (1, 5):
+        again = solver("sheet", plan, worlds, device="cuda:0", self_contact=True)
+        np.testing.assert_array_equal(outcome(again), alone)
+        np.testing.assert_array_equal(again.local_positions()[-1], alone[0])
+
+
+@pytest.mark.cuda
+def test_shared_memory_changes_no_bit():
+    """Promise: where the positions lie while they are worked on is of no account."""
+    found = []
+    for shared in (False, True):
+        made = solver("sheet", "fused", device="cuda:0", self_contact=True)
+        made.shared_memory = shared
+        found.append(outcome(made))
+    np.testing.assert_array_equal(found[0], found[1])
