@@ -48,14 +48,17 @@ class Discretisation:
     best: int | None = None
 
 
-RIGIDITIES = (2.5e-5, 5e-5, 1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3)
-"""[N m] Doubling over the range of measured fabrics (1.4e-5 to 1.25e-4) and on to stiffer cloths such as canvas."""
+RIGIDITIES = (3e-5, 1e-4, 3e-4, 8e-4, 1.6e-3)
+"""[N m] From measured fabrics (1.4e-5 to 1.25e-4) on to stiffer cloths such as canvas."""
+FRICTIONS = (0.25, 0.5)
+"""How far the part on the table slides after the hand changes the silhouette as much as the rigidity does."""
 
 
 def spread(stretch_stiffness: float, shear_stiffness: float) -> tuple[Hypothesis, ...]:
-    """One hypothesis for each bending rigidity."""
+    """One hypothesis for each friction and bending rigidity."""
     return tuple(
-        Hypothesis(rigidity, stretch_stiffness=stretch_stiffness, shear_stiffness=shear_stiffness)
+        Hypothesis(rigidity, friction, stretch_stiffness=stretch_stiffness, shear_stiffness=shear_stiffness)
+        for friction in FRICTIONS
         for rigidity in RIGIDITIES
     )
 
@@ -65,7 +68,7 @@ SPREAD = spread(1000.0, 300.0)
 
 DISCRETISATIONS = (
     Discretisation(20, 14, spread(1000.0, 40.0)),
-    Discretisation(25, 30, spread(3000.0, 1200.0), best=9),
+    Discretisation(25, 20, spread(3000.0, 1200.0), best=12),
 )
 """A coarse cloth that shears easily tells for every candidate, then a finer and stiffer weave for the best of them. How
 a lifted cloth buckles depends on how it shears and on the mesh: two that differ in both had more right answers than
