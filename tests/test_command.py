@@ -72,7 +72,6 @@ def check_result(result, n, m):
     assert set(result["seconds"]) == {"read", "see", "imagine", "compare", "total"}
 
 
-@pytest.mark.slow
 def test_the_full_grid(tmp_path):
     """All 36 candidates: the answer is the point that was picked."""
     assert pick(CASE, tmp_path) == 0

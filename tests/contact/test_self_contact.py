@@ -21,12 +21,12 @@ def lifted(picks: list[int], seconds: float, margin: float | None = None, **mate
     """Return a solver in which a sheet on the floor was lifted by another vertex in each world."""
     topology = ClothTopology.sheet((CELLS, CELLS), (SIZE, SIZE))
     worlds = len(picks)
-    start = np.repeat(topology.rest[None], worlds, axis=0) + [0.0, 0.0, 0.003]
+    start = np.repeat(topology.rest[None], worlds, axis=0) + np.array((0.0, 0.0, 0.003))
     cloth = nuno.Cloth(**{"area_density": 0.2, "bending_rigidity": 5e-5, "thickness": 0.004, **material})
     solver = ClothSolver(topology, cloth, start, np.zeros_like(start), substeps=20)
     solver.set_colliders(Colliders.from_bodies([nuno.plane()], worlds, "cpu"))
     held = start[np.arange(worlds), picks]
-    path = np.stack([held, held + [0.0, 0.0, 0.35]], axis=1)[:, None]
+    path = np.stack([held, held + np.array((0.0, 0.0, 0.35))], axis=1)[:, None]
     solver.set_grips(
         [
             SimpleNamespace(

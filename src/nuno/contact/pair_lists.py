@@ -41,7 +41,9 @@ FORGET = wp.constant(1.0e8)
 
 
 @wp.func
-def append(hit: float, count: wp.array(dtype=int), which: int, pairs: wp.array(dtype=int), a: int, b: int, c: int, d: int):  # noqa: E501
+def append(
+    hit: float, count: wp.array(dtype=int), which: int, pairs: wp.array(dtype=int), a: int, b: int, c: int, d: int
+):
     """Add a candidate to the list where ``hit`` is positive; what does not fit is counted but not kept."""
     if hit > 0.0:
         k = wp.atomic_add(count, which, 1)
@@ -67,7 +69,16 @@ while (mask) {
     }
 }
 """)
-def append(hit: lane, count: wp.array(dtype=lane_int), which: int, pairs: wp.array(dtype=lane_int), a: int, b: int, c: int, d: int): ...  # noqa: E501, F811
+def append(
+    hit: lane,
+    count: wp.array(dtype=lane_int),
+    which: int,
+    pairs: wp.array(dtype=lane_int),
+    a: int,
+    b: int,
+    c: int,
+    d: int,
+): ...
 
 
 @wp.func_native("""
@@ -81,7 +92,16 @@ for (int l = 0; l < 16; ++l) {
     }
 }
 """)
-def append(hit: lane, count: wp.array(dtype=lane_int), which: int, pairs: wp.array(dtype=lane_int), a: lane_int, b: lane_int, c: lane_int, d: lane_int): ...  # noqa: E501, F811
+def append(
+    hit: lane,
+    count: wp.array(dtype=lane_int),
+    which: int,
+    pairs: wp.array(dtype=lane_int),
+    a: lane_int,
+    b: lane_int,
+    c: lane_int,
+    d: lane_int,
+): ...
 
 
 @wp.func
@@ -94,7 +114,7 @@ def raise_to(values: wp.array(dtype=float), k: int, value: float, threads: int):
 
 
 @wp.func
-def raise_to(values: wp.array(dtype=Any), k: int, value: Any, threads: int):  # noqa: F811
+def raise_to(values: wp.array(dtype=Any), k: int, value: Any, threads: int):
     values[k] = most(values[k], value)
 
 

@@ -53,19 +53,51 @@ def move(t: Any, n: int, i: int, dx: float, dy: float, dz: float, s: float, thre
 
 
 @wp.func
-def move(t: Any, n: int, i: Any, dx: Any, dy: Any, dz: Any, s: Any, threads: int):  # noqa: F811
+def move(t: Any, n: int, i: Any, dx: Any, dy: Any, dz: Any, s: Any, threads: int):
     place(t.x, i, gather(t.x, i) + times(dx, s))
     place(t.y, i, gather(t.y, i) + times(dy, s))
     place(t.z, i, gather(t.z, i) + times(dz, s))
 
 
 @wp.func
-def part(t: Any, n: int, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any, nx: Any, ny: Any, nz: Any, on: Any, leave: Any, threads: int):  # noqa: E501
+def part(
+    t: Any,
+    n: int,
+    a: Any,
+    b: Any,
+    c: Any,
+    d: Any,
+    ka: Any,
+    kb: Any,
+    kc: Any,
+    kd: Any,
+    nx: Any,
+    ny: Any,
+    nz: Any,
+    on: Any,
+    leave: Any,
+    threads: int,
+):
     """Keep sum k_i x_i at least a thickness along the normal, with friction; ``on`` is positive where it counts."""
     zero = fill(ka, 0.0)
-    pxs = times(ka, gather(t.px, a)) + times(kb, gather(t.px, b)) + times(kc, gather(t.px, c)) + times(kd, gather(t.px, d))
-    pys = times(ka, gather(t.py, a)) + times(kb, gather(t.py, b)) + times(kc, gather(t.py, c)) + times(kd, gather(t.py, d))
-    pzs = times(ka, gather(t.pz, a)) + times(kb, gather(t.pz, b)) + times(kc, gather(t.pz, c)) + times(kd, gather(t.pz, d))
+    pxs = (
+        times(ka, gather(t.px, a))
+        + times(kb, gather(t.px, b))
+        + times(kc, gather(t.px, c))
+        + times(kd, gather(t.px, d))
+    )
+    pys = (
+        times(ka, gather(t.py, a))
+        + times(kb, gather(t.py, b))
+        + times(kc, gather(t.py, c))
+        + times(kd, gather(t.py, d))
+    )
+    pzs = (
+        times(ka, gather(t.pz, a))
+        + times(kb, gather(t.pz, b))
+        + times(kc, gather(t.pz, c))
+        + times(kd, gather(t.pz, d))
+    )
     gx = times(ka, gather(t.x, a)) + times(kb, gather(t.x, b)) + times(kc, gather(t.x, c)) + times(kd, gather(t.x, d))
     gy = times(ka, gather(t.y, a)) + times(kb, gather(t.y, b)) + times(kc, gather(t.y, c)) + times(kd, gather(t.y, d))
     gz = times(ka, gather(t.z, a)) + times(kb, gather(t.z, b)) + times(kc, gather(t.z, c)) + times(kd, gather(t.z, d))
@@ -187,7 +219,24 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
         on = times(within(like, k, t.touch_count[1]), reach2 - cc)
         if anywhere(on):
             inv = over(one, root(cc + fill(like, 1.0e-20)))
-            part(t, n, a, b, c, d, one - s, s, q - one, -q, times(cx, inv), times(cy, inv), times(cz, inv), on, leave, threads)  # noqa: E501
+            part(
+                t,
+                n,
+                a,
+                b,
+                c,
+                d,
+                one - s,
+                s,
+                q - one,
+                -q,
+                times(cx, inv),
+                times(cy, inv),
+                times(cz, inv),
+                on,
+                leave,
+                threads,
+            )
 
 
 @wp.func

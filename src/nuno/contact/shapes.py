@@ -9,19 +9,21 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, mul, sub  # noqa: F401
-from nuno.solver.lanes import (
+from nuno.solver.lanes import (  # noqa: F401
+    add,
+    anywhere,
     choose,
     fill,
     lane,
-    anywhere,
     largest,
     least,
     most,
+    mul,
     over,
     per_world,
     root,
     size_of,
+    sub,
     times,
 )
 from nuno.solver.state import FRICTION, ORIGIN, SPEED, THICKNESS, Shapes
@@ -132,7 +134,7 @@ def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: float, y: float
 
 
 @wp.func
-def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: lane, y: lane, z: lane, bx: lane, by: lane, bz: lane, reach: float):  # noqa: E501, F811
+def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: lane, y: lane, z: lane, bx: lane, by: lane, bz: lane, reach: float):  # noqa: E501
     gap = lane()
     nx = lane()
     ny = lane()
@@ -256,7 +258,7 @@ def widen(box: wp.array(dtype=float), k: int, lo: float, hi: float, threads: int
 
 
 @wp.func
-def widen(box: wp.array(dtype=Any), k: int, lo: Any, hi: Any, threads: int):  # noqa: F811
+def widen(box: wp.array(dtype=Any), k: int, lo: Any, hi: Any, threads: int):
     box[k] = least(box[k], lo)
     box[3 + k] = most(box[3 + k], hi)
 

@@ -24,8 +24,8 @@ def bend_stiffness(weight: Any, alpha: Any):
     """The denominator of a bend's update: weight / 2 + alpha, at least 0.8 weight.
 
     With lambda starting at zero, one pass adds to the static compliance what the same substep's other constraints do
-    not undo, about half of the weight; taken off, a strip hangs as its rigidity says at far larger steps. The floor bounds
-    the over-relaxation to 1.25, well inside of 2, where it would oscillate.
+    not undo, about half of the weight; taken off, a strip hangs as its rigidity says at far larger steps. The floor
+    bounds the over-relaxation to 1.25, well inside of 2, where it would oscillate.
     """
     return most(scaled(weight, 0.5) + alpha, scaled(weight, 0.8)) + fill(weight, 1.0e-12)
 

@@ -197,7 +197,7 @@ class ClothSolver:
                     count = len(elements)
                     u = np.arange(count) if per_element else np.zeros(count, int)
                     v = u + count if per_element else u + 1
-                    shear_values, shear_each = table(("shear_stiffness",))
+                    _, shear_each = table(("shear_stiffness",))
                     w = np.arange(count) if shear_each else np.zeros(count, int)
                     both = [np.concatenate([c[:, elements.faces[:, 0]] for c in stretch], axis=1)] if per_element else []
                     if both:
@@ -456,7 +456,8 @@ class ClothSolver:
                 entries.append(
                     dict(
                         corners=corners[:, k], weights=single, times=np.asarray(grip.times, float),
-                        positions=np.asarray(grip.positions)[:, k] - self.origin[:, None], ease=grip.interpolation == "minimum_jerk",
+                        positions=np.asarray(grip.positions)[:, k] - self.origin[:, None],
+                        ease=grip.interpolation == "minimum_jerk",
                         compliance=float(grip.compliance), fixed=vertex and grip.compliance == 0.0,
                     )
                 )  # fmt: skip
@@ -557,6 +558,8 @@ class ClothSolver:
         if self.group_count == 1:
             group(0)
         else:
+            # here, for every thread would compile it for itself
+            wp.load_module(run_lanes.module, device=self.device)
             list(_pool().map(group, range(self.group_count)))
 
     def _large_plan(self) -> LargePlan:

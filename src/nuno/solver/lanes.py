@@ -48,7 +48,7 @@ def mul(a: lane, b: float) -> lane: ...
 
 
 @wp.func_native(_simd("a * B", "b"))
-def mul(a: float, b: lane) -> lane: ...  # noqa: F811
+def mul(a: float, b: lane) -> lane: ...
 
 
 @wp.func
@@ -58,7 +58,7 @@ def times(a: float, b: float):
 
 
 @wp.func_native(_simd("A * B", "a", "b"))
-def times(a: lane, b: lane) -> lane: ...  # noqa: F811 (Warp overload)
+def times(a: lane, b: lane) -> lane: ...
 
 
 @wp.func
@@ -68,7 +68,7 @@ def over(a: float, b: float):
 
 
 @wp.func_native(_simd("A / B", "a", "b"))
-def over(a: lane, b: lane) -> lane: ...  # noqa: F811
+def over(a: lane, b: lane) -> lane: ...
 
 
 @wp.func
@@ -78,7 +78,7 @@ def root(a: float):
 
 
 @wp.func_native(_simd("__builtin_elementwise_sqrt(A)", "a"))
-def root(a: lane) -> lane: ...  # noqa: F811
+def root(a: lane) -> lane: ...
 
 
 @wp.func
@@ -88,7 +88,7 @@ def fill(like: float, value: float):
 
 
 @wp.func_native(_simd("(V){} + value"))
-def fill(like: lane, value: float) -> lane: ...  # noqa: F811
+def fill(like: lane, value: float) -> lane: ...
 
 
 @wp.func
@@ -98,7 +98,7 @@ def choose(sign: float, a: float, b: float):
 
 
 @wp.func_native(_simd("(V)((SIGN > 0.f) ? (I)A : (I)B)", "sign", "a", "b"))
-def choose(sign: lane, a: lane, b: lane) -> lane: ...  # noqa: F811
+def choose(sign: lane, a: lane, b: lane) -> lane: ...
 
 
 @wp.func
@@ -108,7 +108,7 @@ def least(a: float, b: float):
 
 
 @wp.func_native(_simd("(V)((A < B) ? (I)A : (I)B)", "a", "b"))
-def least(a: lane, b: lane) -> lane: ...  # noqa: F811
+def least(a: lane, b: lane) -> lane: ...
 
 
 @wp.func
@@ -118,7 +118,7 @@ def most(a: float, b: float):
 
 
 @wp.func_native(_simd("(V)((A > B) ? (I)A : (I)B)", "a", "b"))
-def most(a: lane, b: lane) -> lane: ...  # noqa: F811
+def most(a: lane, b: lane) -> lane: ...
 
 
 @wp.func
@@ -128,7 +128,7 @@ def size_of(a: float):
 
 
 @wp.func_native(_simd("(V)((A > 0.f) ? (I)A : (I)(-A))", "a"))
-def size_of(a: lane) -> lane: ...  # noqa: F811
+def size_of(a: lane) -> lane: ...
 
 
 @wp.func
@@ -138,7 +138,7 @@ def anywhere(a: float):
 
 
 @wp.func_native(_native("V A = *(const V*)&a; return __builtin_reduce_or((I)(A > 0.f)) != 0;"))
-def anywhere(a: lane) -> bool: ...  # noqa: F811
+def anywhere(a: lane) -> bool: ...
 
 
 @wp.func
@@ -148,7 +148,7 @@ def largest(a: float):
 
 
 @wp.func_native(_native("V A = *(const V*)&a; return __builtin_reduce_max(A);"))
-def largest(a: lane) -> float: ...  # noqa: F811
+def largest(a: lane) -> float: ...
 
 
 @wp.func
@@ -158,7 +158,7 @@ def highest(a: int):
 
 
 @wp.func
-def highest(a: lane_int):  # noqa: F811
+def highest(a: lane_int):
     return wp.max(a)
 
 
@@ -178,11 +178,11 @@ for (int l = 0; l < 16; ++l) r[l] = x.data[i[l]][l];
 #endif
 return r;""")
 )
-def gather(x: wp.array(dtype=lane), i: lane_int) -> lane: ...  # noqa: F811
+def gather(x: wp.array(dtype=lane), i: lane_int) -> lane: ...
 
 
 @wp.func
-def gather(x: wp.array(dtype=lane), i: int):  # noqa: F811
+def gather(x: wp.array(dtype=lane), i: int):
     return x[i]
 
 
@@ -193,14 +193,17 @@ def place(x: wp.array(dtype=float), i: int, value: float):
 
 
 @wp.func_native(
-    _native("""
+    _native(
+        """
 #if defined(__AVX512F__)
 __builtin_ia32_scattersiv16sf(x.data, (unsigned short)0xffff, *(const I*)&i * 16 + OWN, *(const V*)&value, 4);
 #else
 for (int l = 0; l < 16; ++l) x.data[i[l]][l] = value[l];
-#endif""", "")
+#endif""",
+        "",
+    )
 )
-def place(x: wp.array(dtype=lane), i: lane_int, value: lane): ...  # noqa: F811
+def place(x: wp.array(dtype=lane), i: lane_int, value: lane): ...
 
 
 @wp.func
@@ -210,7 +213,7 @@ def known(like: float, i: int):
 
 
 @wp.func_native(_simd("(V)((*(const I*)&i >= 0) & (I)((V){} + 1.f))"))
-def known(like: lane, i: lane_int) -> lane: ...  # noqa: F811
+def known(like: lane, i: lane_int) -> lane: ...
 
 
 @wp.func
@@ -220,7 +223,7 @@ def within(like: float, k: int, count: int):
 
 
 @wp.func_native(_simd("(V)((*(const I*)&count > k) & (I)((V){} + 1.f))"))
-def within(like: lane, k: int, count: lane_int) -> lane: ...  # noqa: F811
+def within(like: lane, k: int, count: lane_int) -> lane: ...
 
 
 @wp.func
@@ -230,7 +233,7 @@ def clipped(i: int):
 
 
 @wp.func_native("wp::vec_t<16,wp::int32> r; for (int l=0; l<16; ++l) r[l] = i[l] < 0 ? 0 : i[l]; return r;")
-def clipped(i: lane_int) -> lane_int: ...  # noqa: F811
+def clipped(i: lane_int) -> lane_int: ...
 
 
 @wp.func
@@ -240,17 +243,17 @@ def window(a: wp.array(dtype=float), first: int, count: int):
 
 
 @wp.func
-def window(a: wp.array(dtype=lane), first: int, count: int):  # noqa: F811
+def window(a: wp.array(dtype=lane), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane)
 
 
 @wp.func
-def window(a: wp.array(dtype=int), first: int, count: int):  # noqa: F811
+def window(a: wp.array(dtype=int), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4), shape=(count,), dtype=int)
 
 
 @wp.func
-def window(a: wp.array(dtype=lane_int), first: int, count: int):  # noqa: F811
+def window(a: wp.array(dtype=lane_int), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane_int)
 
 
@@ -261,7 +264,7 @@ def per_world(like: float, table: wp.array(dtype=float), group: int, stride: int
 
 
 @wp.func
-def per_world(like: lane, table: wp.array(dtype=float), group: int, stride: int, worlds: int, entry: int):  # noqa: F811
+def per_world(like: lane, table: wp.array(dtype=float), group: int, stride: int, worlds: int, entry: int):
     r = lane(table[entry])
     if stride > 0:
         for k in range(16):
