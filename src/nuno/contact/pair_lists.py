@@ -30,7 +30,18 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
     within,
 )
-from nuno.solver.state import LISTINGS, PICK_REACH, PICKED, SPEED, THICKNESS, TRAVEL, Settings, Topology
+from nuno.solver.state import (
+    LISTINGS,
+    PICK_REACH,
+    PICKED,
+    SPEED,
+    THICKNESS,
+    TRAVEL,
+    Settings,
+    StateFloat,
+    StateLanes,
+    Topology,
+)
 
 GROUP = 8
 """Consecutive blocks that are passed over together where their common box is far."""
@@ -38,6 +49,10 @@ PICK_AHEAD = wp.constant(1.5)
 """Substeps for which the pairs that may touch are picked, at the speed of the moment."""
 FORGET = wp.constant(1.0e8)
 """[m] A travel beyond this says that there is no list."""
+VERTEX_SHARES = 4
+"""Threads among which the vertices of a block are dealt out, where many threads list pairs."""
+EDGE_SHARES = 8
+"""Threads among which the edges of a block are dealt out."""
 
 
 @wp.func
@@ -104,17 +119,44 @@ def append(
 ): ...
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+if (threads % 32 == 0)
+    for (int k = 16; k > 0; k /= 2) value = fmaxf(value, __shfl_xor_sync(0xffffffffu, value, k));
+#endif
+return value;
+""")
+def most_of_warp(value: float, threads: int) -> float:
+    """The largest value of the 32 threads that run together, all of which must come here."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return threads % 32 != 0 || thread % 32 == 0;
+#else
+return true;
+#endif
+""")
+def leads_warp(thread: int, threads: int) -> bool:
+    """Whether the thread speaks for those that `most_of_warp` has looked at."""
+    ...
+
+
 @wp.func
-def raise_to(values: wp.array(dtype=float), k: int, value: float, threads: int):
-    """Element k becomes ``value`` where that is larger."""
+def raise_to(values: wp.array(dtype=float), k: int, value: float, thread: int, threads: int):
+    """Element k becomes the largest ``value`` of all threads where that is larger."""
     if threads > 1:
-        wp.atomic_max(values, k, value)
+        # an atomic for each thread would have all of them queue up
+        high = most_of_warp(value, threads)
+        if leads_warp(thread, threads):
+            wp.atomic_max(values, k, high)
     else:
         values[k] = most(values[k], value)
 
 
 @wp.func
-def raise_to(values: wp.array(dtype=Any), k: int, value: Any, threads: int):
+def raise_to(values: wp.array(dtype=Any), k: int, value: Any, thread: int, threads: int):
     values[k] = most(values[k], value)
 
 
@@ -137,13 +179,12 @@ def measure_span(t: Any, n: int, thread: int, threads: int):
         lx = most(lx, -dx)
         ly = most(ly, -dy)
         lz = most(lz, -dz)
-    if thread < n:
-        raise_to(t.listed, 3 * n, hx, threads)
-        raise_to(t.listed, 3 * n + 1, hy, threads)
-        raise_to(t.listed, 3 * n + 2, hz, threads)
-        raise_to(t.listed, 3 * n + 3, lx, threads)
-        raise_to(t.listed, 3 * n + 4, ly, threads)
-        raise_to(t.listed, 3 * n + 5, lz, threads)
+    raise_to(t.listed, 3 * n, hx, thread, threads)
+    raise_to(t.listed, 3 * n + 1, hy, thread, threads)
+    raise_to(t.listed, 3 * n + 2, hz, thread, threads)
+    raise_to(t.listed, 3 * n + 3, lx, thread, threads)
+    raise_to(t.listed, 3 * n + 4, ly, thread, threads)
+    raise_to(t.listed, 3 * n + 5, lz, thread, threads)
 
 
 @wp.func
@@ -372,6 +413,168 @@ def find_creases(t: Any, topo: Topology, far2: Any, thread: int, threads: int):
         append(hit, t.pair_count, 1, t.edge_edge, q[0], q[1], q[2], q[3])
 
 
+# Many threads list in three rounds, each evenly dealt out: the pairs of blocks that meet, the pairs of elements whose
+# spheres meet, and those that are near. The first two rounds' lists stand in the room of the picked pairs, which are
+# picked anew once the list is made. What does not fit there is dealt with on the spot, so that nothing is lost.
+
+
+@wp.func
+def put_off(t: StateFloat, a: int, b: int, threads: int):
+    """Note two blocks that meet for the next round; 0 where they are to be looked at right away."""
+    if threads > 1:
+        k = wp.atomic_add(t.touch_count, 0, 1)
+        if 2 * k + 1 < t.touch_triangle.shape[0]:
+            t.touch_triangle[2 * k] = a
+            t.touch_triangle[2 * k + 1] = b
+            return 1
+    return 0
+
+
+@wp.func
+def put_off(t: StateLanes, a: int, b: int, threads: int):
+    return 0
+
+
+@wp.func
+def examine_pair(t: StateFloat, topo: Topology, u: int, v: int, far2: float):
+    """List a suspect if it is near: vertex u and triangle v, or edges -1 - u and v."""
+    if u >= 0:
+        f = topo.block_face[v]
+        hit = near_triangle(t, u, f[0], f[1], f[2], far2)
+        append(hit, t.pair_count, 0, t.vertex_triangle, u, f[0], f[1], f[2])
+    else:
+        e = topo.block_edge[-1 - u]
+        g = topo.block_edge[v]
+        near = near_edges(t, e[0], e[1], g[0], g[1], far2)
+        append(near, t.pair_count, 1, t.edge_edge, e[0], e[1], g[0], g[1])
+
+
+@wp.func
+def suspect(t: StateFloat, topo: Topology, u: int, first: int, bits: int, count: int, far2: float):
+    """Note the suspects u and ``first`` plus the places of the set ``bits``, ``count`` of them."""
+    if count > 0:
+        # one atomic for all, for each takes its time to answer
+        k = wp.atomic_add(t.touch_count, 1, count)
+        left = bits
+        v = first
+        while left != 0:
+            if left & 1 != 0:
+                if 2 * k + 1 < t.touch_edge.shape[0]:
+                    t.touch_edge[2 * k] = u
+                    t.touch_edge[2 * k + 1] = v
+                else:
+                    examine_pair(t, topo, u, v, far2)
+                k += 1
+            left = left >> 1
+            v += 1
+
+
+@wp.func
+def suspect_vertices(t: StateFloat, topo: Topology, far: float, far2: float, thread: int, threads: int):
+    """Vertices and triangles of the blocks that meet whose spheres do; a thread takes a vertex or few."""
+    pairs = wp.min(t.touch_count[0], t.touch_triangle.shape[0] / 2)
+    for item in range(thread, 2 * VERTEX_SHARES * pairs, threads):
+        p = item / (2 * VERTEX_SHARES)
+        share = item % (2 * VERTEX_SHARES)
+        a = t.touch_triangle[2 * p]
+        b = t.touch_triangle[2 * p + 1]
+        start = topo.block_vertex_start[a] + share
+        stop = topo.block_vertex_start[a + 1]
+        if share >= VERTEX_SHARES:
+            start = topo.block_vertex_start[b] + share - VERTEX_SHARES
+            stop = topo.block_vertex_start[b + 1]
+            if a == b:
+                stop = start
+            b = a
+        for k in range(start, stop, VERTEX_SHARES):
+            i = topo.block_vertex[k]
+            x = t.x[i]
+            y = t.y[i]
+            z = t.z[i]
+            gx = wp.min(x - t.bounds[6 * b], t.bounds[6 * b + 3] - x)
+            gy = wp.min(y - t.bounds[6 * b + 1], t.bounds[6 * b + 4] - y)
+            gz = wp.min(z - t.bounds[6 * b + 2], t.bounds[6 * b + 5] - z)
+            if wp.min(gx, wp.min(gy, gz)) + far > 0.0:
+                last = topo.block_face_start[b + 1]
+                for first in range(topo.block_face_start[b], last, 30):
+                    bits = int(0)
+                    count = int(0)
+                    for j in range(first, wp.min(first + 30, last)):
+                        dx = x - t.middle[4 * j]
+                        dy = y - t.middle[4 * j + 1]
+                        dz = z - t.middle[4 * j + 2]
+                        reach = far + t.middle[4 * j + 3]
+                        f = topo.block_face[j]
+                        if reach * reach - dx * dx - dy * dy - dz * dz > 0.0:
+                            if i != f[0] and i != f[1] and i != f[2]:
+                                bits = bits | (1 << (j - first))
+                                count += 1
+                    suspect(t, topo, i, first, bits, count, far2)
+
+
+@wp.func
+def suspect_edges(t: StateFloat, topo: Topology, far: float, far2: float, thread: int, threads: int):
+    """Edges of the blocks that meet whose spheres do; a thread takes an edge or few."""
+    pairs = wp.min(t.touch_count[0], t.touch_triangle.shape[0] / 2)
+    offset = topo.block_face.shape[0]
+    for item in range(thread, EDGE_SHARES * pairs, threads):
+        p = item / EDGE_SHARES
+        a = t.touch_triangle[2 * p]
+        b = t.touch_triangle[2 * p + 1]
+        last = topo.block_edge_start[b + 1]
+        for j in range(topo.block_edge_start[a] + item % EDGE_SHARES, topo.block_edge_start[a + 1], EDGE_SHARES):
+            m = 4 * (offset + j)
+            x = t.middle[m]
+            y = t.middle[m + 1]
+            z = t.middle[m + 2]
+            r = t.middle[m + 3] + far
+            gx = wp.min(x - t.bounds[6 * b], t.bounds[6 * b + 3] - x)
+            gy = wp.min(y - t.bounds[6 * b + 1], t.bounds[6 * b + 4] - y)
+            gz = wp.min(z - t.bounds[6 * b + 2], t.bounds[6 * b + 5] - z)
+            if wp.min(gx, wp.min(gy, gz)) + r > 0.0:
+                e = topo.block_edge[j]
+                begin = topo.block_edge_start[b]
+                if a == b:
+                    begin = j + 1
+                for first in range(begin, last, 30):
+                    bits = int(0)
+                    count = int(0)
+                    for k in range(first, wp.min(first + 30, last)):
+                        q = 4 * (offset + k)
+                        dx = x - t.middle[q]
+                        dy = y - t.middle[q + 1]
+                        dz = z - t.middle[q + 2]
+                        reach = r + t.middle[q + 3]
+                        f = topo.block_edge[k]
+                        if reach * reach - dx * dx - dy * dy - dz * dz > 0.0:
+                            if e[0] != f[0] and e[0] != f[1] and e[1] != f[0] and e[1] != f[1]:
+                                bits = bits | (1 << (k - first))
+                                count += 1
+                    suspect(t, topo, -1 - j, first, bits, count, far2)
+
+
+@wp.func
+def examine(t: StateFloat, topo: Topology, far2: float, thread: int, threads: int):
+    """List those suspects that are near."""
+    for k in range(thread, wp.min(t.touch_count[1], t.touch_edge.shape[0] / 2), threads):
+        examine_pair(t, topo, t.touch_edge[2 * k], t.touch_edge[2 * k + 1], far2)
+
+
+@wp.func
+def suspect_vertices(t: StateLanes, topo: Topology, far: lane, far2: lane, thread: int, threads: int):
+    pass
+
+
+@wp.func
+def suspect_edges(t: StateLanes, topo: Topology, far: lane, far2: lane, thread: int, threads: int):
+    pass
+
+
+@wp.func
+def examine(t: StateLanes, topo: Topology, far2: lane, thread: int, threads: int):
+    pass
+
+
 @wp.func
 def find_pairs(t: Any, topo: Topology, margin: float, thread: int, threads: int):
     """List all pairs that share no vertex and are nearer than the thickness and the margin."""
@@ -398,11 +601,18 @@ def find_pairs(t: Any, topo: Topology, margin: float, thread: int, threads: int)
                     gy = least(t.bounds[k + 4] - ly, hy - t.bounds[k + 1])
                     gz = least(t.bounds[k + 5] - lz, hz - t.bounds[k + 2])
                     if anywhere(least(gx, least(gy, gz))):
-                        find_vertex_triangle(t, topo, a, b, far, far2)
-                        if a != b:
-                            find_vertex_triangle(t, topo, b, a, far, far2)
-                        find_edge_edge(t, topo, a, b, far, far2)
+                        if put_off(t, a, b, threads) == 0:
+                            find_vertex_triangle(t, topo, a, b, far, far2)
+                            if a != b:
+                                find_vertex_triangle(t, topo, b, a, far, far2)
+                            find_edge_edge(t, topo, a, b, far, far2)
     find_creases(t, topo, far2, thread, threads)
+    if threads > 1:
+        barrier(threads)
+        suspect_vertices(t, topo, far, far2, thread, threads)
+        suspect_edges(t, topo, far, far2, thread, threads)
+        barrier(threads)
+        examine(t, topo, far2, thread, threads)
 
 
 @wp.func
@@ -483,6 +693,8 @@ def find_contacts(t: Any, topo: Topology, run: Settings, thread: int, threads: i
             if thread == 0:
                 t.pair_count[0] = t.pair_count[0] * 0
                 t.pair_count[1] = t.pair_count[1] * 0
+                t.touch_count[0] = t.touch_count[0] * 0
+                t.touch_count[1] = t.touch_count[1] * 0
                 t.notes[TRAVEL] = fill(left, 0.0)
                 t.notes[LISTINGS] = t.notes[LISTINGS] + fill(left, 1.0)
             for i in range(thread, n, threads):
