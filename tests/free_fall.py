@@ -46,9 +46,7 @@ class FreeFall:
 
     diverging = False
 
-    def __init__(
-        self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction
-    ):
+    def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity = np.array(gravity, dtype=np.float32)
         self.set_state(positions, velocities)
         self.friction, self.grips, self.forces, self.colliders = friction, [], None, None

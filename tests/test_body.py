@@ -50,9 +50,7 @@ def test_a_mesh_stays_where_its_vertices_are_unless_placed(tmp_path):
     body = nuno.mesh(TRIANGLE)
     np.testing.assert_allclose(body.vertices, TRIANGLE[0], atol=EXACT)
     np.testing.assert_allclose(body.position, (1 / 3, 1 / 3, 0), atol=EXACT)
-    np.testing.assert_allclose(
-        nuno.mesh(TRIANGLE, position=(0, 0, 1)).vertices.mean(axis=0), (0, 0, 1), atol=EXACT
-    )
+    np.testing.assert_allclose(nuno.mesh(TRIANGLE, position=(0, 0, 1)).vertices.mean(axis=0), (0, 0, 1), atol=EXACT)
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.2)
     assert nuno.mesh(ball).vertices.shape == ball.vertices.shape
     ball.export(tmp_path / "ball.stl")
@@ -136,8 +134,5 @@ def test_import_is_light():
 
     heavy = ("warp", "cv2", "trimesh", "matplotlib", "pinocchio")
     code = f"import sys, nuno; print([m for m in {heavy} if m in sys.modules])"
-    assert (
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-        == "[]\n"
-    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
     assert nuno.__all__ == sorted(nuno.__all__)

@@ -24,9 +24,7 @@ def test_resolved_broadcasts_to_worlds_and_elements():
 
 def test_resolved_names_what_fits():
     """An array that fits neither worlds nor elements is refused with the shapes that do."""
-    with pytest.raises(
-        InvalidInputError, match=r"shear_stiffness.*\(2,\).*\(5,\).*got an array of shape \(3,\)"
-    ):
+    with pytest.raises(InvalidInputError, match=r"shear_stiffness.*\(2,\).*\(5,\).*got an array of shape \(3,\)"):
         Cloth(shear_stiffness=[1.0, 2.0, 3.0]).resolved(2, 5)
     with pytest.raises(InvalidInputError, match="thickness"):
         Cloth(thickness=np.full(5, 1e-3)).resolved(2, 5)

@@ -183,9 +183,7 @@ def test_arguments_by_world_and_adopt():
     futures.attach(towel, Cloth(area_density=[0.1, 0.2], friction=[0.3, 0.6]))
     futures.find("table").locate([(0, 0, 0), (0, 0, -1)])
     goals = np.array([(0, 0, 2.0), (0, 1, 3)])
-    grip = futures.grip(
-        towel, towel.at([0.0, 1.0], 0.0).per_world(), to=Path([0.0, 1.0], goals[:, None].repeat(2, 1))
-    )
+    grip = futures.grip(towel, towel.at([0.0, 1.0], 0.0).per_world(), to=Path([0.0, 1.0], goals[:, None].repeat(2, 1)))
     futures.grip(towel, [[11], [-1]], to=goals)
     futures.push(towel, [(1, 0, 0), (2, 0, 0)])
     futures.run(0.5)

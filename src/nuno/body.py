@@ -203,9 +203,7 @@ class Body(Coordinates):
         if asked.ndim == 3 and len(asked) != count:
             raise InvalidInputError(f"points by world must be (k, 3) or ({count}, k, 3), got {asked.shape}")
         asked = np.broadcast_to(asked, (count, *asked.shape[-2:]))
-        found = [
-            closest_points(p, v, faces) for p, v in zip(asked, vertices.reshape(count, -1, 3), strict=True)
-        ]
+        found = [closest_points(p, v, faces) for p, v in zip(asked, vertices.reshape(count, -1, 3), strict=True)]
         return SurfacePoints(np.stack([f.faces for f in found]), np.stack([f.barycentric for f in found]))
 
     def _guard(self) -> AbstractContextManager[Any]:

@@ -37,9 +37,7 @@ class Coordinates:
         self._children: list[Coordinates] = []
 
     def __repr__(self) -> str:
-        return (
-            f"{type(self).__name__}(position={self.position.tolist()}, quaternion={self.quaternion.tolist()})"
-        )
+        return f"{type(self).__name__}(position={self.position.tolist()}, quaternion={self.quaternion.tolist()})"
 
     @property
     def position(self) -> np.ndarray:
@@ -104,9 +102,7 @@ class Coordinates:
             raise InvalidInputError("axis must not be of length zero")
         q = quat.from_axis_angle(direction / length, turn)
         position, quaternion = self._pose()
-        turned = (
-            quat.multiply(quaternion, q) if _checked_frame(wrt) == "local" else quat.multiply(q, quaternion)
-        )
+        turned = quat.multiply(quaternion, q) if _checked_frame(wrt) == "local" else quat.multiply(q, quaternion)
         self._place(position, turned / np.linalg.norm(turned, axis=-1, keepdims=True))
         return self
 

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from nuno.simulation import Simulation
 
 
-State = dict[
-    str, np.ndarray
-]  # of a solver: "local" and "origin", which add up to positions, "velocities" ...
+State = dict[str, np.ndarray]  # of a solver: "local" and "origin", which add up to positions, "velocities" ...
 SOON = 1e-9  # [s], below which two instants are the same
 
 
@@ -74,9 +72,7 @@ class Dynamics:
             device=world.device, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
             friction=friction,
         )  # fmt: skip
-        self.solver.set_state(
-            positions, velocities
-        )  # once more, in float64: it may keep an origin of its own
+        self.solver.set_state(positions, velocities)  # once more, in float64: it may keep an origin of its own
         self.grips_changed = False
         self.collider_version = -1
         self._pushing: tuple[Push, ...] = ()
@@ -115,8 +111,7 @@ def check_material(shape: Shape, material: Any, world_count: int) -> None:
     """
     if not shape.is_cloth:
         raise InvalidInputError(
-            f"no material makes a {shape.kind} dynamic in this version; "
-            "shapes that can be attached: sheet, cloth_mesh"
+            f"no material makes a {shape.kind} dynamic in this version; shapes that can be attached: sheet, cloth_mesh"
         )
     if not isinstance(material, Cloth):
         raise InvalidInputError(f"a {shape.kind} needs a Cloth material, got {type(material).__name__}")

@@ -96,9 +96,7 @@ class Grip:
         return self._spec
 
 
-def make_grip(
-    body: Body, where: Any, to: Any, compliance: float, target: Body | None, world: Simulation
-) -> Grip:
+def make_grip(body: Body, where: Any, to: Any, compliance: float, target: Body | None, world: Simulation) -> Grip:
     """Return a grip on ``body``, not yet active; see ``World.grip``.
 
     Raises:
@@ -135,9 +133,7 @@ def make_grip(
     return Grip(body, spec, target, local)
 
 
-def _points(
-    body: Body, where: Any, worlds: int
-) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+def _points(body: Body, where: Any, worlds: int) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     vertex_count, faces = body.vertices.shape[-2], body.faces
     if not isinstance(where, SurfacePoints):
         indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)

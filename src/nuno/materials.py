@@ -54,9 +54,7 @@ class Cloth:
             value = getattr(self, item.name)
             if item.name in DIRECTED and isinstance(value, tuple | list):
                 if len(value) != 2:
-                    raise InvalidInputError(
-                        f"{item.name} takes one value or (warp, weft), got {len(value)} values"
-                    )
+                    raise InvalidInputError(f"{item.name} takes one value or (warp, weft), got {len(value)} values")
                 checked: Any = tuple(_checked(item.name, part) for part in value)
             else:
                 checked = _checked(item.name, value)
@@ -149,9 +147,7 @@ def _checked(name: str, value: Any) -> Any:
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}") from error
     deepest = 2 if name in PER_ELEMENT else 1
     if array.ndim > deepest or array.size == 0:
-        raise InvalidInputError(
-            f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}"
-        )
+        raise InvalidInputError(f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}")
     if not np.isfinite(array).all() or (array < 0.0).any() or (not zero and (array == 0.0).any()):
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}")
     array.setflags(write=False)

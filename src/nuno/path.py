@@ -42,17 +42,13 @@ class Path:
         k = len(times)
         positions = finite_array("positions", self.positions, (k, 3), ("worlds", k, 3))
         if self.interpolation not in INTERPOLATIONS:
-            raise InvalidInputError(
-                f"interpolation must be one of {INTERPOLATIONS}, got {self.interpolation!r}"
-            )
+            raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {self.interpolation!r}")
         turns = self.quaternions
         if turns is not None:
             turns = quat.unit("quaternions", turns, (k, 4), ("worlds", k, 4))
             counts = {a.shape[0] for a in (positions, turns) if a.ndim == 3}
             if len(counts) > 1:
-                raise InvalidInputError(
-                    f"positions and quaternions are for different numbers of worlds: {counts}"
-                )
+                raise InvalidInputError(f"positions and quaternions are for different numbers of worlds: {counts}")
             turns.setflags(write=False)
         for name, array in (("times", times), ("positions", positions)):
             array.setflags(write=False)

@@ -170,9 +170,7 @@ class ClothMesh(TriangleMesh):
         corners = np.pad(rest, ((0, 0), (0, 3 - rest.shape[1])))[self.faces]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         if (flat := np.flatnonzero(area <= 0.0)).size:
-            raise MeshError(
-                f"{flat.size} faces have no area in the rest shape, the first is {flat[0]}; remove them"
-            )
+            raise MeshError(f"{flat.size} faces have no area in the rest shape, the first is {flat[0]}; remove them")
         object.__setattr__(self, "rest", _frozen(rest))
 
 
@@ -212,9 +210,7 @@ def _is_closed(faces: np.ndarray) -> bool:
     """Return whether every directed edge is met by exactly one the other way."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     codes = np.sort(edges[:, 0] << 32 | edges[:, 1])
-    return len(np.unique(codes)) == len(codes) and bool(
-        np.array_equal(codes, np.sort(edges[:, 1] << 32 | edges[:, 0]))
-    )
+    return len(np.unique(codes)) == len(codes) and bool(np.array_equal(codes, np.sort(edges[:, 1] << 32 | edges[:, 0])))
 
 
 def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:

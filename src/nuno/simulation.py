@@ -111,9 +111,7 @@ class Simulation:
 
     def _check_worlds(self, what: str, axes: tuple[int, ...]) -> None:
         if axes and axes != (self.world_count,):
-            raise InvalidInputError(
-                f"{what} must be one value or {self.world_count}, one a world, got {axes[0]}"
-            )
+            raise InvalidInputError(f"{what} must be one value or {self.world_count}, one a world, got {axes[0]}")
 
     def _register(self, body: Body) -> None:
         body._world = self

@@ -127,9 +127,7 @@ class Snapshot:
             for grip in self.grips
         ]  # fmt: skip
         friction = tuple((a, b, _plain(single(mu, 0))) for a, b, mu in self.pair_friction)
-        return replace(
-            self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count
-        )
+        return replace(self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count)
 
 
 def capture(world: Simulation) -> Snapshot:
@@ -242,16 +240,10 @@ def same_shape(a: Shape, b: Shape) -> bool:
 
 def _dynamics_for(record: DynamicsRecord, body: Body, world: Simulation, same_settings: bool) -> Dynamics:
     current = body._dynamics
-    if (
-        current is not None
-        and same_settings
-        and current.fits(record.material, world.world_count, record.friction)
-    ):
+    if current is not None and same_settings and current.fits(record.material, world.world_count, record.friction):
         return current
     positions = record.state["local"].astype(np.float64) + record.state["origin"][:, None]
-    return Dynamics(
-        body.shape, record.material, positions, record.state["velocities"], record.friction, world
-    )
+    return Dynamics(body.shape, record.material, positions, record.state["velocities"], record.friction, world)
 
 
 def _take_apart(world: Simulation) -> None:
@@ -277,9 +269,7 @@ def _fill(body: Body, record: BodyRecord) -> None:
     if body._parent is not None and not outside:
         body._parent._children = [child for child in body._parent._children if child is not body]
         body._parent = None
-    body._position, body._quaternion = (
-        pose if body._parent is None else compose(invert(body._parent._pose()), pose)
-    )
+    body._position, body._quaternion = pose if body._parent is None else compose(invert(body._parent._pose()), pose)
     body._name, body._shape, body.color = record.name, record.shape, record.color
     body._friction, body._thickness = record.friction, record.thickness
     body._group, body._collides_with = record.group, record.collides_with

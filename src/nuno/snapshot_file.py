@@ -31,8 +31,7 @@ SHAPES = (
     shapes.TriangleMesh, shapes.ClothMesh,
 )  # fmt: skip
 TYPES: dict[str, Any] = {
-    kind.__name__: kind
-    for kind in (*SHAPES, Cloth, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
+    kind.__name__: kind for kind in (*SHAPES, Cloth, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
 }
 
 
@@ -88,9 +87,7 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
             raise TypeError("the header holds no world")
         for body in snapshot.bodies:
             if meshes[body.key] != mesh_hash(body.shape):
-                raise FileFormatError(
-                    f"the mesh of {body.name!r} in {os.fspath(path)!r} does not match its hash"
-                )
+                raise FileFormatError(f"the mesh of {body.name!r} in {os.fspath(path)!r} does not match its hash")
     except FileFormatError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, NunoError) as error:
@@ -100,9 +97,7 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
 
 def mesh_hash(shape: shapes.Shape) -> str:
     """Return the SHA-256 of a shape's vertices and faces."""
-    vertices, faces = (
-        (shape.vertices, shape.faces) if isinstance(shape, shapes.TriangleMesh) else shape.mesh()
-    )
+    vertices, faces = (shape.vertices, shape.faces) if isinstance(shape, shapes.TriangleMesh) else shape.mesh()
     digest = hashlib.sha256(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(faces, dtype="<i4").tobytes())
     return digest.hexdigest()

@@ -31,9 +31,7 @@ class SurfacePoints:
     def __post_init__(self) -> None:
         faces = np.atleast_1d(np.array(self.faces))
         if faces.dtype.kind not in "iu" or faces.ndim > 2 or faces.size == 0:
-            raise InvalidInputError(
-                f"faces must be whole numbers of shape (k,) or (worlds, k), got {self.faces!r}"
-            )
+            raise InvalidInputError(f"faces must be whole numbers of shape (k,) or (worlds, k), got {self.faces!r}")
         weights = finite_array("barycentric", np.atleast_2d(self.barycentric), (*faces.shape, 3))
         if weights.min() < NEGATIVE or np.abs(weights.sum(axis=-1) - 1.0).max() > 1e-5:
             raise InvalidInputError("barycentric weights must be at least 0 and add up to 1")
@@ -113,9 +111,7 @@ def _closest_weights(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray)
     ]
     conditions = [condition for condition, _ in cases]
     inside = (1 - inside_v - inside_w, inside_v, inside_w)
-    return np.stack(
-        [np.select(conditions, [w[k] for _, w in cases], default=inside[k]) for k in range(3)], axis=-1
-    )
+    return np.stack([np.select(conditions, [w[k] for _, w in cases], default=inside[k]) for k in range(3)], axis=-1)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

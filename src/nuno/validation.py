@@ -14,9 +14,7 @@ from nuno.errors import InvalidInputError
 Shape = tuple[int | str, ...]
 
 
-def finite_array(
-    name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError
-) -> np.ndarray:
+def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError) -> np.ndarray:
     """Return ``value`` as a new float64 array of one of the given shapes.
 
     Args:
@@ -59,9 +57,7 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     return array.astype(np.int32)
 
 
-def number(
-    name: str, value: Any, *, low: float = -np.inf, above: float = -np.inf, high: float = np.inf
-) -> float:
+def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.inf, high: float = np.inf) -> float:
     """Return ``value`` as a finite float with low <= value <= high and value > above.
 
     Raises:

@@ -127,9 +127,7 @@ class World(Simulation):
         with self._call():
             own = self._own(body)
             if own._dynamics is not None:
-                raise BodyStateError(
-                    f"{own.name!r} is dynamic already; detach it first to change its material"
-                )
+                raise BodyStateError(f"{own.name!r} is dynamic already; detach it first to change its material")
             if own._parent is not None:
                 raise BodyStateError(f"{own.name!r} follows another frame; dissoc it first")
             chosen = Cloth(friction=own.friction) if material is None else material
@@ -319,9 +317,7 @@ class World(Simulation):
 
             snapshot = read_snapshot(snapshot)
         if not isinstance(snapshot, Snapshot):
-            raise InvalidInputError(
-                f"restore needs what save returned, or a path, got {type(saved).__name__}"
-            )
+            raise InvalidInputError(f"restore needs what save returned, or a path, got {type(saved).__name__}")
         with self._call():
             apply(snapshot, self)
 
@@ -338,9 +334,7 @@ class World(Simulation):
         worlds = count("n", n)
         with self._call():
             if self.world_count != 1:
-                raise BodyStateError(
-                    f"only a single world can be imagined further; this one has {self.world_count}"
-                )
+                raise BodyStateError(f"only a single world can be imagined further; this one has {self.world_count}")
             futures = World(device=self._device if device is None else device)
             snapshot = capture(self)
         apply(snapshot.spread(worlds), futures)

@@ -79,9 +79,7 @@ class Pair:
     size: tuple[float, float]
 
 
-def look_at(
-    position: np.ndarray, target: np.ndarray, focal: float, width: int = 640, height: int = 480
-) -> Camera:
+def look_at(position: np.ndarray, target: np.ndarray, focal: float, width: int = 640, height: int = 480) -> Camera:
     """A camera at a position [m] that looks at a target [m], level."""
     forward = (target - position) / np.linalg.norm(target - position)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -105,12 +103,8 @@ def make_pair(look: Look, seed: int, *, noise: float = 3.0, lift: bool = True, c
     rng = np.random.default_rng(seed)
     table_height = rng.uniform(0.65, 0.8)
     table = Table(table_height, (rng.uniform(0.38, 0.5), rng.uniform(0.55, 0.7)), (0.1, 0.0))
-    position = np.array(
-        [rng.uniform(-1.0, -0.8), rng.uniform(-0.2, 0.2), table_height + rng.uniform(0.5, 0.75)]
-    )
-    camera = look_at(
-        position, np.array([0.15, rng.uniform(-0.08, 0.08), table_height + 0.1]), rng.uniform(480, 560)
-    )
+    position = np.array([rng.uniform(-1.0, -0.8), rng.uniform(-0.2, 0.2), table_height + rng.uniform(0.5, 0.75)])
+    camera = look_at(position, np.array([0.15, rng.uniform(-0.08, 0.08), table_height + 0.1]), rng.uniform(480, 560))
     short = rng.uniform(0.3, 0.45)
     size = (short * rng.uniform(1.1, 1.5), short)
     yaw = rng.uniform(0, 2 * np.pi)
@@ -137,9 +131,7 @@ def make_pair(look: Look, seed: int, *, noise: float = 3.0, lift: bool = True, c
         rest, faces = _grid(size, 56, 44)
         pick = np.array([rng.choice([-0.5, -0.3, -0.1, 0.1, 0.3, 0.5]) for _ in range(2)]) * size
         travel = np.array([rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), rng.uniform(0.25, 0.45)])
-        vertices = _tent(rest, pick, travel, rng) @ np.block(
-            [[axes, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]]
-        )
+        vertices = _tent(rest, pick, travel, rng) @ np.block([[axes, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]])
         vertices += np.array([*centre, table_height + REST_HEIGHT])
         hand = np.array([*(centre + pick @ axes), table_height + REST_HEIGHT]) + np.array(
             [*(travel[:2] @ axes), travel[2]]
@@ -147,9 +139,7 @@ def make_pair(look: Look, seed: int, *, noise: float = 3.0, lift: bool = True, c
         _cast_shadow(after, vertices, faces, to_light, camera, table)
         index = _rasterise(vertices, faces, camera)
         mask_after = index >= 0
-        colours = (
-            _pattern(rest[faces].mean(axis=1), look) * _shade(vertices, faces, to_light, camera)[:, None]
-        )
+        colours = _pattern(rest[faces].mean(axis=1), look) * _shade(vertices, faces, to_light, camera)[:, None]
         after[mask_after] = colours[index[mask_after]] / flat_light
         sphere = _sphere(camera, hand, HAND_RADIUS)
         after[sphere] = (28, 28, 32)
@@ -227,9 +217,7 @@ def _tent(rest: np.ndarray, pick: np.ndarray, travel: np.ndarray, rng: np.random
     steep = rng.uniform(0.75, 0.95)
     fall = np.minimum(distance * steep, travel[2] - 0.002)
     flat = np.sqrt(np.maximum(distance**2 - fall**2, 0.0))
-    folds = rng.uniform(0.0, 0.2) * (
-        np.sin(rng.integers(3, 7) * angle + rng.uniform(0, 6)) - 1.0
-    )  # never stretched
+    folds = rng.uniform(0.0, 0.2) * (np.sin(rng.integers(3, 7) * angle + rng.uniform(0, 6)) - 1.0)  # never stretched
     radius = flat * (1 + folds * fall / travel[2])
     xy = pick + away / np.maximum(distance, 1e-9)[:, None] * radius[:, None] + travel[:2]
     return np.column_stack([xy, travel[2] - fall])
@@ -277,9 +265,7 @@ def _cast_shadow(
         points = vertices - to_light * ((vertices[:, 2] - height) / to_light[2])[:, None]
         if height == table.height:
             caught = (table_margin(table, points[faces][..., :2]) > 0).any(axis=1)
-        drawn = (
-            faces if height == table.height else faces[~caught]
-        )  # the table keeps its shadow from the floor
+        drawn = faces if height == table.height else faces[~caught]  # the table keeps its shadow from the floor
         shadow = (_draw(points, drawn, camera) >= 0) & where
         if height == 0.0:
             shadow &= plane_coordinates(camera, 0.0)[..., 0] < 1.6

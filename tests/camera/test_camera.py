@@ -46,9 +46,7 @@ def test_back_project_undoes_project(distortion):
     pixels = camera.project(points)
     assert pixels.shape == (4, 10, 2)
     # OpenCV's undistortion is iterative: it stops at about 1e-5 m at this distance
-    np.testing.assert_allclose(
-        camera.back_project(pixels, 0.25), points, atol=1e-10 if distortion is None else 2e-5
-    )
+    np.testing.assert_allclose(camera.back_project(pixels, 0.25), points, atol=1e-10 if distortion is None else 2e-5)
 
 
 def test_rays_have_unit_depth():

@@ -34,9 +34,7 @@ def _draw(camera, vertices, faces, *, region=None, layer=None, label=0, ids=Fals
 def _square(x0, y0, x1, y1, z):
     """A square whose corners are at these pixels of PLAIN."""
     corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
-    return np.column_stack([(corners - (64.0, 48.0)) * z / 256.0, np.full(4, z)]), np.array(
-        [[0, 1, 2], [0, 2, 3]]
-    )
+    return np.column_stack([(corners - (64.0, 48.0)) * z / 256.0, np.full(4, z)]), np.array([[0, 1, 2], [0, 2, 3]])
 
 
 @pytest.mark.parametrize("z", [1.0, 2.0])
@@ -70,9 +68,7 @@ def test_shared_edges_neither_leave_gaps_nor_overlap():
     points[1:-1, 1:-1] += rng.uniform(-3, 3, (ny - 2, nx - 2, 2))
     points[3:6, 3:6] = np.rint(points[3:6, 3:6])  # some corners on pixel centres
     z = rng.uniform(0.8, 2.0, (ny, nx))
-    vertices = np.concatenate([(points - (64, 48)) * z[..., None] / 256.0, z[..., None]], axis=-1).reshape(
-        -1, 3
-    )
+    vertices = np.concatenate([(points - (64, 48)) * z[..., None] / 256.0, z[..., None]], axis=-1).reshape(-1, 3)
     a = (np.arange(ny - 1)[:, None] * nx + np.arange(nx - 1)).ravel()
     faces = np.concatenate([np.stack([a, a + 1, a + nx], 1), np.stack([a + 1, a + nx, a + nx + 1], 1)])
     each = raster.masks_of(_draw(PLAIN, vertices[faces], [[0, 1, 2]])).numpy()  # a world a triangle
@@ -198,8 +194,7 @@ def test_threads_have_the_bits_of_one():
     triangles = wp.array(faces, dtype=wp.vec3i, device="cpu")
     with ThreadPoolExecutor(4) as pool:
         jobs = [
-            pool.submit(raster.draw, keys[k : k + 3], points[k : k + 3], triangles, seen, 0)
-            for k in range(0, 12, 3)
+            pool.submit(raster.draw, keys[k : k + 3], points[k : k + 3], triangles, seen, 0) for k in range(0, 12, 3)
         ]
         for job in jobs:
             job.result()
@@ -256,9 +251,7 @@ def test_layers_hide_and_are_hidden():
     assert farther.sum() == 30 * 10 and not farther[:, :60].any()
 
 
-@pytest.mark.parametrize(
-    "distortion", [MILD, (0.1, -0.02, 0.001, 0.002), (0.3, 0.1, 0, 0, 0, 0.2, 0.05, 0.01)]
-)
+@pytest.mark.parametrize("distortion", [MILD, (0.1, -0.02, 0.001, 0.002), (0.3, 0.1, 0, 0, 0, 0.2, 0.05, 0.01)])
 def test_distortion_is_opencvs(distortion):
     """A finely divided square covers the pixels whose undistorted rays meet it."""
     camera = Camera(320, 240, 250.0, 250.0, 161.0, 118.0, distortion=distortion)

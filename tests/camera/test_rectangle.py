@@ -105,9 +105,7 @@ def test_ragged_mask_is_mended() -> None:
 
 def test_lens_distortion() -> None:
     """Sides that a lens bends are straight on the plane."""
-    camera = Camera(
-        640, 480, 520.0, 520.0, 319.5, 239.5, BESIDE.camera_to_world, np.array([-0.12, 0.02, 0.0, 0.0])
-    )
+    camera = Camera(640, 480, 520.0, 520.0, 319.5, 239.5, BESIDE.camera_to_world, np.array([-0.12, 0.02, 0.0, 0.0]))
     mask, image = draw(camera, (0.1, 0.0), (0.5, 0.36), 0.4)
     found = fit_rectangle(mask, image, camera, HEIGHT)
     assert farthest(found, corners_of((0.1, 0.0), (0.5, 0.36), 0.4)) < 0.001

@@ -21,9 +21,7 @@ DOWN = Camera(
 
 def _body(name, kind, at=(0.0, 0.0, 0.0)):
     vertices, faces = kind.mesh()
-    return SimpleNamespace(
-        name=name, shape=kind, vertices=vertices + np.asarray(at), faces=faces, is_dynamic=False
-    )
+    return SimpleNamespace(name=name, shape=kind, vertices=vertices + np.asarray(at), faces=faces, is_dynamic=False)
 
 
 def _world(*bodies, worlds=1):
@@ -45,11 +43,7 @@ def test_ids_say_who_is_in_front():
     """The hand hides the cloth, the cloth the table, the table the floor."""
     ids = render_ids(_room(), DOWN).numpy()
     assert ids.dtype == np.int32 and ids.shape == (120, 160)
-    u, v = (
-        np.rint(DOWN.project([(0.1, 0, 0.75), (0.2, 0.05, 0.51), (-0.2, 0.1, 0.5), (0.4, 0.3, 0)]))
-        .astype(int)
-        .T
-    )
+    u, v = np.rint(DOWN.project([(0.1, 0, 0.75), (0.2, 0.05, 0.51), (-0.2, 0.1, 0.5), (0.4, 0.3, 0)])).astype(int).T
     assert ids[v, u].tolist() == [3, 2, 1, 0]
     # the table's top, 0.6 x 0.4 m at 1.5 m: 80 x 53.3 px, of which the cloth and the hand hide a part
     assert (ids >= 1).sum() == 80 * 54
@@ -130,9 +124,7 @@ def test_batch_has_the_bits_of_single_worlds(chunk, monkeypatch):
 @pytest.mark.parametrize("distortion", [None, (-0.2, 0.04, 0.001, -0.001)])
 def test_static_bodies_may_differ_by_world(distortion):
     """Floors and tables that stand elsewhere in each world look as they do alone, also through a lens."""
-    camera = Camera(
-        160, 120, 200.0, 200.0, 79.5, 59.5, camera_to_world=DOWN.camera_to_world, distortion=distortion
-    )
+    camera = Camera(160, 120, 200.0, 200.0, 79.5, 59.5, camera_to_world=DOWN.camera_to_world, distortion=distortion)
     many = _room(worlds=3)
     for body in many.bodies:  # all bodies by world; hand and table are alike in all
         if body.vertices.ndim == 2:

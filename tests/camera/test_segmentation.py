@@ -146,9 +146,7 @@ def test_camera_that_looks_away(striped: Pair) -> None:
 
 def test_nothing_in_the_hand(striped: Pair) -> None:
     """A hand with no cloth anywhere near is a named error: the image after shows the bare table."""
-    bare = make_pair(
-        LOOKS[BY_NAME["blue stripes on wood"]], 500 + BY_NAME["blue stripes on wood"], lift=False
-    ).after
+    bare = make_pair(LOOKS[BY_NAME["blue stripes on wood"]], 500 + BY_NAME["blue stripes on wood"], lift=False).after
     with pytest.raises(ClothNotFoundError):
         segment_after(bare, striped.camera, striped.table, striped.before, striped.mask_before, striped.hand)
 

@@ -91,9 +91,7 @@ def test_empty_masks_have_defined_scores():
     np.testing.assert_array_equal(scores["centroid"], [[-1, -1], [19.5, 14.5], [19.5, 14.5]])
     assert similarity(empty, blob, "chamfer") == 50.0
     everything_ignored = similarity(blob, blob, "all", ignore=full)
-    assert np.isfinite(
-        [*everything_ignored["centroid"], *(everything_ignored[s] for s in module.SCORES)]
-    ).all()
+    assert np.isfinite([*everything_ignored["centroid"], *(everything_ignored[s] for s in module.SCORES)]).all()
 
 
 def test_region_counts_the_background_outside_exactly():
@@ -122,16 +120,12 @@ def test_batches_threads_and_kinds_have_the_same_bits():
     for name, values in expected.items():
         np.testing.assert_array_equal(np.concatenate([s[name] for s in slices]), values)
         np.testing.assert_array_equal(score_masks(sims[3:4], real)[name][0], values[3])
-        np.testing.assert_array_equal(
-            score_masks(wp.array(sims, dtype=wp.bool, device="cpu"), real)[name], values
-        )
+        np.testing.assert_array_equal(score_masks(wp.array(sims, dtype=wp.bool, device="cpu"), real)[name], values)
         np.testing.assert_array_equal(score_masks(sims.astype(np.uint8) * 255, real)[name], values)
     without = score_masks(sims, real, with_contour=False)
     assert "chamfer" not in without
     np.testing.assert_array_equal(without["eq1"], expected["eq1"])
-    np.testing.assert_array_equal(
-        similarity(wp.array(sims, dtype=wp.bool, device="cpu"), real), expected["eq1"]
-    )
+    np.testing.assert_array_equal(similarity(wp.array(sims, dtype=wp.bool, device="cpu"), real), expected["eq1"])
 
 
 @pytest.mark.cuda
@@ -145,9 +139,7 @@ def test_cuda_repeats_its_bits_and_agrees_with_the_cpu():
     for name in here:
         np.testing.assert_array_equal(first[name], second[name])
         # a square root may round to another 1/1024 px
-        np.testing.assert_allclose(
-            first[name], here[name], atol=1 / 1024 if name == "chamfer" else 0.0, rtol=0.0
-        )
+        np.testing.assert_allclose(first[name], here[name], atol=1 / 1024 if name == "chamfer" else 0.0, rtol=0.0)
 
 
 def test_bad_arguments_are_refused():

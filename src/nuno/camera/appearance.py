@@ -144,9 +144,7 @@ def shaded_density(
     along2 = share * share * length2
     across2 = np.maximum(np.einsum("...i,...i->...", pixels, pixels) - along2, 0.0)
     variance = np.float32(noise**2) + np.float32(spread**2) * along2
-    ends = np.clip(
-        np.minimum(share - darkest, brightest - share) / np.float32(0.05) + np.float32(0.5), 0.0, 1.0
-    )
+    ends = np.clip(np.minimum(share - darkest, brightest - share) / np.float32(0.05) + np.float32(0.5), 0.0, 1.0)
     even = ends / (np.float32(brightest - darkest) * np.sqrt(length2))
     return even * np.exp(-0.5 * across2 / variance) / (np.float32(2 * np.pi) * variance)
 

@@ -112,9 +112,7 @@ def compare(
     inside = shrink(mask, 3)
     grain = _grain(first, view, scene, hidden, ring, inside if inside.any() else mask)
     darkest = float(colours[shares > 0.03].mean(axis=-1).min(initial=1.0))
-    shade = _shade(
-        view, scene, grain, table, noise, np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9))
-    )
+    shade = _shade(view, scene, grain, table, noise, np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9)))
     return Background(view, scene, hidden, table, colours, shares, noise, grain, shade)
 
 
@@ -176,14 +174,10 @@ def _grain(
 
 def _heavy_tailed(offset: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Density of an offset: normal, with a tenth spread over 60 levels."""
-    return 0.9 * np.exp(-0.5 * offset * offset / variance) / np.sqrt(2 * np.pi * variance) + np.float32(
-        0.1 / 60.0
-    )
+    return 0.9 * np.exp(-0.5 * offset * offset / variance) / np.sqrt(2 * np.pi * variance) + np.float32(0.1 / 60.0)
 
 
-def _roughness_ratio(
-    found: np.ndarray, noise: np.ndarray, table: np.ndarray, cloth: np.ndarray
-) -> np.ndarray:
+def _roughness_ratio(found: np.ndarray, noise: np.ndarray, table: np.ndarray, cloth: np.ndarray) -> np.ndarray:
     """Logarithm (k,) of how much likelier a relative roughness is for the table than for the cloth.
 
     Args:

@@ -51,9 +51,7 @@ def _profiles(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray) -> tup
     """Offsets (m,) and image values (k, m, channels) along the normals."""
     offsets = np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
     if not len(pixels):
-        return offsets, np.empty(
-            (0, len(offsets), 1 if image.ndim == 2 else image.shape[2]), dtype=image.dtype
-        )
+        return offsets, np.empty((0, len(offsets), 1 if image.ndim == 2 else image.shape[2]), dtype=image.dtype)
     at = (pixels[:, None] + offsets[None, :, None] * normals[:, None]).astype(np.float32)
     values = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return offsets, values.reshape(len(pixels), len(offsets), -1)
@@ -107,9 +105,7 @@ def edge_in_image(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray) ->
     outside = cv2.blur(values[:, outer].mean(axis=1), (1, 5), borderType=cv2.BORDER_REPLICATE).reshape(-1, 3)
     difference = inside - outside
     contrast = (difference**2).sum(axis=1)
-    level = ((values - outside[:, None]) * difference[:, None]).sum(axis=-1) / np.maximum(contrast, 1.0)[
-        :, None
-    ]
+    level = ((values - outside[:, None]) * difference[:, None]).sum(axis=-1) / np.maximum(contrast, 1.0)[:, None]
     offset = _crossing(offsets, level, 2.0)
     offset[contrast < 12.0**2] = np.nan  # four times a camera's noise
     return pixels + offset[:, None] * normals

@@ -17,9 +17,7 @@ _CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a sta
 _SMALLEST = 20  # [blocks] of a region that may be a cloth
 
 
-def first_look(
-    rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
+def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Find the cloth roughly.
 
     Args:
@@ -91,9 +89,7 @@ def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.nd
     return distance
 
 
-def _choose(
-    found: np.ndarray, distance: np.ndarray, pixel: np.ndarray | None, xy: np.ndarray | None
-) -> np.ndarray:
+def _choose(found: np.ndarray, distance: np.ndarray, pixel: np.ndarray | None, xy: np.ndarray | None) -> np.ndarray:
     """The part (h, w) bool at a pixel of the full image, or else the one that is largest and differs most.
 
     Where plane coordinates xy (h, w, 2) are given, it must have a cloth's size on the plane.
@@ -146,9 +142,7 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
         for label in np.flatnonzero(stats[:, cv2.CC_STAT_AREA] > 0.03 * even.size):
             if label == 0:
                 continue
-            surface = cv2.morphologyEx(
-                (labels == label).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)
-            )
+            surface = cv2.morphologyEx((labels == label).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
             contours, tree = cv2.findContours(surface, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
             for contour, (_, _, _, parent) in zip(contours, tree[0], strict=True):
                 if parent < 0 or len(contour) < 16:
@@ -156,9 +150,7 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
                 hole = np.zeros(surface.shape, dtype=np.uint8)
                 cv2.drawContours(hole, [contour], -1, 1, thickness=cv2.FILLED)
                 blob = hole.astype(bool) & ~surface.astype(bool)
-                if blob.sum() < _SMALLEST or (
-                    pixel is not None and _label_near(blob.astype(int), pixel) == 0
-                ):
+                if blob.sum() < _SMALLEST or (pixel is not None and _label_near(blob.astype(int), pixel) == 0):
                     continue
                 size, likeness = _size_on_plane(contour[:, 0], xy)
                 if likeness < 0.8 or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:

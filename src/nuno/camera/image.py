@@ -32,9 +32,7 @@ def read_image(path: str | Path) -> np.ndarray:
     data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     if image is None:
-        raise ImageError(
-            f"{path} ({data.size} bytes) holds no image that OpenCV can decode (PNG, JPEG, TIFF ...)"
-        )
+        raise ImageError(f"{path} ({data.size} bytes) holds no image that OpenCV can decode (PNG, JPEG, TIFF ...)")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
@@ -53,8 +51,7 @@ def check_image(image: ArrayLike, camera: Camera, name: str = "image") -> np.nda
     expected = (camera.height, camera.width, 3)
     if array.shape != expected or array.dtype != np.uint8:
         raise ImageError(
-            f"{name} must be RGB uint8 of shape {expected} to fit its camera, "
-            f"got {array.dtype} of shape {array.shape}"
+            f"{name} must be RGB uint8 of shape {expected} to fit its camera, got {array.dtype} of shape {array.shape}"
         )
     return array
 

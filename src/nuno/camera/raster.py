@@ -43,9 +43,7 @@ SUBPIXELS = 256
 _STEPS = wp.constant(1.0 / DEPTH_STEP)
 _FARTHEST = wp.constant(1.0e4)  # [m]; 1e9 steps fit 30 bits
 _SUBPIXELS = wp.constant(float(SUBPIXELS))
-_EDGE_ON = wp.constant(
-    0.3
-)  # cosine below which the sides of a thick triangle are drawn too: else they are hidden
+_EDGE_ON = wp.constant(0.3)  # cosine below which the sides of a thick triangle are drawn too: else they are hidden
 _FARTHEST_SUBPIXEL = wp.constant(2.0**29)  # products of two differences then stay below 2**61
 
 
@@ -100,9 +98,7 @@ def _owned(dx: wp.int64, dy: wp.int64) -> wp.int64:
 
 
 @wp.func
-def _fill(
-    a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]
-):
+def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
     """Draw one triangle that lies in front of the near plane (vertices in the camera's frame)."""
     sa = _project(a, v)
     sb = _project(b, v)
@@ -361,8 +357,7 @@ def draw(
         raise InvalidInputError(f"key images of {keys.shape[1:]} for a view of {(seen.height, seen.width)}")
     if positions.device != keys.device or faces.device != keys.device:
         raise InvalidInputError(
-            f"keys are on {keys.device}, "
-            f"positions on {positions.device}, faces on {faces.device}; use one device"
+            f"keys are on {keys.device}, positions on {positions.device}, faces on {faces.device}; use one device"
         )
     if not 0.0 <= thickness < np.inf:
         raise InvalidInputError(f"thickness must be at least 0 [m], got {thickness}")

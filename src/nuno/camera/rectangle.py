@@ -19,9 +19,7 @@ _LEAST = 0.2  # share of a side that must show an edge
 _SCATTER = 0.25  # [px] median scatter of an edge about its line that noise explains
 _AGREE = 1.0  # [px] how far an edge may be from the one that most others agree on
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
-_OUTWARD = np.array(
-    [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]
-)  # normal of the side after each corner
+_OUTWARD = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # normal of the side after each corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +126,7 @@ def _largest(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA]
     if areas.max() < 0.95 * areas.sum():
-        warnings.append(
-            f"of the mask's {count - 1} parts the largest, {areas.max() / areas.sum():.0%}, was used"
-        )
+        warnings.append(f"of the mask's {count - 1} parts the largest, {areas.max() / areas.sum():.0%}, was used")
     return labels == 1 + int(areas.argmax())
 
 
@@ -139,9 +135,7 @@ def _spanning(mask: np.ndarray, camera: Camera, height: float) -> _Pose:
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max(contours, key=len)[:, 0].astype(float)
     if len(outline) < 12:
-        raise EstimationError(
-            f"the mask's region has an outline of {len(outline)} pixels, too small for a rectangle"
-        )
+        raise EstimationError(f"the mask's region has an outline of {len(outline)} pixels, too small for a rectangle")
     ground = camera.back_project(outline, height)[:, :2]
     middle = ground.mean(axis=0)
     centre, size, angle = cv2.minAreaRect((ground - middle).astype(np.float32))
@@ -173,9 +167,7 @@ def _fit_to_edges(
         ground.append(points)
         weights.append(1.0 / np.maximum(metres, 1e-6))
         sides.append(np.full(len(edge), side))
-    fitted, residual = _least_squares(
-        pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights)
-    )
+    fitted, residual = _least_squares(pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights))
     return fitted, residual
 
 
@@ -186,23 +178,17 @@ def _refined(line: np.ndarray, normals: np.ndarray, rough: np.ndarray, fine: np.
     table. Where a pattern runs along the side, the image's edges jump between the cloth's and the pattern's.
     """
     offsets = [((edge - line) * normals).sum(axis=1) for edge in (rough, fine)]
-    middles = [
-        float(np.median(offset[np.isfinite(offset)])) for offset in offsets if np.isfinite(offset).any()
-    ]
+    middles = [float(np.median(offset[np.isfinite(offset)])) for offset in offsets if np.isfinite(offset).any()]
     if len(middles) < 2 or np.isfinite(offsets[1]).mean() < 0.5 or abs(middles[1] - middles[0]) > _AGREE:
         return rough
-    scatter = [
-        float(np.nanmedian(np.abs(offset - middle))) for offset, middle in zip(offsets, middles, strict=True)
-    ]
+    scatter = [float(np.nanmedian(np.abs(offset - middle))) for offset, middle in zip(offsets, middles, strict=True)]
     if scatter[1] > max(scatter[0], _SCATTER):
         return rough
     fine[np.abs(offsets[1] - middles[1]) > _AGREE] = np.nan
     return fine
 
 
-def _least_squares(
-    pose: _Pose, points: np.ndarray, sides: np.ndarray, weights: np.ndarray
-) -> tuple[_Pose, float]:
+def _least_squares(pose: _Pose, points: np.ndarray, sides: np.ndarray, weights: np.ndarray) -> tuple[_Pose, float]:
     """Gauss-Newton with Cauchy weights over points (k, 2) [m] of sides (k,), weights (k,) [px/m]."""
     centre, yaw, size = pose.centre.copy(), pose.yaw, pose.size.copy()
     for _ in range(12):
@@ -256,9 +242,7 @@ def _judge_shape(mask: np.ndarray, pose: _Pose, camera: Camera, height: float, w
         warnings.append(f"the cloth is not quite a rectangle: it shares {overlap:.0%} with the best one")
 
 
-def _labelled(
-    pose: _Pose, camera: Camera, height: float, residual: float, warnings: list[str]
-) -> ClothRectangle:
+def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warnings: list[str]) -> ClothRectangle:
     """Name the corners by the label rule."""
     corners = np.column_stack([pose.corners(), np.full(4, height)])
     pixels = camera.project(corners)

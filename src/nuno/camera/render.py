@@ -139,12 +139,8 @@ def _render(
         if seen.distorted and not body.is_dynamic:
             vertices, faces = _split(camera, vertices[0], faces)
             vertices = vertices[None]
-        points: wp.array = wp.array(
-            np.ascontiguousarray(vertices, dtype=np.float32), dtype=wp.vec3, device=device
-        )
-        triangles: wp.array = wp.array(
-            np.ascontiguousarray(faces, dtype=np.int32), dtype=wp.vec3i, device=device
-        )
+        points: wp.array = wp.array(np.ascontiguousarray(vertices, dtype=np.float32), dtype=wp.vec3, device=device)
+        triangles: wp.array = wp.array(np.ascontiguousarray(faces, dtype=np.int32), dtype=wp.vec3i, device=device)
         raster.draw(keys, points, triangles, seen, label, thickness=thickness)
 
     layer = raster.key_images(1, region, device, ids=wide)

@@ -19,9 +19,7 @@ _LIGHT = (0.12, 1.3)  # a lifted cloth shows from this to this share of the ligh
 _CERTAIN = 6.0  # [nats] no single pixel says more than this
 
 
-def segment_before(
-    image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None
-) -> np.ndarray:
+def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None) -> np.ndarray:
     """Find the cloth that lies flat on the table.
 
     The cloth is the largest region on the table's plane that does not look like the table around it. A first
@@ -80,11 +78,7 @@ def segment_after(
     before = check_image(before_image, camera, "the image before")
     mask = check_mask(before_mask, camera, "the mask before")
     hand = np.asarray(hand_position, dtype=float)
-    if (
-        hand.shape != (3,)
-        or not np.isfinite(hand).all()
-        or not (np.isfinite(hand_radius) and hand_radius >= 0)
-    ):
+    if hand.shape != (3,) or not np.isfinite(hand).all() or not (np.isfinite(hand_radius) and hand_radius >= 0):
         raise InvalidInputError(
             "the hand needs a position of three finite numbers and a radius from 0 up [m], "
             f"got {hand_position!r} and {hand_radius!r}"
@@ -94,9 +88,7 @@ def segment_after(
 
     reach = _sphere(camera, hand, _largest_length(mask, camera, table.height), step=4)
     if not reach.any():
-        raise ClothNotFoundError(
-            f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image"
-        )
+        raise ClothNotFoundError(f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image")
     background = compare(before, rgb, mask, _table_top(camera, table), reach)
     inside = shrink(mask, 3)
     colours, shares = palette(before[inside if inside.any() else mask].astype(np.float32), 6)
@@ -110,9 +102,7 @@ def segment_after(
     ratio[grip | ~reach] = -_CERTAIN
     likely, unlikely = (ratio > 2.0) & reach, (ratio < -2.0) & reach
     if likely.sum() < 20:
-        raise ClothNotFoundError(
-            "no cloth: nothing within reach of the hand has the colours of the cloth before"
-        )
+        raise ClothNotFoundError("no cloth: nothing within reach of the hand has the colours of the cloth before")
     if unlikely.sum() >= 20:
         guide = discriminant(background.view, likely, unlikely)
         ratio = guided_filter(ratio, guide, radius=3, epsilon=0.05)
@@ -131,11 +121,7 @@ def _check_hint(hint: ArrayLike | None, camera: Camera) -> np.ndarray | None:
     if values.size not in (2, 4) or not np.isfinite(values).all():
         raise InvalidInputError(f"a hint is a pixel (u, v) or a box (u0, v0, u1, v1), got {hint!r}")
     size = np.array([camera.width, camera.height] * (values.size // 2))
-    if (
-        (values < -0.5).any()
-        or (values > size - 0.5).any()
-        or (values.size == 4 and (values[2:] <= values[:2]).any())
-    ):
+    if (values < -0.5).any() or (values > size - 0.5).any() or (values.size == 4 and (values[2:] <= values[:2]).any()):
         raise InvalidInputError(
             f"the hint {values.tolist()} does not lie in the {camera.width} x {camera.height} image"
         )
@@ -153,9 +139,7 @@ def _largest_length(mask: np.ndarray, camera: Camera, height: float) -> float:
 def _table_top(camera: Camera, table: Table) -> np.ndarray:
     """(h, w) bool, the table's top, or its whole plane where its extents are not known; to about 2 px."""
     xy = plane_coordinates(camera, table.height, step=4)
-    return _enlarge(
-        np.isfinite(xy[..., 0]) if table.half_extents is None else table_margin(table, xy) > 0, camera
-    )
+    return _enlarge(np.isfinite(xy[..., 0]) if table.half_extents is None else table_margin(table, xy) > 0, camera)
 
 
 def _sphere(camera: Camera, centre: np.ndarray, radius: float, step: int = 1) -> np.ndarray:

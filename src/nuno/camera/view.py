@@ -54,9 +54,7 @@ class Region:
             or self.x0 + self.width > camera.width
             or self.y0 + self.height > camera.height
         ):
-            raise InvalidInputError(
-                f"{self} does not lie inside an image of {camera.width} x {camera.height} px"
-            )
+            raise InvalidInputError(f"{self} does not lie inside an image of {camera.width} x {camera.height} px")
 
 
 @wp.struct

@@ -126,7 +126,19 @@ def mesh_gap(mesh: wp.uint64, kind: int, point: wp.vec3, before: wp.vec3, reach:
 
 
 @wp.func
-def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: float, y: float, z: float, bx: float, by: float, bz: float, reach: float):  # noqa: E501
+def gap_mesh(
+    shapes: Shapes,
+    s: int,
+    group: int,
+    worlds: int,
+    x: float,
+    y: float,
+    z: float,
+    bx: float,
+    by: float,
+    bz: float,
+    reach: float,
+):
     """`mesh_gap` of one world."""
     mesh = shapes.mesh[s + group * shapes.mesh_stride]
     r = mesh_gap(mesh, shapes.kind[s], wp.vec3(x, y, z), wp.vec3(bx, by, bz), reach)
@@ -134,7 +146,19 @@ def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: float, y: float
 
 
 @wp.func
-def gap_mesh(shapes: Shapes, s: int, group: int, worlds: int, x: lane, y: lane, z: lane, bx: lane, by: lane, bz: lane, reach: float):  # noqa: E501
+def gap_mesh(
+    shapes: Shapes,
+    s: int,
+    group: int,
+    worlds: int,
+    x: lane,
+    y: lane,
+    z: lane,
+    bx: lane,
+    by: lane,
+    bz: lane,
+    reach: float,
+):
     gap = lane()
     nx = lane()
     ny = lane()

@@ -40,7 +40,9 @@ class Elements:
         return len(self.vertices)
 
 
-def _elements(vertices: np.ndarray, scale: Any, axis: Any, faces: np.ndarray, colours: np.ndarray, **extra: np.ndarray) -> Elements:
+def _elements(
+    vertices: np.ndarray, scale: Any, axis: Any, faces: np.ndarray, colours: np.ndarray, **extra: np.ndarray
+) -> Elements:
     count = len(vertices)
     order, offsets = by_colour(colours)
     return Elements(

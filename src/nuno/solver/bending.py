@@ -76,7 +76,21 @@ def weighed(x: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, k
 
 
 @wp.func
-def bend_hinge(t: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any, rest: Any, alpha: Any, damped: int, gamma: Any):  # noqa: E501
+def bend_hinge(
+    t: Any,
+    a: Any,
+    b: Any,
+    c: Any,
+    d: Any,
+    ka: Any,
+    kb: Any,
+    kc: Any,
+    kd: Any,
+    rest: Any,
+    alpha: Any,
+    damped: int,
+    gamma: Any,
+):
     """Four vertices: c = sum k_i x_i - rest n, n the unit normal of the hinge's two triangles.
 
     ``rest`` is zero for all that is flat at rest, and for the twist of a grid cell.

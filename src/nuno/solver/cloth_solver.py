@@ -199,10 +199,14 @@ class ClothSolver:
                     v = u + count if per_element else u + 1
                     _, shear_each = table(("shear_stiffness",))
                     w = np.arange(count) if shear_each else np.zeros(count, int)
-                    both = [np.concatenate([c[:, elements.faces[:, 0]] for c in stretch], axis=1)] if per_element else []
+                    both = (
+                        [np.concatenate([c[:, elements.faces[:, 0]] for c in stretch], axis=1)] if per_element else []
+                    )
                     if both:
                         state.stretch_soft, size.stretch_soft = self._put(1.0 / both[0]), both[0].shape[1]
-                    topo.triangle_soft = wp.array(np.stack([u, v, w], 1).astype(np.int32), dtype=wp.vec3i, device=self.device)
+                    topo.triangle_soft = wp.array(
+                        np.stack([u, v, w], 1).astype(np.int32), dtype=wp.vec3i, device=self.device
+                    )
                 else:
                     soft = np.ascontiguousarray(soft[string_yarns(topology.edges)[0]])
                     topo.edge_soft = wp.array(soft, dtype=int, device=self.device)
@@ -225,7 +229,11 @@ class ClothSolver:
         mass = self._vertex_mass(density) if per_face else density[:, :1] * topology.area[None]
         self._inverse_mass = (1.0 / mass).astype(np.float32)
         self.mass = mass
-        own = values["friction"] if friction is None else np.broadcast_to(np.asarray(friction, float).reshape(-1, 1), (worlds, 1))
+        own = (
+            values["friction"]
+            if friction is None
+            else np.broadcast_to(np.asarray(friction, float).reshape(-1, 1), (worlds, 1))
+        )
         # thicker than half a cell, layers of one fold would push their own neighbours apart
         thickness = np.minimum(values["thickness"], 0.5 * topology.cell_size)
         self._scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
@@ -233,7 +241,9 @@ class ClothSolver:
         self._damped = bool(np.any(values["damping"] > 0))
         self._allocate()
 
-    def _soft_values(self, elements: Elements, columns: list[np.ndarray], per_element: bool) -> tuple[np.ndarray, int, np.ndarray]:
+    def _soft_values(
+        self, elements: Elements, columns: list[np.ndarray], per_element: bool
+    ) -> tuple[np.ndarray, int, np.ndarray]:
         """Compliances (worlds, k), how many, and which one each element takes."""
         if not per_element:
             return 1.0 / np.concatenate([c[:, :1] for c in columns], axis=1), len(columns), elements.axis
@@ -242,7 +252,9 @@ class ClothSolver:
         mean = full[:, elements.axis[:, None], elements.faces].mean(axis=2)
         return 1.0 / mean.reshape(len(mean), count), count, np.arange(count)
 
-    def _soft(self, elements: Elements, columns: list[np.ndarray], per_element: bool) -> tuple[wp.array, int, np.ndarray]:
+    def _soft(
+        self, elements: Elements, columns: list[np.ndarray], per_element: bool
+    ) -> tuple[wp.array, int, np.ndarray]:
         values, count, index = self._soft_values(elements, columns, per_element)
         values = np.broadcast_to(values, (self.world_count, values.shape[1]))
         return self._put(values), count, index.astype(np.int32)

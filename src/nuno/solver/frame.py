@@ -176,7 +176,17 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
 
 
 @wp.func
-def run_share(s: Any, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, tid: int, threads: int):  # noqa: E501
+def run_share(
+    s: Any,
+    topo: Topology,
+    size: Sizes,
+    run: Settings,
+    shapes: Shapes,
+    first: int,
+    substeps: int,
+    tid: int,
+    threads: int,
+):
     """What thread ``tid`` does: its share of the world, or of the sixteen worlds, that is its block's."""
     t = view(s, first + tid / threads, topo.particles, size)
     advance(t, topo, run, shapes, substeps, tid % threads, threads)
@@ -186,12 +196,16 @@ def run_share(s: Any, topo: Topology, size: Sizes, run: Settings, shapes: Shapes
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_worlds")
-def run_worlds(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
+def run_worlds(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int
+):
     """Every world by itself: one thread on the CPU, a block of ``threads`` threads on CUDA."""
     run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.run_lanes")
-def run_lanes(s: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int):  # noqa: E501
+def run_lanes(
+    s: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int
+):
     """Sixteen worlds at once, by one thread on the CPU."""
     run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)

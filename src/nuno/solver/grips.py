@@ -4,8 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, mul, sub  # noqa: F401
-from nuno.solver.lanes import clipped, choose, fill, gather, known, largest, over, place, times
+from nuno.solver.lanes import add, choose, clipped, fill, gather, known, largest, mul, over, place, sub, times  # noqa: F401
 from nuno.solver.state import CLOCK, Settings
 
 

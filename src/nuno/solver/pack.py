@@ -9,7 +9,14 @@ from nuno.solver.state import CLOCK, NOTES, ORIGIN, SCALARS
 
 
 @wp.kernel(enable_backward=False)
-def pack(x: wp.array(dtype=Any), y: wp.array(dtype=Any), z: wp.array(dtype=Any), scalars: wp.array(dtype=Any), n: int, out: wp.array2d(dtype=wp.vec3)):
+def pack(
+    x: wp.array(dtype=Any),
+    y: wp.array(dtype=Any),
+    z: wp.array(dtype=Any),
+    scalars: wp.array(dtype=Any),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
     """One world after the other, (worlds, n) of vec3."""
     world, i = wp.tid()
     k = world * n + i
@@ -18,7 +25,14 @@ def pack(x: wp.array(dtype=Any), y: wp.array(dtype=Any), z: wp.array(dtype=Any),
 
 
 @wp.kernel(enable_backward=False)
-def pack_lanes(x: wp.array(dtype=lane), y: wp.array(dtype=lane), z: wp.array(dtype=lane), scalars: wp.array(dtype=lane), n: int, out: wp.array2d(dtype=wp.vec3)):  # noqa: E501
+def pack_lanes(
+    x: wp.array(dtype=lane),
+    y: wp.array(dtype=lane),
+    z: wp.array(dtype=lane),
+    scalars: wp.array(dtype=lane),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
     """The same out of lanes."""
     group, i = wp.tid()
     k = group * n + i
@@ -42,7 +56,17 @@ def zero_clock(notes: wp.array(dtype=Any), stride: int, entry: int):
     notes[i] = notes[i] * 0.0
 
 
-wp.overload(pack, [wp.array(dtype=float), wp.array(dtype=float), wp.array(dtype=float), wp.array(dtype=float), int, wp.array2d(dtype=wp.vec3)])
+wp.overload(
+    pack,
+    [
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        int,
+        wp.array2d(dtype=wp.vec3),
+    ],
+)
 wp.overload(zero_clock, [wp.array(dtype=float), int, int])
 wp.overload(zero_clock, [wp.array(dtype=lane), int, int])
 

@@ -80,7 +80,9 @@ def run_blocks(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_blocks_shared")
-def run_blocks_shared(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int):  # noqa: E501
+def run_blocks_shared(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
     """The same with x, y, z and w in shared memory for as long as the launch takes."""
     tid = wp.tid()
     n = topo.particles

@@ -24,7 +24,15 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
     numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
     numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight")
-    integers = ("grip_corner", "vertex_triangle", "edge_edge", "pair_count", "touch_triangle", "touch_edge", "touch_count")
+    integers = (
+        "grip_corner",
+        "vertex_triangle",
+        "edge_edge",
+        "pair_count",
+        "touch_triangle",
+        "touch_edge",
+        "touch_count",
+    )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
     return fields | {"moved": wp.array(dtype=int), "near": wp.array(dtype=int), "group": int, "worlds": int}
