@@ -21,7 +21,7 @@ import warp as wp
 from generated_cases import generate
 from tqdm import tqdm
 
-from nuno import World, box, estimate_pick, plane, read_case, sheet
+from nuno import NunoError, World, box, estimate_pick, plane, read_case, sheet
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
 from nuno.camera.table import Table
@@ -94,11 +94,16 @@ def generated(count: int, seed: int, device: str, limit: float) -> list[dict[str
             made, seed = generate(1, 2, seed, device), seed + 1
             continue
         case = made.pop(0)
-        result = estimate_pick(
-            None, None, camera=case.camera, table_height=case.table.height, hand=case.hand,
-            table_half_extents=case.table.half_extents, table_centre=case.table.centre,
-            before_mask=case.mask_before, after_mask=case.mask_after, device=device, progress=False,
-        )  # fmt: skip
+        try:
+            result = estimate_pick(
+                None, None, camera=case.camera, table_height=case.table.height, hand=case.hand,
+                table_half_extents=case.table.half_extents, table_centre=case.table.centre,
+                before_mask=case.mask_before, after_mask=case.mask_after, device=device, progress=False,
+            )  # fmt: skip
+        except NunoError as error:  # no answer is a wrong answer
+            rows.append({"case": f"seed {seed - 1}", "true": list(case.true_ij), "error": str(error), "steps": 5})
+            rows[-1] |= {"distance": 5.0, "seconds": 0.0, "confidence": 0.0}
+            continue
         rows.append(row(f"seed {seed - 1}", result, case.true_ij) | {"material": case.material})
         bar.update()
     return rows

@@ -80,7 +80,7 @@ class _Pose:
         return self.centre + (_CORNERS * self.size) @ self.axes()
 
 
-def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_height: float) -> ClothRectangle:
+def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plane_height: float) -> ClothRectangle:
     """Fit a rectangle to a cloth that lies flat on a horizontal plane.
 
     A first rectangle spans the mask's outline, taken back to the plane. Then the edge is measured along the
@@ -90,7 +90,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_heigh
 
     Args:
         mask: (h, w) bool, the cloth.
-        image: (h, w, 3) uint8 RGB.
+        image: (h, w, 3) uint8 RGB; None where only the mask is known, whose edge then counts.
         camera: The camera that took it.
         plane_height: z of the cloth's middle surface [m]: the table's height and half of the cloth's
             thickness.
@@ -101,7 +101,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_heigh
         EstimationError: the region is no rectangle on the plane, or one of its sides is outside of the image.
     """
     mask = check_mask(mask, camera)
-    rgb = check_image(image, camera)
+    rgb = None if image is None else check_image(image, camera)
     if not mask.any():
         raise ClothNotFoundError("the mask is empty, so there is no cloth to measure")
     warnings: list[str] = []
@@ -114,9 +114,10 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike, camera: Camera, plane_heigh
     if cut:
         warnings.append(cut)
     _judge_shape(mask, pose, camera, plane_height, warnings)
-    soft_image = cv2.GaussianBlur(rgb.astype(np.float32), (0, 0), 0.6)
-    for _ in range(2):
-        pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
+    if rgb is not None:
+        soft_image = cv2.GaussianBlur(rgb.astype(np.float32), (0, 0), 0.6)
+        for _ in range(2):
+            pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
     if residual > 1.5:
         warnings.append(f"the cloth's sides are not straight: {residual:.1f} px off the rectangle on average")
     return _labelled(pose, camera, plane_height, residual, warnings)
@@ -132,6 +133,9 @@ def _largest(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
 
 def _spanning(mask: np.ndarray, camera: Camera, height: float) -> _Pose:
     """The smallest rectangle on the plane around the mask."""
+    # smoothed first: the spikes of a rough mask would hold the rectangle off its sides
+    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 3.0) >= 0.5
+    mask = smooth if smooth.any() else mask
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = max(contours, key=len)[:, 0].astype(float)
     if len(outline) < 12:

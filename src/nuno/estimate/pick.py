@@ -129,10 +129,7 @@ def estimate_pick(
         mask_before = segment_before(image_before, camera, table, hint=hint)
     if rectangle is None:
         assert mask_before is not None
-        grey = (
-            image_before if image_before is not None else np.repeat(mask_before[..., None] * np.uint8(255), 3, axis=2)
-        )
-        rectangle = fit_rectangle(mask_before, grey, camera, table.height + rest_height)
+        rectangle = fit_rectangle(mask_before, image_before, camera, table.height + rest_height)
     if after_mask is None:
         if image_after is None or image_before is None or mask_before is None:
             raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
