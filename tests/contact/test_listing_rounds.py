@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 
 import nuno
-from nuno.contact import pair_lists
+from nuno.contact import nearness, pair_lists, rounds
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.cloth_solver import ClothSolver
 from nuno.solver.state import THICKNESS, Settings, Sizes, StateFloat, Topology, view
@@ -21,10 +21,10 @@ def listing(s: StateFloat, topo: Topology, size: Sizes, run: Settings, phase: in
     far = t.scalars[THICKNESS] + 1.01 * run.margin
     far2 = far * far
     if phase == BOUND:
-        pair_lists.middles(t, topo, thread, threads)
-        pair_lists.bound_blocks(t, topo, thread, threads)
+        nearness.middles(t, topo, thread, threads)
+        nearness.bound_blocks(t, topo, thread, threads)
     elif phase == GROUPS:
-        pair_lists.bound_groups(t, topo, thread, threads)
+        nearness.bound_groups(t, topo, thread, threads)
     elif phase == ALONE:
         pair_lists.find_pairs(t, topo, run.margin, thread, threads)
     elif phase == BLOCKS:
@@ -35,17 +35,17 @@ def listing(s: StateFloat, topo: Topology, size: Sizes, run: Settings, phase: in
                     gap = wp.min(gap, t.bounds[6 * b + 3 + c] - t.bounds[6 * a + c] + far)
                     gap = wp.min(gap, t.bounds[6 * a + 3 + c] - t.bounds[6 * b + c] + far)
                 if gap > 0.0:
-                    if pair_lists.put_off(t, a, b, threads) == 0:
+                    if rounds.put_off(t, a, b, threads) == 0:
                         pair_lists.find_vertex_triangle(t, topo, a, b, far, far2)
                         if a != b:
                             pair_lists.find_vertex_triangle(t, topo, b, a, far, far2)
                         pair_lists.find_edge_edge(t, topo, a, b, far, far2)
         pair_lists.find_creases(t, topo, far2, thread, threads)
     elif phase == SUSPECTS:
-        pair_lists.suspect_vertices(t, topo, far, far2, thread, threads)
-        pair_lists.suspect_edges(t, topo, far, far2, thread, threads)
+        rounds.suspect_vertices(t, topo, far, far2, thread, threads)
+        rounds.suspect_edges(t, topo, far, far2, thread, threads)
     else:
-        pair_lists.examine(t, topo, far2, thread, threads)
+        rounds.examine(t, topo, far2, thread, threads)
 
 
 def listed(cloth, positions, phases, threads):

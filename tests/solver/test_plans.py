@@ -8,10 +8,11 @@ import nuno
 from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
 from nuno.solver.bending import bend_hinge, bend_line
-from nuno.solver.cloth_solver import ClothSolver, default_substeps
+from nuno.solver.cloth_solver import ClothSolver
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.membrane import shear_cell, stretch_triangle
 from nuno.solver.state import StateFloat, StateLanes
+from nuno.solver.substeps import default_substeps
 
 CELLS = (13, 9)  # no multiple of a vector's length, so that every group has an end
 

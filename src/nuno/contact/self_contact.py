@@ -10,7 +10,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.pair_lists import closest_on_edges, swept
+from nuno.contact.nearness import closest_on_edges
+from nuno.contact.pair_lists import swept
 from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     add,
     anywhere,

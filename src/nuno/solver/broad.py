@@ -11,19 +11,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.pair_lists import (
-    FORGET,
-    GROUP,
-    append,
-    bound_blocks,
-    bound_groups,
-    find_edge_edge,
-    find_vertex_triangle,
-    measure_span,
-    middles,
-    near_edges,
-    swept,
-)
+from nuno.contact.nearness import GROUP, append, bound_blocks, bound_groups, measure_span, middles, near_edges
+from nuno.contact.pair_lists import FORGET, find_edge_edge, find_vertex_triangle, swept
 from nuno.solver.state import LISTINGS, THICKNESS, TRAVEL, Settings, Sizes, StateFloat, Topology, view
 
 REACH = 16

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.contact.pair_lists import GROUP
-from nuno.scene.cloth import ClothTopology, Elements
-from nuno.scene.yarns import string_yarns
+from nuno.contact.nearness import GROUP
+from nuno.scene.cloth import ClothTopology
+from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.frame import run_lanes, run_worlds
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.large import CELLS, HINGES, LINES, TRIANGLES, YARNS, LargePlan
@@ -31,6 +31,8 @@ from nuno.solver.state import (
     StateLanes,
     Topology,
 )
+from nuno.solver.substeps import default_substeps
+from nuno.solver.upload import upload
 from nuno.solver.wide import run_wide, widen_topology
 
 if TYPE_CHECKING:
@@ -42,12 +44,6 @@ BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
-SAG, MESH_SAG = 0.01, 0.0025
-"""Strain scale 2 g L dt^2 / h^2 that the default number of substeps allows a sheet and a cloth mesh."""
-BENDING_STEP = 1.8
-"""The default number of substeps keeps B dt^2 / (rho h^4) at or under one over this."""
-FEWEST, MOST_SUBSTEPS = 10, 240
-"""Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
 
 _threads: ThreadPoolExecutor | None = None
 
@@ -58,33 +54,6 @@ def _pool() -> ThreadPoolExecutor:
     if _threads is None:
         _threads = ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="nuno-lanes")
     return _threads
-
-
-def default_substeps(
-    topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0
-) -> int:
-    """Substeps a frame from the cell size h and the cloth's extent L [m], its density rho and rigidity B.
-
-    In-plane, one pass a substep leaves a hanging cloth strains of the order 2 g L dt^2 / h^2. Held at ``SAG``, the 99th
-    percentile of the strain of sheets of 16 to 64 cells a side (0.3 and 1 m, 300 to 1000 N/m) that hang by two
-    corners is 0 to 0.2 % of strain above its value at 160 substeps or more, which itself is 0.4 to 1.8 %; at 5000 N/m
-    it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
-    the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip
-    then hangs within 10 % of its rigidity; one so stiff that this asks for more than `MOST_SUBSTEPS` comes out softer.
-
-    Args:
-        topology: The cloth's elements.
-        gravity: Size of gravity [m/s2].
-        frame: Length of a frame [s].
-        density: Smallest area density [kg/m2].
-        rigidity: Largest bending rigidity [N m].
-    """
-    h = topology.cell_size
-    allowed = SAG if len(topology.edges) else MESH_SAG
-    step = h * math.sqrt(allowed / (2.0 * max(gravity, 1.0) * topology.extent))
-    if rigidity > 0.0:
-        step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
-    return min(max(FEWEST, math.ceil(frame / step)), MOST_SUBSTEPS)
 
 
 class ClothSolver:
@@ -185,50 +154,16 @@ class ClothSolver:
         topo.particles, topo.blocks = n, topology.blocks.count
         self._size, self._state, self._topology = size, state, topo
 
-        def table(which: tuple[str, ...]) -> tuple[list[np.ndarray], bool]:
-            columns = [np.maximum(np.asarray(values[name], dtype=np.float64), 1e-12) for name in which]
-            return columns, any(column.shape[1] > 1 for column in columns)
-
-        stretch, per_element = table(("stretch_stiffness_warp", "stretch_stiffness_weft"))
-        for elements, field in ((topology.edges, "edge_soft"), (topology.triangles, "triangle_soft")):
-            if len(elements):
-                state.stretch_soft, size.stretch_soft, soft = self._soft(elements, stretch, per_element)
-                if field == "triangle_soft":
-                    count = len(elements)
-                    u = np.arange(count) if per_element else np.zeros(count, int)
-                    v = u + count if per_element else u + 1
-                    _, shear_each = table(("shear_stiffness",))
-                    w = np.arange(count) if shear_each else np.zeros(count, int)
-                    both = (
-                        [np.concatenate([c[:, elements.faces[:, 0]] for c in stretch], axis=1)] if per_element else []
-                    )
-                    if both:
-                        state.stretch_soft, size.stretch_soft = self._put(1.0 / both[0]), both[0].shape[1]
-                    topo.triangle_soft = wp.array(
-                        np.stack([u, v, w], 1).astype(np.int32), dtype=wp.vec3i, device=self.device
-                    )
-                else:
-                    soft = np.ascontiguousarray(soft[string_yarns(topology.edges)[0]])
-                    topo.edge_soft = wp.array(soft, dtype=int, device=self.device)
-        shear, per_element = table(("shear_stiffness",))
-        elements = topology.cells if len(topology.cells) else topology.triangles
-        state.shear_soft, size.shear_soft, soft = self._soft(elements, shear, per_element)
-        topo.cell_soft = wp.array(soft if len(topology.cells) else soft[:0], dtype=int, device=self.device)
-        bend, per_element = table(("bending_rigidity_warp", "bending_rigidity_weft"))
-        both = np.sqrt(bend[0] * bend[1])
-        bend = [bend[0], bend[1], both]
-        parts, sizes = [], 0
-        for elements, field in ((topology.lines, "line_soft"), (topology.hinges, "hinge_soft")):
-            soft_values, count, soft = self._soft_values(elements, bend, per_element)
-            setattr(topo, field, wp.array((soft + sizes).astype(np.int32), dtype=int, device=self.device))
-            parts.append(soft_values)
-            sizes += count
-        state.bend_soft, size.bend_soft = self._put(np.concatenate(parts, axis=1)), sizes
-        density = np.asarray(values["area_density"], dtype=float)
-        per_face = density.shape[1] > 1
-        mass = self._vertex_mass(density) if per_face else density[:, :1] * topology.area[None]
-        self._inverse_mass = (1.0 / mass).astype(np.float32)
-        self.mass = mass
+        soft = compliances(topology, values)
+        for kind in ("stretch", "shear", "bend"):
+            table = getattr(soft, kind)
+            setattr(state, f"{kind}_soft", self._put(table))
+            setattr(size, f"{kind}_soft", table.shape[1])
+        for kind in ("edge", "cell", "line", "hinge"):
+            setattr(topo, f"{kind}_soft", wp.array(getattr(soft, kind), dtype=int, device=self.device))
+        topo.triangle_soft = wp.array(soft.triangle, dtype=wp.vec3i, device=self.device)
+        self.mass = vertex_masses(topology, values["area_density"])
+        self._inverse_mass = (1.0 / self.mass).astype(np.float32)
         own = (
             values["friction"]
             if friction is None
@@ -240,37 +175,6 @@ class ClothSolver:
         self._scalars[:, :ORIGIN] = np.concatenate([values["air_drag"], own, values["damping"], thickness], axis=1)
         self._damped = bool(np.any(values["damping"] > 0))
         self._allocate()
-
-    def _soft_values(
-        self, elements: Elements, columns: list[np.ndarray], per_element: bool
-    ) -> tuple[np.ndarray, int, np.ndarray]:
-        """Compliances (worlds, k), how many, and which one each element takes."""
-        if not per_element:
-            return 1.0 / np.concatenate([c[:, :1] for c in columns], axis=1), len(columns), elements.axis
-        count = len(elements)
-        full = np.stack([np.broadcast_to(c, (len(c), self.topology.element_count)) for c in columns], axis=1)
-        mean = full[:, elements.axis[:, None], elements.faces].mean(axis=2)
-        return 1.0 / mean.reshape(len(mean), count), count, np.arange(count)
-
-    def _soft(
-        self, elements: Elements, columns: list[np.ndarray], per_element: bool
-    ) -> tuple[wp.array, int, np.ndarray]:
-        values, count, index = self._soft_values(elements, columns, per_element)
-        values = np.broadcast_to(values, (self.world_count, values.shape[1]))
-        return self._put(values), count, index.astype(np.int32)
-
-    def _vertex_mass(self, density: np.ndarray) -> np.ndarray:
-        """(worlds, n) masses [kg] where the area density is given per element."""
-        topology = self.topology
-        per_face = len(topology.faces) // topology.element_count
-        x = topology.rest[topology.faces]
-        areas = 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
-        face_mass = np.repeat(density, per_face, axis=1) * areas / 3
-        mass = np.zeros((self.world_count, self.particle_count))
-        shares = np.broadcast_to(face_mass, (self.world_count, len(areas))).T
-        for k in range(3):
-            np.add.at(mass.T, topology.faces[:, k], shares)
-        return mass
 
     @property
     def _whole(self) -> int:
@@ -586,40 +490,3 @@ class ClothSolver:
         from nuno.solver.pack import reset_clock
 
         reset_clock(self._state, self.group_count, self.lanes, self.device)
-
-
-def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
-    """The topology's arrays on a device, made once."""
-    found = topology.device_arrays.get(device)
-    if found is not None:
-        return found
-
-    def put(values: np.ndarray, dtype: Any) -> wp.array:
-        kind = np.int32 if dtype in (int, wp.vec2i, wp.vec3i, wp.vec4i) else np.float32
-        return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)
-
-    t, b = topology, topology.blocks
-    order, starts, kinds = string_yarns(t.edges)
-    made = dict(
-        edge=put(t.edges.vertices[order], wp.vec2i), edge_rest=put(t.edges.extra["rest"][order], float),
-        edge_scale=put(t.edges.scale[order], float), edge_soft=put(t.edges.axis[order], int),
-        yarn=put(starts, int), yarn_kind=put(kinds, int),
-        cell=put(t.cells.vertices, wp.vec4i), cell_scale=put(t.cells.extra["quarter"], float),
-        cell_colour=put(t.cells.offsets, int), cell_soft=put(t.cells.axis, int),
-        triangle=put(t.triangles.vertices, wp.vec3i), triangle_u=put(t.triangles.extra["u"], wp.vec3),
-        triangle_v=put(t.triangles.extra["v"], wp.vec3), triangle_area=put(t.triangles.extra["area"], float),
-        triangle_colour=put(t.triangles.offsets, int),
-        triangle_soft=put(np.zeros((len(t.triangles), 3)), wp.vec3i),
-        line=put(t.lines.vertices, wp.vec3i), line_scale=put(t.lines.scale, float),
-        line_colour=put(t.lines.offsets, int), line_soft=put(t.lines.axis, int),
-        hinge=put(t.hinges.vertices, wp.vec4i), hinge_weight=put(t.hinges.extra["weight"], wp.vec4),
-        hinge_rest=put(t.hinges.extra["rest"], float), hinge_scale=put(t.hinges.scale, float),
-        hinge_colour=put(t.hinges.offsets, int), hinge_soft=put(t.hinges.axis, int),
-        block_vertex=put(b.vertex, int), block_vertex_start=put(b.vertex_start, int),
-        block_face=put(b.face, wp.vec3i), block_face_start=put(b.face_start, int),
-        block_edge=put(b.edge, wp.vec2i), block_edge_start=put(b.edge_start, int),
-        block_corner=put(b.corner, int), block_corner_start=put(b.corner_start, int),
-        crease=put(b.crease, wp.vec4i),
-    )  # fmt: skip
-    topology.device_arrays[device] = made
-    return made

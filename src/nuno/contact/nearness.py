@@ -1,0 +1,310 @@
+"""What is near: lists of candidate pairs, bounds of blocks and of displacements, and the tests of distance.
+
+A pair that a test lets through although it is not near costs time only, for solving it changes nothing.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+    add,
+    fill,
+    gather,
+    lane,
+    lane_int,
+    least,
+    most,
+    mul,
+    over,
+    root,
+    sub,
+    times,
+)
+from nuno.solver.state import Topology
+
+GROUP = 8
+"""Consecutive blocks that are passed over together where their common box is far."""
+
+
+@wp.func
+def append(
+    hit: float, count: wp.array(dtype=int), which: int, pairs: wp.array(dtype=int), a: int, b: int, c: int, d: int
+):
+    """Add a candidate to the list where ``hit`` is positive; what does not fit is counted but not kept."""
+    if hit > 0.0:
+        k = wp.atomic_add(count, which, 1)
+        if 4 * k + 3 < pairs.shape[0]:
+            pairs[4 * k] = a
+            pairs[4 * k + 1] = b
+            pairs[4 * k + 2] = c
+            pairs[4 * k + 3] = d
+
+
+@wp.func_native("""
+unsigned mask = 0;
+for (int l = 0; l < 16; ++l) mask |= unsigned(hit[l] > 0.f) << l;
+while (mask) {
+    int l = __builtin_ctz(mask);
+    mask &= mask - 1;
+    int k = count.data[which][l]++;
+    if (4 * k + 3 < pairs.shape[0]) {
+        pairs.data[4 * k][l] = a;
+        pairs.data[4 * k + 1][l] = b;
+        pairs.data[4 * k + 2][l] = c;
+        pairs.data[4 * k + 3][l] = d;
+    }
+}
+""")
+def append(
+    hit: lane,
+    count: wp.array(dtype=lane_int),
+    which: int,
+    pairs: wp.array(dtype=lane_int),
+    a: int,
+    b: int,
+    c: int,
+    d: int,
+): ...
+
+
+@wp.func_native("""
+for (int l = 0; l < 16; ++l) {
+    if (hit[l] > 0.f) {
+        int k = count.data[which][l]++;
+        pairs.data[4 * k][l] = a[l];
+        pairs.data[4 * k + 1][l] = b[l];
+        pairs.data[4 * k + 2][l] = c[l];
+        pairs.data[4 * k + 3][l] = d[l];
+    }
+}
+""")
+def append(
+    hit: lane,
+    count: wp.array(dtype=lane_int),
+    which: int,
+    pairs: wp.array(dtype=lane_int),
+    a: lane_int,
+    b: lane_int,
+    c: lane_int,
+    d: lane_int,
+): ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+if (threads % 32 == 0)
+    for (int k = 16; k > 0; k /= 2) value = fmaxf(value, __shfl_xor_sync(0xffffffffu, value, k));
+#endif
+return value;
+""")
+def most_of_warp(value: float, threads: int) -> float:
+    """The largest value of the 32 threads that run together, all of which must come here."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return threads % 32 != 0 || thread % 32 == 0;
+#else
+return true;
+#endif
+""")
+def leads_warp(thread: int, threads: int) -> bool:
+    """Whether the thread speaks for those that `most_of_warp` has looked at."""
+    ...
+
+
+@wp.func
+def raise_to(values: wp.array(dtype=float), k: int, value: float, thread: int, threads: int):
+    """Element k becomes the largest ``value`` of all threads where that is larger."""
+    if threads > 1:
+        # an atomic for each thread would have all of them queue up
+        high = most_of_warp(value, threads)
+        if leads_warp(thread, threads):
+            wp.atomic_max(values, k, high)
+    else:
+        values[k] = most(values[k], value)
+
+
+@wp.func
+def raise_to(values: wp.array(dtype=Any), k: int, value: Any, thread: int, threads: int):
+    values[k] = most(values[k], value)
+
+
+@wp.func
+def measure_span(t: Any, n: int, thread: int, threads: int):
+    """The box, around the origin, of all displacements since the list was made: largest, and largest negative."""
+    hx = fill(t.x[0], -1.0e30)
+    hy = hx
+    hz = hx
+    lx = hx
+    ly = hx
+    lz = hx
+    for i in range(thread, n, threads):
+        dx = t.x[i] - t.listed[i]
+        dy = t.y[i] - t.listed[n + i]
+        dz = t.z[i] - t.listed[2 * n + i]
+        hx = most(hx, dx)
+        hy = most(hy, dy)
+        hz = most(hz, dz)
+        lx = most(lx, -dx)
+        ly = most(ly, -dy)
+        lz = most(lz, -dz)
+    raise_to(t.listed, 3 * n, hx, thread, threads)
+    raise_to(t.listed, 3 * n + 1, hy, thread, threads)
+    raise_to(t.listed, 3 * n + 2, hz, thread, threads)
+    raise_to(t.listed, 3 * n + 3, lx, thread, threads)
+    raise_to(t.listed, 3 * n + 4, ly, thread, threads)
+    raise_to(t.listed, 3 * n + 5, lz, thread, threads)
+
+
+@wp.func
+def middles(t: Any, topo: Topology, thread: int, threads: int):
+    """Centre and radius of each triangle and each edge."""
+    third = 1.0 / 3.0
+    m = topo.block_face.shape[0]
+    for j in range(thread, m, threads):
+        f = topo.block_face[j]
+        mx = (t.x[f[0]] + t.x[f[1]] + t.x[f[2]]) * third
+        my = (t.y[f[0]] + t.y[f[1]] + t.y[f[2]]) * third
+        mz = (t.z[f[0]] + t.z[f[1]] + t.z[f[2]]) * third
+        r = fill(mx, 0.0)
+        for k in range(3):
+            i = f[k]
+            dx = t.x[i] - mx
+            dy = t.y[i] - my
+            dz = t.z[i] - mz
+            r = most(r, times(dx, dx) + times(dy, dy) + times(dz, dz))
+        t.middle[4 * j] = mx
+        t.middle[4 * j + 1] = my
+        t.middle[4 * j + 2] = mz
+        t.middle[4 * j + 3] = root(r)
+    for j in range(thread, topo.block_edge.shape[0], threads):
+        e = topo.block_edge[j]
+        dx = (t.x[e[1]] - t.x[e[0]]) * 0.5
+        dy = (t.y[e[1]] - t.y[e[0]]) * 0.5
+        dz = (t.z[e[1]] - t.z[e[0]]) * 0.5
+        k = 4 * (m + j)
+        t.middle[k] = t.x[e[0]] + dx
+        t.middle[k + 1] = t.y[e[0]] + dy
+        t.middle[k + 2] = t.z[e[0]] + dz
+        t.middle[k + 3] = root(times(dx, dx) + times(dy, dy) + times(dz, dz))
+
+
+@wp.func
+def bound_blocks(t: Any, topo: Topology, thread: int, threads: int):
+    """Bounding boxes of the blocks' vertices and elements: the lower corner, and the upper one."""
+    for b in range(thread, topo.blocks, threads):
+        first = topo.block_corner[topo.block_corner_start[b]]
+        lx = t.x[first]
+        ly = t.y[first]
+        lz = t.z[first]
+        hx = lx
+        hy = ly
+        hz = lz
+        for k in range(topo.block_corner_start[b] + 1, topo.block_corner_start[b + 1]):
+            i = topo.block_corner[k]
+            lx = least(lx, t.x[i])
+            ly = least(ly, t.y[i])
+            lz = least(lz, t.z[i])
+            hx = most(hx, t.x[i])
+            hy = most(hy, t.y[i])
+            hz = most(hz, t.z[i])
+        t.bounds[6 * b] = lx
+        t.bounds[6 * b + 1] = ly
+        t.bounds[6 * b + 2] = lz
+        t.bounds[6 * b + 3] = hx
+        t.bounds[6 * b + 4] = hy
+        t.bounds[6 * b + 5] = hz
+
+
+@wp.func
+def bound_groups(t: Any, topo: Topology, thread: int, threads: int):
+    """Bounding boxes of groups of consecutive blocks."""
+    m = topo.blocks
+    for g in range(thread, (m + GROUP - 1) / GROUP, threads):
+        k = 6 * (m + g)
+        for c in range(6):
+            v = t.bounds[6 * GROUP * g + c]
+            for b in range(GROUP * g + 1, wp.min(GROUP * g + GROUP, m)):
+                if c < 3:
+                    v = least(v, t.bounds[6 * b + c])
+                else:
+                    v = most(v, t.bounds[6 * b + c])
+            t.bounds[k + c] = v
+
+
+@wp.func
+def closest_on_edges(rx: Any, ry: Any, rz: Any, ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
+    """Parameters in [0, 1] of the closest points of two edges with directions a and b, r from b's start to a's."""
+    zero = fill(rx, 0.0)
+    one = fill(rx, 1.0)
+    tiny = fill(rx, 1.0e-16)
+    aa = times(ax, ax) + times(ay, ay) + times(az, az) + tiny
+    bb = times(bx, bx) + times(by, by) + times(bz, bz) + tiny
+    ab = times(ax, bx) + times(ay, by) + times(az, bz)
+    ar = times(ax, rx) + times(ay, ry) + times(az, rz)
+    br = times(bx, rx) + times(by, ry) + times(bz, rz)
+    det = times(aa, bb) - times(ab, ab)
+    s = over(times(ab, br) - times(ar, bb), most(det, times(aa, bb) * 1.0e-6))
+    s = least(most(s, zero), one)
+    q = least(most(over(times(ab, s) + br, bb), zero), one)
+    s = least(most(over(times(ab, q) - ar, aa), zero), one)
+    return s, q
+
+
+@wp.func
+def near_triangle(t: Any, i: Any, f0: Any, f1: Any, f2: Any, far2: Any):
+    """Positive where vertex i may be nearer to a triangle than the root of ``far2``.
+
+    Height over the plane and the excess over the worst of the three edge lines bound the distance from below.
+    """
+    ax = gather(t.x, f1) - gather(t.x, f0)
+    ay = gather(t.y, f1) - gather(t.y, f0)
+    az = gather(t.z, f1) - gather(t.z, f0)
+    bx = gather(t.x, f2) - gather(t.x, f0)
+    by = gather(t.y, f2) - gather(t.y, f0)
+    bz = gather(t.z, f2) - gather(t.z, f0)
+    dx = gather(t.x, i) - gather(t.x, f0)
+    dy = gather(t.y, i) - gather(t.y, f0)
+    dz = gather(t.z, i) - gather(t.z, f0)
+    cx = bx - ax
+    cy = by - ay
+    cz = bz - az
+    nx = times(ay, bz) - times(az, by)
+    ny = times(az, bx) - times(ax, bz)
+    nz = times(ax, by) - times(ay, bx)
+    h = times(dx, nx) + times(dy, ny) + times(dz, nz)
+    nn = times(nx, nx) + times(ny, ny) + times(nz, nz)
+    v = times(times(dy, bz) - times(dz, by), nx)
+    v = v + times(times(dz, bx) - times(dx, bz), ny)
+    v = v + times(times(dx, by) - times(dy, bx), nz)
+    w = times(times(ay, dz) - times(az, dy), nx)
+    w = w + times(times(az, dx) - times(ax, dz), ny)
+    w = w + times(times(ax, dy) - times(ay, dx), nz)
+    outside = least(least(nn - v - w, fill(h, 0.0)), least(v, w))
+    aa = times(ax, ax) + times(ay, ay) + times(az, az)
+    bb = times(bx, bx) + times(by, by) + times(bz, bz)
+    cc = times(cx, cx) + times(cy, cy) + times(cz, cz)
+    longest = most(aa, most(bb, cc))
+    return times(longest, times(far2, nn) - times(h, h)) - times(outside, outside)
+
+
+@wp.func
+def near_edges(t: Any, e0: Any, e1: Any, f0: Any, f1: Any, far2: Any):
+    """Positive where two edges are nearer to each other than the root of ``far2``."""
+    rx = gather(t.x, e0) - gather(t.x, f0)
+    ry = gather(t.y, e0) - gather(t.y, f0)
+    rz = gather(t.z, e0) - gather(t.z, f0)
+    ax = gather(t.x, e1) - gather(t.x, e0)
+    ay = gather(t.y, e1) - gather(t.y, e0)
+    az = gather(t.z, e1) - gather(t.z, e0)
+    bx = gather(t.x, f1) - gather(t.x, f0)
+    by = gather(t.y, f1) - gather(t.y, f0)
+    bz = gather(t.z, f1) - gather(t.z, f0)
+    s, q = closest_on_edges(rx, ry, rz, ax, ay, az, bx, by, bz)
+    cx = rx + times(s, ax) - times(q, bx)
+    cy = ry + times(s, ay) - times(q, by)
+    cz = rz + times(s, az) - times(q, bz)
+    return far2 - times(cx, cx) - times(cy, cy) - times(cz, cz)
