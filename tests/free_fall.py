@@ -45,6 +45,7 @@ class FreeFall:
     """Unit masses under gravity and forces, one explicit step a run."""
 
     diverging = False
+    self_contact = True
 
     def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity = np.array(gravity, dtype=np.float32)

@@ -98,3 +98,25 @@ def test_state_on_the_device(room):
     # float32 at lengths below 1 m
     np.testing.assert_allclose(state["positions"].numpy()[0], cloth.vertices, atol=1e-7)
     np.testing.assert_array_equal(state["velocities"].numpy()[0], cloth.velocities)
+
+
+def test_a_cloth_that_ignores_itself_folds_through_itself():
+    """A flap that is carried down through the cloth's other half stops on it, or goes through, also after a restore."""
+
+    def lowest_flap(ignore):
+        world = nuno.World(device="cpu", gravity=(0, 0, 0), substeps=10)
+        cloth = world.add(nuno.sheet((0.4, 0.2), cells=(8, 4), name="cloth"))
+        world.attach(cloth, nuno.Cloth(thickness=0.01, friction=0.0))
+        if ignore:
+            world.ignore_contact(cloth, cloth)
+            world.restore(world.save())
+        rows, start = np.arange(5) * 9, cloth.vertices
+        flat = (rows[:, None] + np.arange(5, 9)).ravel()
+        world.grip(cloth, flat, to=start[flat].mean(axis=0))
+        over = [start[rows].mean(axis=0), (-0.1, 0, 0.15), (0.1, 0, 0.05), (0.1, 0, -0.05)]
+        world.grip(cloth, rows, to=Path([0.0, 0.5, 1.0, 1.5], over), compliance=0.05)
+        world.run(1.5)
+        return cloth.vertices[rows, 2].mean()
+
+    assert lowest_flap(ignore=False) > 0.0
+    assert lowest_flap(ignore=True) < 0.0

@@ -26,6 +26,10 @@ class ContactRules:
             return False
         return bool(a.group & b.collides_with) and bool(b.group & a.collides_with)
 
+    def touches_itself(self, body: Body) -> bool:
+        """Return whether the parts of a body touch each other: unless it is ignored as a pair with itself."""
+        return frozenset((body.key,)) not in self.ignored
+
     def colliders_of(self, dynamic: Body, static: list[Body]) -> tuple[list[Body], dict[str, Any]]:
         """Return the bodies that ``dynamic`` touches, and by name the friction of pairs with their own."""
         touched = [body for body in static if self.touch(dynamic, body)]

@@ -77,6 +77,12 @@ class Dynamics:
         self.collider_version = -1
         self._pushing: tuple[Push, ...] = ()
 
+    def set_self_contact(self, touching: bool) -> None:
+        """Let the body touch itself or not, from the next step on."""
+        if touching != self.solver.self_contact:
+            self.solver.self_contact = touching
+            self.solver.load_state(self.solver.save_state())  # which forgets the list of pairs: it is out of date
+
     def run(self, time: float, duration: float, frame: float) -> None:
         """Advance from ``time`` by ``duration`` [s], with the grips and pushes of that span."""
         if self.grips_changed or any(grip.target is not None for grip in self.grips):

@@ -185,6 +185,8 @@ class Simulation:
             ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
             stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
             now = start
+            for body, dynamics in moving.items():
+                dynamics.set_self_contact(self._rules.touches_itself(body))
             for stop in stops:
                 for dynamics in moving.values():
                     dynamics.run(now, stop - now, 1.0 / self.frame_rate)
