@@ -25,7 +25,8 @@ from nuno import NunoError, World, box, estimate_pick, plane, read_case, sheet
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
 from nuno.camera.table import Table
-from nuno.estimate.futures import score_futures
+from nuno.estimate.futures import Futures, score_futures, solver_of
+from nuno.estimate.hypotheses import Discretisation, Hypothesis
 from nuno.estimate.similarity import Silhouette
 from nuno.materials import Cloth
 from nuno.path import Path as HandPath
@@ -129,23 +130,19 @@ def batch(worlds: int, cells: int, device: str, substeps: int | None) -> tuple[W
 def speed(device: str, repeats: int, many: int) -> dict[str, Any]:
     """One batch of 36 x 3 s with masks and scores, and ``many`` worlds where that is asked for."""
     camera = Camera(640, 480, 500, 500, 319.5, 239.5, Camera.from_dict(LOOK).camera_to_world).scaled(0.5)
-    real = Silhouette(np.zeros((camera.height, camera.width), bool) | (np.arange(camera.width) > 200))
+    real = Silhouette(np.tile(np.arange(camera.width) > 200, (camera.height, 1)))
     walls = []
     substeps = 0
     for k in range(repeats + 1):
         futures, body = batch(36, 30, device, 20)
-        snapshot = (futures, body)
         wp.synchronize_device(device)
         start = time.perf_counter()
         futures.run(3.0, progress=False)
         simulated = time.perf_counter() - start
-        from nuno.estimate.futures import Futures
-        from nuno.estimate.hypotheses import Discretisation, Hypothesis
-
-        group = Futures(*snapshot, futures, 36, Discretisation(30, 20, (Hypothesis(5e-5),)))
+        group = Futures(futures, body, futures, 36, Discretisation(30, 20, (Hypothesis(5e-5),)))
         score_futures(group, camera, real, Table(0.7))
         wall = time.perf_counter() - start
-        substeps = body._dynamics.solver.substeps
+        substeps = solver_of(body).substeps
         if k:  # the first run loads kernels
             walls.append((wall, simulated))
     result: dict[str, Any] = {
@@ -161,7 +158,7 @@ def speed(device: str, repeats: int, many: int) -> dict[str, Any]:
         futures.run(3.0, progress=False)
         wp.synchronize_device(device)
         wall = time.perf_counter() - start
-        memory = body._dynamics.solver.memory_bytes
+        memory = solver_of(body).memory_bytes
         result["many"] = {
             "worlds": many, "wall_s": round(wall, 2), "simulated_s_per_s": round(many * 3.0 / wall),
             "memory_gb": round(memory / 1e9, 2), "bytes_per_world": memory // many,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -58,8 +58,13 @@ class Futures:
     @property
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool: which futures' states are numbers."""
-        solver = self.body._dynamics.solver  # type: ignore[union-attr]
-        return solver.finite().reshape(len(self.discretisation.spread), self.candidates)
+        return solver_of(self.body).finite().reshape(len(self.discretisation.spread), self.candidates)
+
+
+def solver_of(body: Body) -> Any:
+    """The solver of a body that has dynamics."""
+    assert body._dynamics is not None
+    return body._dynamics.solver
 
 
 def table_world(
@@ -163,15 +168,14 @@ def imagine_picks(
     while settled < SETTLE_SECONDS:
         futures.run(chunk, progress=False)
         settled += chunk
-        if rest_speed(futures, body) < REST_SPEED:
+        if rest_speed(body) < REST_SPEED:
             break
     return Futures(futures, body, world, k, discretisation)
 
 
-def rest_speed(world: World, body: Body) -> float:
+def rest_speed(body: Body) -> float:
     """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
-    solver = body._dynamics.solver  # type: ignore[union-attr]
-    speeds = np.sqrt((solver.velocities() ** 2).sum(axis=-1).mean(axis=-1))
+    speeds = np.sqrt((solver_of(body).velocities() ** 2).sum(axis=-1).mean(axis=-1))
     return float(np.percentile(speeds, 90))
 
 
@@ -199,8 +203,7 @@ def score_futures(
 
 def draw_futures(futures: Futures, camera: Camera, table: Table) -> tuple[wp.array, Region]:
     """Key images of the cloth behind the table's edge, and the part of the image that they hold."""
-    solver = futures.body._dynamics.solver  # type: ignore[union-attr]
-    positions = solver.positions_on_device()
+    positions = solver_of(futures.body).positions_on_device()
     corners = positions.numpy().reshape(-1, 3)
     region = Region.around(camera, corners[np.isfinite(corners).all(axis=1)], margin=4.0)
     looking = view(camera, region)
