@@ -19,6 +19,11 @@ from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.state import (
     DAMPING,
+    LAYERS,
+    MOTION,
+    PULLS,
+    SHAPES,
+    VELOCITIES,
     Settings,
     Shapes,
     Sizes,
@@ -144,35 +149,39 @@ def near_shapes(t: Any, n: int, run: Settings, shapes: Shapes, thread: int, thre
 
 @wp.func
 def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
-    """All phases of ``substeps`` substeps."""
+    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for."""
     n = topo.particles
     for k in range(substeps):
-        if k % run.frame == 0:
-            near_shapes(t, n, run, shapes, thread, threads)
-        # before the listing, which asks how far anything went in the substep before
-        tick(t, run, thread)
-        barrier(threads)
-        if run.touching != 0:
-            find_contacts(t, topo, run, thread, threads)
-        predict(t, n, run, thread, threads)
-        barrier(threads)
-        hold_vertices(t, run, thread, threads)
-        barrier(threads)
-        elastic(t, topo, run, thread, threads)
-        pull_points(t, run, thread, threads)
-        barrier(threads)
-        if run.touching != 0:
+        if run.parts & MOTION != 0:
+            if (run.first + k) % run.frame == 0:
+                near_shapes(t, n, run, shapes, thread, threads)
+            # before the listing, which asks how far anything went in the substep before
+            tick(t, run, thread)
+            barrier(threads)
+            if run.touching != 0:
+                find_contacts(t, topo, run, thread, threads)
+            predict(t, n, run, thread, threads)
+            barrier(threads)
+            hold_vertices(t, run, thread, threads)
+            barrier(threads)
+            elastic(t, topo, run, thread, threads)
+        if run.parts & PULLS != 0:
+            pull_points(t, run, thread, threads)
+            barrier(threads)
+        if run.touching != 0 and run.parts & LAYERS != 0:
             touch_edge_edge(t, n, run, thread, threads)
             touch_vertex_triangle(t, n, run, thread, threads)
             barrier(threads)
             take_moves(t, n, thread, threads)
             barrier(threads)
-        touch_shapes(t, n, shapes, run.dt, thread, threads)
-        barrier(threads)
-        reset_speed(t, thread)
-        barrier(threads)
-        read_velocities(t, n, run, thread, threads)
-        barrier(threads)
+        if run.parts & SHAPES != 0:
+            touch_shapes(t, n, shapes, run.dt, thread, threads)
+            barrier(threads)
+        if run.parts & VELOCITIES != 0:
+            reset_speed(t, thread)
+            barrier(threads)
+            read_velocities(t, n, run, thread, threads)
+            barrier(threads)
 
 
 @wp.func

@@ -11,7 +11,7 @@ from nuno.solver.state import CLOCK, Settings
 @wp.func
 def key_position(t: Any, run: Settings, g: int):
     """Where grip g should be now: linear or quintic minimum jerk between its key frames."""
-    now = largest(t.notes[CLOCK])
+    now = largest(t.notes[CLOCK]) * run.dt
     first = g * run.keys
     k = int(0)
     while k < run.keys - 2 and now > run.grip_time[first + k + 1]:
@@ -41,7 +41,9 @@ def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
             x, y, z = key_position(t, run, g)
             i = clipped(t.grip_corner[3 * g])
             # a world without this grip writes back what was there
-            on = times(known(one, t.grip_corner[3 * g]), one - choose(gather(t.w, i), one, one - one))
+            on = known(one, t.grip_corner[3 * g])
+            if run.probing == 0:
+                on = times(on, one - choose(gather(t.w, i), one, one - one))
             place(t.x, i, choose(on, x, gather(t.x, i)))
             place(t.y, i, choose(on, y, gather(t.y, i)))
             place(t.z, i, choose(on, z, gather(t.z, i)))

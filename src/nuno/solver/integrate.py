@@ -91,8 +91,8 @@ def reset_speed(t: Any, thread: int):
 
 @wp.func
 def tick(t: Any, run: Settings, thread: int):
-    """Advance the run's clock and the distance that anything may have gone since the pairs were listed."""
+    """Advance the clock, which counts substeps, and how far anything may have gone since pairs were listed."""
     if thread == 0:
-        t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], run.dt)
+        t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], 1.0)
         t.notes[PICKED] = t.notes[PICKED] + root(t.notes[SPEED]) * run.dt
         t.notes[TRAVEL] = t.notes[TRAVEL] + wp.sqrt(largest(t.notes[SPEED])) * fill(t.x[0], run.dt)

@@ -19,7 +19,19 @@ from nuno.solver.broad import PairFinder
 from nuno.solver.frame import bend_hinges, bend_lines, shear_cells, strain_triangles, stretch_yarns
 from nuno.solver.grips import hold_vertices, pull_points
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
-from nuno.solver.state import Settings, Shapes, Sizes, StateFloat, Topology, view
+from nuno.solver.state import (
+    LAYERS,
+    MOTION,
+    PULLS,
+    SHAPES,
+    VELOCITIES,
+    Settings,
+    Shapes,
+    Sizes,
+    StateFloat,
+    Topology,
+    view,
+)
 
 HINGES, LINES, CELLS, TRIANGLES, YARNS = range(5)
 RESET, MEASURE, SELECT, SORT = range(4)
@@ -119,8 +131,10 @@ def finish(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Sh
     """Shapes and velocities, particle by particle."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
-    touch_shapes(t, topo.particles, shapes, run.dt, tid % threads, threads)
-    read_velocities(t, topo.particles, run, tid % threads, threads)
+    if run.parts & SHAPES != 0:
+        touch_shapes(t, topo.particles, shapes, run.dt, tid % threads, threads)
+    if run.parts & VELOCITIES != 0:
+        read_velocities(t, topo.particles, run, tid % threads, threads)
 
 
 class LargePlan:
@@ -156,7 +170,7 @@ class LargePlan:
         """Advance by ``substeps`` substeps under the settings ``run``."""
         graph = self._captured(run) if self._cuda else None
         for k in range(substeps):
-            if k % run.frame == 0:
+            if run.parts & MOTION and (run.first + k) % run.frame == 0:
                 self._survey(run)
             if graph is None:
                 self._substep(run)
@@ -166,7 +180,16 @@ class LargePlan:
     def _captured(self, run: Any) -> Any:
         """The graph of a substep: made for its settings, with the grips' figures in arrays of its own."""
         key: tuple[Any, ...] = (run.dt, tuple(run.gravity), run.pushed, run.damped, run.touching, run.margin)
-        key += (run.reach, run.frame, run.grips, run.keys, run.grip_ease.ptr, run.grip_fixed.ptr)
+        key += (
+            run.reach,
+            run.frame,
+            run.parts,
+            run.probing,
+            run.grips,
+            run.keys,
+            run.grip_ease.ptr,
+            run.grip_fixed.ptr,
+        )
         found = self._graphs.get(key)
         if found is None:
             run.grip_time, run.grip_soft = wp.clone(run.grip_time), wp.clone(run.grip_soft)
@@ -194,17 +217,20 @@ class LargePlan:
     def _substep(self, run: Any) -> None:
         n = self._topology.particles
         common = [self._state, self._topology, self._size, run]
-        wp.launch(start, dim=self._worlds, inputs=common, device=self._device)
-        if run.touching:
-            self._finder.launch(self._state, self._size, run)
-        self._launch(begin, n, run)
-        if run.grips:
-            self._launch(hold, run.grips, run)
-        for kind, first, last in self._colours:
-            self._launch(project, last - first, run, kind, first, last)
-        if run.grips:
+        if run.parts & MOTION:
+            wp.launch(start, dim=self._worlds, inputs=common, device=self._device)
+            if run.touching:
+                self._finder.launch(self._state, self._size, run)
+            self._launch(begin, n, run)
+            if run.grips:
+                self._launch(hold, run.grips, run)
+            for kind, first, last in self._colours:
+                self._launch(project, last - first, run, kind, first, last)
+        if run.parts & PULLS and run.grips:
             wp.launch(pull, dim=self._worlds, inputs=common, device=self._device)
-        if run.touching:
-            self._launch(touch, MANY, run)
-        self._launch(settle, n if run.touching else 1, run)
-        self._launch(finish, n, run, self._shapes)
+        if run.parts & LAYERS:
+            if run.touching:
+                self._launch(touch, MANY, run)
+            self._launch(settle, n if run.touching else 1, run)
+        if run.parts & (SHAPES | VELOCITIES):
+            self._launch(finish, n, run, self._shapes)

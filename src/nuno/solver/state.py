@@ -17,10 +17,18 @@ TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
 PICKED, PICK_REACH = 4, 5
 NOTES = 6
 
+PARTICLE_ARRAYS = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w")
+"""Positions, those at the substep's start, velocities and inverse masses."""
+
+# The parts of a substep, which a run does all of, and others from outside step between.
+MOTION, PULLS, LAYERS, SHAPES, VELOCITIES = 1, 2, 4, 8, 16
+"""Prediction, stiff grips and elasticity; other grips; self-contact; static shapes; velocities."""
+ALL_PARTS = 31
+
 
 def _state_fields(number: type, integer: type) -> dict[str, Any]:
     """The fields of a State whose numbers are floats or lanes of floats."""
-    numbers = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w", "fx", "fy", "fz")
+    numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz")
     numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
     numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight")
@@ -115,7 +123,7 @@ class Sizes:
 
 @wp.struct
 class Settings:
-    """What holds for the whole run."""
+    """What holds for the whole run, or while it goes by parts: ``first`` is the first substep's number."""
 
     dt: float
     gravity: wp.vec3
@@ -125,6 +133,9 @@ class Settings:
     margin: float
     reach: float
     frame: int
+    first: int
+    parts: int
+    probing: int
     grips: int
     keys: int
     grip_time: wp.array(dtype=float)

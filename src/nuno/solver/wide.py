@@ -28,7 +28,23 @@ from nuno.solver.grips import hold_vertices, pull_points
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import LANES, fill, lane, lane_int, largest
 from nuno.solver.membrane import stretch_yarn
-from nuno.solver.state import NOTES, SCALARS, SPEED, Settings, Shapes, Sizes, StateFloat, StateLanes, Topology, view
+from nuno.solver.state import (
+    LAYERS,
+    MOTION,
+    NOTES,
+    PULLS,
+    SCALARS,
+    SHAPES,
+    SPEED,
+    VELOCITIES,
+    Settings,
+    Shapes,
+    Sizes,
+    StateFloat,
+    StateLanes,
+    Topology,
+    view,
+)
 
 
 @wp.struct
@@ -126,23 +142,27 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
     t = view(s, wp.tid(), n, size)
     p = by_sixteen(t, wide, m)
     for k in range(substeps):
-        if k % run.frame == 0:
-            near_shapes(t, n, run, shapes, 0, 1)
-        tick(t, run, 0)
-        if run.touching != 0:
-            find_contacts(t, topo, run, 0, 1)
-        predict(p, m, run, 0, 1)
-        hold_vertices(t, run, 0, 1)
-        elastic_wide(t, wide, run)
-        pull_points(t, run, 0, 1)
-        if run.touching != 0:
+        if run.parts & MOTION != 0:
+            if (run.first + k) % run.frame == 0:
+                near_shapes(t, n, run, shapes, 0, 1)
+            tick(t, run, 0)
+            if run.touching != 0:
+                find_contacts(t, topo, run, 0, 1)
+            predict(p, m, run, 0, 1)
+            hold_vertices(t, run, 0, 1)
+            elastic_wide(t, wide, run)
+        if run.parts & PULLS != 0:
+            pull_points(t, run, 0, 1)
+        if run.touching != 0 and run.parts & LAYERS != 0:
             touch_edge_edge(t, n, run, 0, 1)
             touch_vertex_triangle(t, n, run, 0, 1)
             take_moves(t, n, 0, 1)
-        touch_shapes(p, m, shapes, run.dt, 0, 1)
-        reset_speed(p, 0)
-        read_velocities(p, m, run, 0, 1)
-        t.notes[SPEED] = largest(p.notes[SPEED])
+        if run.parts & SHAPES != 0:
+            touch_shapes(p, m, shapes, run.dt, 0, 1)
+        if run.parts & VELOCITIES != 0:
+            reset_speed(p, 0)
+            read_velocities(p, m, run, 0, 1)
+            t.notes[SPEED] = largest(p.notes[SPEED])
 
 
 def widen_topology(topology: Any, arrays: Any) -> Any:

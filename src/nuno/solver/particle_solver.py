@@ -1,0 +1,392 @@
+"""Particles in one or many worlds: their state on the device, what acts on them, and how time passes.
+
+What they are the corners of, and so the elastic constraints between them, is for the classes under `ParticleSolver`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.solver.lanes import LANES, lane, lane_int
+from nuno.solver.state import (
+    ALL_PARTS,
+    NOTES,
+    ORIGIN,
+    PARTICLE_ARRAYS,
+    SPEED,
+    TRAVEL,
+    Settings,
+    Shapes,
+)
+
+if TYPE_CHECKING:
+    from nuno.grip import GripSpec
+    from nuno.scene.colliders import Colliders
+
+_threads: ThreadPoolExecutor | None = None
+
+
+def _pool() -> ThreadPoolExecutor:
+    """A thread per core; Warp's CPU launches release the GIL."""
+    global _threads
+    if _threads is None:
+        _threads = ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="nuno-lanes")
+    return _threads
+
+
+class ParticleSolver:
+    """The particles of one body, and the frame around its elastic constraints.
+
+    A class under it makes the arrays in its constructor, between `_prepare` and `_start`, and launches kernels in
+    `_advance`.
+
+    Attributes:
+        device: "cpu" or "cuda:0" ...
+        world_count: Worlds in the batch.
+        particle_count: Particles of each world.
+        frame_rate: Frames a second.
+        gravity: (3,) [m/s2].
+        substeps: Substeps a frame.
+        self_contact: Whether the body collides with itself.
+        plan: How kernels are launched.
+        lanes: Worlds in a vector, 16 in a batch on the CPU and else 1.
+        mass: (worlds, n) [kg].
+    """
+
+    substeps: int
+    self_contact: bool
+    plan: str
+    mass: np.ndarray
+    _state: Any
+    _size: Any
+    _topology: Any
+    _scalars: np.ndarray
+    _inverse_mass: np.ndarray
+    _damped: bool
+    _cell_size: float
+
+    def _prepare(
+        self, positions: np.ndarray, device: str, gravity: Sequence[float], frame_rate: float, lanes: bool = True
+    ) -> None:
+        """Take what shapes all arrays; ``lanes=False`` keeps worlds one after the other on the CPU too."""
+        self.device, self.frame_rate = str(device), float(frame_rate)
+        self.world_count, self.particle_count = positions.shape[:2]
+        self.gravity = np.asarray(gravity, dtype=float)
+        self._cuda = self.device.startswith("cuda")
+        self.lanes = LANES if not self._cuda and self.world_count > 1 and lanes else 1
+        self.group_count = -(-self.world_count // self.lanes)
+        self._number: Any = lane if self.lanes > 1 else float
+        self._integer: Any = lane_int if self.lanes > 1 else int
+
+    def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
+        """Set the first state; nothing acts yet."""
+        self.set_state(positions, velocities)
+        self.set_colliders(None)
+        self.set_grips(())
+        self.set_forces(None)
+
+    def _advance(self, run: Settings, substeps: int) -> None:
+        """Launch ``substeps`` substeps under the settings."""
+        raise NotImplementedError
+
+    def _forget_launches(self) -> None:
+        """Be told that arrays were replaced, which captured launches still name."""
+
+    # -- arrays: worlds are the leading axis outside, lanes the innermost inside
+
+    def _put(self, values: np.ndarray, integer: bool = False) -> wp.array:
+        """A device array of (worlds, k) numbers, k elements per world or per group of lanes."""
+        kind = np.int32 if integer else np.float32
+        values = np.ascontiguousarray(np.asarray(values, dtype=kind).reshape(self.world_count, -1))
+        dtype = self._integer if integer else self._number
+        if self.lanes > 1:
+            pad = self.group_count * self.lanes - self.world_count
+            # lanes beyond the last world repeat it: they cost nothing more and stay finite
+            values = np.concatenate([values, np.repeat(values[-1:], pad, axis=0)])
+            values = values.reshape(self.group_count, self.lanes, -1).transpose(0, 2, 1)
+            return wp.array(np.ascontiguousarray(values).reshape(-1, self.lanes), dtype=dtype, device=self.device)
+        return wp.array(values.ravel(), dtype=dtype, device=self.device)
+
+    def _get(self, array: wp.array, count: int) -> np.ndarray:
+        """The (worlds, count) numbers of a device array."""
+        values = array.numpy()
+        if self.lanes > 1:
+            values = values.reshape(self.group_count, count, self.lanes).transpose(0, 2, 1)
+        return values.reshape(-1, count)[: self.world_count]
+
+    def _empty(self, count: int, dtype: Any) -> wp.array:
+        """Zeros, ``count`` a world or group of lanes."""
+        return wp.zeros(self.group_count * count, dtype=dtype, device=self.device)
+
+    @property
+    def _whole(self) -> int:
+        """Numbers in a world's array, up to a whole vector where particles are taken by sixteen."""
+        n = self.particle_count
+        return -(-n // LANES) * LANES if self.plan == "vector" else n
+
+    def _allocate_particles(self) -> None:
+        """Room for the arrays that all particles have."""
+        state, n = self._state, self.particle_count
+        for name in PARTICLE_ARRAYS:
+            setattr(state, name, self._empty(self._whole, self._number)[: self.group_count * n])
+        state.notes = self._empty(NOTES, self._number)
+        state.box = self._empty(6, self._number)
+        state.worlds = self.world_count
+
+    def _over_groups(self, launch: Callable[[int], None], module: Any) -> None:
+        """Call ``launch`` with every group of lanes, a thread per core."""
+        if self.group_count == 1:
+            launch(0)
+        else:
+            # here, for every thread would compile it for itself
+            wp.load_module(module, device=self.device)
+            list(_pool().map(launch, range(self.group_count)))
+
+    # -- state
+
+    def positions(self) -> np.ndarray:
+        """(worlds, n, 3) float64, a copy [m]."""
+        return self.local_positions() + self.origin[:, None]
+
+    def local_positions(self) -> np.ndarray:
+        """(worlds, n, 3) float32, relative to each world's ``origin`` [m]: the solver's own digits."""
+        s, n = self._state, self.particle_count
+        return np.stack([self._get(a, n) for a in (s.x, s.y, s.z)], axis=-1)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(worlds, 3) float64, what ``local_positions`` are relative to [m]."""
+        return self._scalars[:, ORIGIN : ORIGIN + 3].astype(np.float64)
+
+    def velocities(self) -> np.ndarray:
+        """(worlds, n, 3) float32, a copy [m/s]."""
+        s, n = self._state, self.particle_count
+        return np.stack([self._get(a, n) for a in (s.vx, s.vy, s.vz)], axis=-1)
+
+    def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
+        """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
+        positions = np.asarray(positions, dtype=np.float64)
+        # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
+        origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
+        notes = np.zeros((self.world_count, NOTES), dtype=np.float32)
+        notes[:, TRAVEL] = 1.0e9
+        speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
+        notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
+        self.load_state(
+            dict(
+                local=(positions - origin[:, None]).astype(np.float32), origin=origin.astype(np.float32),
+                velocities=np.asarray(velocities, dtype=np.float32), notes=notes,
+            )
+        )  # fmt: skip
+
+    def save_state(self) -> dict[str, np.ndarray]:
+        """All that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
+        notes = self._get(self._state.notes, NOTES).copy()
+        # the list of candidate pairs is not part of the state: it is made anew, which changes no result
+        notes[:, TRAVEL] = 1.0e9
+        return dict(
+            local=self.local_positions(), origin=self._scalars[:, ORIGIN : ORIGIN + 3].copy(),
+            velocities=self.velocities(), notes=notes,
+        )  # fmt: skip
+
+    def load_state(self, state: dict[str, np.ndarray]) -> None:
+        """Set the state that `save_state` gave; leading axes of 1 are spread over the worlds."""
+        s, worlds, n = self._state, self.world_count, self.particle_count
+        local = np.broadcast_to(state["local"], (worlds, n, 3))
+        velocities = np.broadcast_to(state["velocities"], (worlds, n, 3))
+        for k, (a, b, c) in enumerate((("x", "px", "vx"), ("y", "py", "vy"), ("z", "pz", "vz"))):
+            wp.copy(getattr(s, a), self._put(local[..., k]))
+            wp.copy(getattr(s, b), self._put(local[..., k]))
+            wp.copy(getattr(s, c), self._put(velocities[..., k]))
+        wp.copy(s.notes, self._put(np.broadcast_to(state["notes"], (worlds, NOTES))))
+        self._scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
+        s.scalars = self._put(self._scalars)
+        if hasattr(self, "_grips"):
+            self.set_grips(self._grips)
+
+    def finite(self) -> np.ndarray:
+        """(worlds,) bool: whether every position and velocity is a finite number."""
+        s, n = self._state, self.particle_count
+        arrays = (s.x, s.y, s.z, s.vx, s.vy, s.vz)
+        return np.all([np.isfinite(self._get(a, n)).all(axis=1) for a in arrays], axis=0)
+
+    def positions_on_device(self) -> wp.array:
+        """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy."""
+        from nuno.solver.pack import pack_positions
+
+        return pack_positions(self._state, self.world_count, self.particle_count, self.lanes, self.device)
+
+    @property
+    def arrays(self) -> dict[str, wp.array]:
+        """The solver's own arrays x, y, z [m] and vx, vy, vz [m/s].
+
+        On CUDA and for one world on the CPU each is (worlds * n,) float32; in a batch on the CPU it is
+        (groups * n,) vectors of 16 worlds.
+        """
+        return {name: getattr(self._state, name) for name in ("x", "y", "z", "vx", "vy", "vz")}
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes of device memory that this body holds, elements shared by all worlds included."""
+        total = 0
+        holders: tuple[Any, ...] = (self._state, self._topology)
+        for holder in holders:
+            for name in holder._cls.vars:
+                value = getattr(holder, name)
+                total += value.capacity if isinstance(value, wp.array) else 0
+        return total
+
+    # -- what acts on the particles
+
+    def set_colliders(self, colliders: Colliders | None) -> None:
+        """The static shapes that the body meets; None for none."""
+        if colliders is None:
+            shapes = Shapes()
+            shapes.count = shapes.stride = shapes.mesh_stride = 0
+            shapes.kind = wp.zeros(1, dtype=int, device=self.device)
+            shapes.table = wp.zeros(1, dtype=float, device=self.device)
+            shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
+        else:
+            shapes = colliders.shapes
+        self._colliders, self._shapes = colliders, shapes
+        self._size.near = max(1, int(shapes.count)) + 1
+        self._state.near = wp.zeros(self.group_count * self._size.near, dtype=int, device=self.device)
+        self._forget_launches()
+
+    def set_forces(self, forces: np.ndarray | None) -> None:
+        """Forces [N] on the vertices, (worlds, n, 3), held until set anew; None for none."""
+        s = self._state
+        self._pushed = forces is not None
+        if forces is None:
+            self._size.forces = 1
+            for name in ("fx", "fy", "fz"):
+                setattr(s, name, wp.zeros(self.group_count, dtype=self._number, device=self.device))
+        else:
+            self._size.forces = self.particle_count
+            for k, name in enumerate(("fx", "fy", "fz")):
+                values = self._put(np.asarray(forces)[..., k])
+                held = wp.zeros(self.group_count * self._whole, dtype=self._number, device=self.device)
+                wp.copy(held, values, count=len(values))
+                setattr(s, name, held[: len(values)])
+        self._forget_launches()
+
+    def set_grips(self, grips: Sequence[GripSpec]) -> None:
+        """What is held, and where it goes; vertices that are no longer held get their mass back."""
+        self._grips = tuple(grips)
+        worlds = self.world_count
+        entries: list[dict[str, Any]] = []
+        for grip in grips:
+            if grip.vertices is not None:
+                corners = np.repeat(np.asarray(grip.vertices)[..., None], 3, axis=-1)
+                barycentric = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+            else:
+                corners, barycentric = np.asarray(grip.corners), np.asarray(grip.barycentric)
+            for k in range(corners.shape[1]):
+                single = barycentric[:, k]
+                vertex = bool((np.abs(single[:, 0] - 1.0) < 1e-6).all())
+                entries.append(
+                    dict(
+                        corners=corners[:, k], weights=single, times=np.asarray(grip.times, float),
+                        positions=np.asarray(grip.positions)[:, k] - self.origin[:, None],
+                        ease=grip.interpolation == "minimum_jerk",
+                        compliance=float(grip.compliance), fixed=vertex and grip.compliance == 0.0,
+                    )
+                )  # fmt: skip
+        keys = max([len(e["times"]) for e in entries], default=1)
+        count = max(1, len(entries))
+        corner = np.full((worlds, count, 3), -1, dtype=np.int32)
+        weight = np.zeros((worlds, count, 3), dtype=np.float32)
+        place = np.zeros((worlds, count, keys, 3), dtype=np.float32)
+        self._grip_times = np.zeros((count, keys))
+        mass = self._inverse_mass.copy()
+        for g, e in enumerate(entries):
+            corner[:, g], weight[:, g] = e["corners"], e["weights"]
+            m = len(e["times"])
+            self._grip_times[g] = np.concatenate([e["times"], np.full(keys - m, e["times"][-1])])
+            place[:, g, :m] = e["positions"]
+            place[:, g, m:] = e["positions"][:, -1:]
+            if e["fixed"]:
+                held = np.nonzero(e["corners"][:, 0] >= 0)[0]
+                mass[held, e["corners"][held, 0]] = 0.0
+        s, size = self._state, self._size
+        size.keys, size.grips = count * keys, count
+        for k, name in enumerate(("grip_x", "grip_y", "grip_z")):
+            setattr(s, name, self._put(place[..., k]))
+        s.grip_weight, s.grip_corner = self._put(weight), self._put(corner, integer=True)
+        wp.copy(s.w, self._put(mass))
+        self._grip_count, self._grip_keys = len(entries), keys
+
+        def put(values: np.ndarray, dtype: Any) -> wp.array:
+            return wp.array(values, dtype=dtype, device=self.device)
+
+        self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
+        self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
+        self._grip_soft = np.array([e["compliance"] for e in entries] or [0.0])
+        self._forget_launches()
+
+    # -- running
+
+    def run(self, time: float, duration: float, substeps: int | None = None) -> None:
+        """Advance by whole frames and a shorter last one.
+
+        Args:
+            time: World time at the start [s], for the grips' paths.
+            duration: How long [s].
+            substeps: Substeps of a whole frame, where they are not the solver's own.
+        """
+        frame, count = 1.0 / self.frame_rate, substeps or self.substeps
+        whole = math.floor(duration / frame + 1e-6)
+        rest = duration - whole * frame
+        if whole:
+            self._launch(time, frame / count, whole * count, count)
+        if rest > 1e-9:
+            last = substeps_of(rest, frame, count)
+            self._launch(time + whole * frame, rest / last, last, count)
+
+    def _launch(self, time: float, dt: float, substeps: int, frame: int) -> None:
+        run = self.settings(time, dt, frame)
+        self._reset_clock()
+        self._advance(run, substeps)
+
+    def open(self, time: float, dt: float, frame: int) -> None:
+        """Begin to advance by parts of a substep of ``dt`` [s], ``frame`` of them a frame; see `step_parts`."""
+        self._opened = self.settings(time, dt, frame)
+        self._reset_clock()
+
+    def step_parts(self, index: int, parts: int) -> None:
+        """Do some parts (see `nuno.solver.state`) of substep ``index`` since `open`."""
+        self._opened.first, self._opened.parts = index, parts
+        self._advance(self._opened, 1)
+
+    def settings(self, time: float, dt: float, frame: int) -> Settings:
+        """The run's settings, paths counted from ``time``, with ``frame`` substeps of ``dt`` [s] a frame."""
+        run = Settings()
+        run.dt = dt
+        run.gravity = wp.vec3(*(float(g) for g in self.gravity))
+        run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
+        # candidates within a third of a cell: few enough to look at, and good for several substeps
+        run.margin = 0.35 * self._cell_size
+        run.reach = 0.25 * self._cell_size
+        run.frame, run.first, run.parts, run.probing = frame, 0, ALL_PARTS, 0
+        run.grips, run.keys = self._grip_count, self._grip_keys
+        run.grip_time = wp.array((self._grip_times - time).ravel(), dtype=float, device=self.device)
+        run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
+        run.grip_soft = wp.array(self._grip_soft / dt**2, dtype=float, device=self.device)
+        return run
+
+    def _reset_clock(self) -> None:
+        from nuno.solver.pack import reset_clock
+
+        reset_clock(self._state, self.group_count, self.lanes, self.device)
+
+
+def substeps_of(duration: float, frame: float, substeps: int) -> int:
+    """Substeps of a span shorter than a frame [s] that has ``substeps``."""
+    return max(1, math.ceil(substeps * duration / frame - 1e-6))
