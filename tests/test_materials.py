@@ -1,9 +1,9 @@
-"""Cloth: checks, values by world and by element, presets."""
+"""Materials: checks, values by world and by element, presets."""
 
 import numpy as np
 import pytest
 
-from nuno import Cloth, InvalidInputError, UnknownNameError
+from nuno import Cloth, InvalidInputError, Rigid, Soft, UnknownNameError
 
 
 def test_resolved_broadcasts_to_worlds_and_elements():
@@ -65,3 +65,35 @@ def test_presets():
     assert Cloth.preset("towel").same_as(Cloth())
     with pytest.raises(UnknownNameError, match="tablecloth"):
         Cloth.preset("silk")
+
+
+@pytest.mark.parametrize(
+    "kind, values",
+    [
+        (Soft, {"density": 0.0}),
+        (Soft, {"poisson_ratio": 0.5}),
+        (Soft, {"poisson_ratio": [0.3, 0.6]}),
+        (Soft, {"youngs_modulus": -1.0}),
+        (Rigid, {"mass": 0.0}),
+        (Rigid, {"restitution": 1.5}),
+        (Rigid, {"inertia": np.diag([1.0, 1.0, 3.0])}),
+        (Rigid, {"inertia": [1.0, 1.0, 1.0]}),
+        (Rigid, {"density": [[1.0]]}),
+    ],
+)
+def test_bad_values_of_solids(kind, values):
+    """Every bad value of a soft or rigid material is named, an inertia that no mass has among them."""
+    with pytest.raises(InvalidInputError, match=next(iter(values))):
+        kind(**values)
+
+
+def test_soft_and_rigid_resolve():
+    """Soft solids take values by tetrahedron, rigid ones by world only."""
+    soft = Soft(youngs_modulus=np.arange(1.0, 6.0), damping=[0.1, 0.2]).resolved(2, 5)
+    assert soft["youngs_modulus"].shape == (2, 5) and soft["damping"].shape == (2, 1)
+    assert Soft.preset("sponge").density == 30.0
+    rigid = Rigid(mass=[1.0, 2.0])
+    assert rigid.resolved(2)["restitution"].shape == (2, 1)
+    assert rigid.of_world(1, 2).mass == 2.0 and rigid.inertia is None
+    assert Rigid(inertia=np.diag([1.0, 1.0, 2.0])).same_as(Rigid(inertia=np.diag([1.0, 1.0, 2.0])))
+    assert not Rigid().same_as(Soft())

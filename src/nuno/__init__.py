@@ -22,7 +22,7 @@ from nuno.errors import (
     UnknownNameError,
 )
 from nuno.grip import Grip
-from nuno.materials import Cloth
+from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.path import Path
 from nuno.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 from nuno.snapshot import Snapshot
@@ -54,15 +54,18 @@ __all__ = [
     "Grip",
     "ImageError",
     "InvalidInputError",
+    "Material",
     "MeshError",
     "NunoError",
     "Path",
     "PickCase",
     "PickResult",
     "Plane",
+    "Rigid",
     "Sheet",
     "SimulationDiverged",
     "Snapshot",
+    "Soft",
     "Sphere",
     "SurfacePoints",
     "Table",

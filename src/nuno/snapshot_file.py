@@ -21,7 +21,7 @@ from nuno import shape as shapes
 from nuno.dynamics import Push
 from nuno.errors import FileFormatError, NunoError
 from nuno.grip import GripSpec
-from nuno.materials import Cloth
+from nuno.materials import Cloth, Rigid, Soft
 from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
 
 FORMAT = 1
@@ -31,7 +31,8 @@ SHAPES = (
     shapes.TriangleMesh, shapes.ClothMesh,
 )  # fmt: skip
 TYPES: dict[str, Any] = {
-    kind.__name__: kind for kind in (*SHAPES, Cloth, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
+    kind.__name__: kind
+    for kind in (*SHAPES, Cloth, Soft, Rigid, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
 }
 
 
