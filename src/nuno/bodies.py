@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Unpack
+from collections.abc import Sequence
+from typing import Any, Literal, Unpack
 
 from numpy.typing import ArrayLike
 
 from nuno.body import Body, BodyOptions
+from nuno.compound import Compound
+from nuno.errors import InvalidInputError
 from nuno.mesh.load import MeshSource, load_mesh
 from nuno.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
+from nuno.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra, closed_mesh
+from nuno.validation import number
 
 
 def box(size: ArrayLike, **options: Unpack[BodyOptions]) -> Body:
@@ -34,6 +39,20 @@ def capsule(radius: float, height: float, **options: Unpack[BodyOptions]) -> Bod
 def plane(**options: Unpack[BodyOptions]) -> Body:
     """Return the endless plane z = 0 of its own frame, solid below; the options are those of ``Body``."""
     return Body(Plane(), **options)
+
+
+def compound(parts: Sequence[Any], **options: Unpack[BodyOptions]) -> Body:
+    """Return several shapes fixed to each other; options as for ``Body``.
+
+    Args:
+        parts: A shape such as ``Box(...)``, or (shape, position (3,) [m]) or (shape, position, quaternion (w, x, y,
+            z)), of each part, in the body's own frame.
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: no parts, or a plane or cloth among them.
+    """
+    return Body(Compound(tuple(parts)), **options)
 
 
 def mesh(source: MeshSource, **options: Unpack[BodyOptions]) -> Body:
@@ -65,3 +84,75 @@ def cloth_mesh(
         MeshError: not a usable mesh, or a rest shape with faces of no area.
     """
     return Body(ClothMesh(vertices, faces, rest), **options)  # type: ignore[arg-type]
+
+
+def soft_box(size: ArrayLike, cells: tuple[int, int, int], **options: Unpack[BodyOptions]) -> Body:
+    """Return a soft box with edges ``size`` (3,) [m] in ``cells`` (nx, ny, nz) voxels; options as for ``Body``.
+
+    Each voxel is five tetrahedra, alternating so that their faces match; ``vertices`` are the corners of the voxels,
+    those inside the box included, vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i.
+    """
+    return Body(SoftBox(size, cells), **options)  # type: ignore[arg-type]
+
+
+def soft_sphere(radius: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
+    """Return a soft sphere of ``radius`` [m], in a lattice of voxels of at most ``cell`` [m]; options as for ``Body``.
+
+    ``vertices`` are the lattice's; the round surface is ``Body.skin()``.
+    """
+    return Body(SoftSphere(radius, cell), **options)
+
+
+def soft_cylinder(radius: float, height: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
+    """Return a soft cylinder along z, in a lattice of voxels of at most ``cell`` [m]; options as for ``Body``."""
+    return Body(SoftCylinder(radius, height, cell), **options)
+
+
+def soft_capsule(radius: float, height: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
+    """Return a soft capsule along z, ``height`` [m] between its half spheres; otherwise as ``soft_sphere``."""
+    return Body(SoftCapsule(radius, height, cell), **options)
+
+
+def soft_mesh(
+    source: MeshSource, cell: float, *, tetrahedraliser: Literal["lattice", "pytetwild"] = "lattice",
+    **options: Unpack[BodyOptions],
+) -> Body:  # fmt: skip
+    """Return what a closed surface bounds, as a soft body.
+
+    A lattice of voxels around the surface, five tetrahedra each, moves; the surface is embedded in it (``Body.skin``).
+    With ``tetrahedraliser="pytetwild"`` the tetrahedra follow the surface instead (fTetWild; pip install
+    'nuno-sim[tetrahedra]'), and their own boundary is the skin.
+
+    Args:
+        source: A path, a trimesh or (vertices, faces) [m].
+        cell: Longest edge of a voxel [m], or the length of an edge that pytetwild aims at.
+        tetrahedraliser: "lattice" or "pytetwild".
+        options: Those of ``Body``.
+
+    Raises:
+        MeshError: nothing to read, or a surface that is open, inside out or intersects itself.
+        MissingPackageError: pytetwild is asked for and not installed.
+    """
+    vertices, faces = load_mesh(source)
+    if tetrahedraliser == "lattice":
+        return Body(SoftMesh(vertices, faces, cell), **options)
+    if tetrahedraliser != "pytetwild":
+        raise InvalidInputError(f'tetrahedraliser must be "lattice" or "pytetwild", got {tetrahedraliser!r}')
+    from nuno.mesh.tetrahedraliser import fitted_tetrahedra
+
+    points, triangles = closed_mesh(vertices, faces)
+    return soft_tetrahedra(*fitted_tetrahedra(points, triangles, number("cell", cell, above=0.0)), **options)
+
+
+def soft_tetrahedra(vertices: ArrayLike, tets: ArrayLike, **options: Unpack[BodyOptions]) -> Body:
+    """Return a soft body of given tetrahedra.
+
+    Args:
+        vertices: (n, 3) [m].
+        tets: (m, 4) int.
+        options: Those of ``Body``.
+
+    Raises:
+        MeshError: an index out of range, a flat tetrahedron, or a vertex of none.
+    """
+    return Body(SoftTetrahedra(vertices, tets), **options)  # type: ignore[arg-type]

@@ -39,6 +39,20 @@ class MeshError(InvalidInputError):
     """A mesh that cannot be used, with what is wrong and how to mend it."""
 
 
+class MissingPackageError(NunoError, ImportError):
+    """An optional package that is not installed.
+
+    Args:
+        package: Its name.
+        extra: The extra of nuno-sim that brings it.
+        purpose: What needs it.
+    """
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(f"{purpose} needs {package}, which is not installed: pip install 'nuno-sim[{extra}]'")
+
+
 class FileFormatError(NunoError, ValueError):
     """A file that Nuno cannot read: another format, a newer version, or damaged."""
 

@@ -7,13 +7,14 @@ Every shape has ``kind``, ``centre`` (where its own frame's origin starts in the
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
 from nuno.errors import MeshError
 from nuno.mesh import primitives
+from nuno.mesh.closed import enclosed_volume
 from nuno.mesh.primitives import MeshArrays
 from nuno.validation import count, finite_array, index_array, number
 
@@ -24,6 +25,7 @@ class Shape:
 
     kind: ClassVar[str] = "shape"
     is_cloth: ClassVar[bool] = False  # whether cloth dynamics can be attached
+    is_soft: ClassVar[bool] = False  # whether it is filled with tetrahedra, so that soft dynamics can be
 
     @property
     def centre(self) -> np.ndarray:
@@ -48,7 +50,7 @@ class Box(Shape):
     kind: ClassVar[str] = "box"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", _lengths("size", self.size, 3))
+        object.__setattr__(self, "size", lengths("size", self.size, 3))
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ class Sheet(Shape):
     is_cloth: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", _lengths("size", self.size, 2))
+        object.__setattr__(self, "size", lengths("size", self.size, 2))
         try:
             nx, ny = self.cells
         except (TypeError, ValueError) as error:
@@ -128,20 +130,20 @@ class TriangleMesh(Shape):
     _local: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        vertices, faces = _checked_mesh(self.vertices, self.faces)
+        vertices, faces = checked_mesh(self.vertices, self.faces)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
-        object.__setattr__(self, "_local", _frozen(vertices - vertices.mean(axis=0)))
+        object.__setattr__(self, "_local", frozen(vertices - vertices.mean(axis=0)))
 
     @property
     def centre(self) -> np.ndarray:
         """(3,) float [m], the mean of the vertices as they were given."""
         return self.vertices.mean(axis=0)
 
-    @cached_property
-    def is_solid(self) -> bool:  # type: ignore[override]
+    @property
+    def is_solid(self) -> bool:
         """Whether the faces close the surface and look outwards; a cloth is never solid."""
-        return not self.is_cloth and _is_closed(self.faces) and _volume(self._local, self.faces) > 0.0
+        return not self.is_cloth and _looks_outwards(self)
 
     def mesh(self) -> MeshArrays:
         """Return the vertices about their mean, and the faces."""
@@ -171,7 +173,7 @@ class ClothMesh(TriangleMesh):
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         if (flat := np.flatnonzero(area <= 0.0)).size:
             raise MeshError(f"{flat.size} faces have no area in the rest shape, the first is {flat[0]}; remove them")
-        object.__setattr__(self, "rest", _frozen(rest))
+        object.__setattr__(self, "rest", frozen(rest))
 
 
 @lru_cache(maxsize=512)
@@ -184,26 +186,37 @@ def _primitive(shape: Any) -> MeshArrays:
         "plane": primitives.plane_mesh,
         "sheet": lambda: primitives.sheet_mesh(shape.size, shape.cells),
     }[shape.kind]()
-    return _frozen(made[0]), _frozen(made[1])
+    return frozen(made[0]), frozen(made[1])
 
 
-def _frozen(array: np.ndarray) -> np.ndarray:
+@lru_cache(maxsize=512)
+def _looks_outwards(shape: TriangleMesh) -> bool:
+    return _is_closed(shape.faces) and enclosed_volume(shape._local, shape.faces) > 0.0
+
+
+def frozen(array: np.ndarray) -> np.ndarray:
+    """Return the array, read-only from now on."""
     array.setflags(write=False)
     return array
 
 
-def _lengths(name: str, value: Any, n: int) -> tuple[float, ...]:
-    lengths = finite_array(name, value, (n,))
-    return tuple(number(f"{name}[{i}]", x, above=0.0) for i, x in enumerate(lengths))
+def lengths(name: str, value: Any, n: int) -> tuple[float, ...]:
+    """Return ``value`` as n positive floats [m]."""
+    return tuple(number(f"{name}[{i}]", x, above=0.0) for i, x in enumerate(finite_array(name, value, (n,))))
 
 
-def _checked_mesh(vertices: Any, faces: Any) -> MeshArrays:
+def checked_mesh(vertices: Any, faces: Any) -> MeshArrays:
+    """Return vertices (n, 3) float64 and faces (m, 3) int32, read-only.
+
+    Raises:
+        MeshError: not finite, an index out of range, or a face that names a vertex twice.
+    """
     points = finite_array("vertices", vertices, ("n", 3), error=MeshError)
     triangles = index_array("faces", faces, ("m", 3), low=0, high=len(points), error=MeshError)
     a, b, c = triangles.T
     if (bad := np.flatnonzero((a == b) | (b == c) | (c == a))).size:
         raise MeshError(f"{bad.size} faces name a vertex twice, the first is {bad[0]}; remove them")
-    return _frozen(points), _frozen(triangles)
+    return frozen(points), frozen(triangles)
 
 
 def _is_closed(faces: np.ndarray) -> bool:
@@ -211,8 +224,3 @@ def _is_closed(faces: np.ndarray) -> bool:
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     codes = np.sort(edges[:, 0] << 32 | edges[:, 1])
     return len(np.unique(codes)) == len(codes) and bool(np.array_equal(codes, np.sort(edges[:, 1] << 32 | edges[:, 0])))
-
-
-def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    return float(np.einsum("fx,fx->", a, np.cross(b, c)) / 6.0)

@@ -27,23 +27,23 @@ def plane_mesh() -> MeshArrays:
     return vertices, faces
 
 
-def sphere_mesh(radius: float) -> MeshArrays:
-    """Return a sphere of rings of latitude, poles on z."""
-    latitude = np.linspace(-0.5 * np.pi, 0.5 * np.pi, AROUND // 2 + 1)
-    return _turned(radius * np.cos(latitude), radius * np.sin(latitude))
+def sphere_mesh(radius: float, around: int = AROUND) -> MeshArrays:
+    """Return a sphere of rings of latitude, poles on z, of ``around`` segments."""
+    latitude = np.linspace(-0.5 * np.pi, 0.5 * np.pi, around // 2 + 1)
+    return _turned(radius * np.cos(latitude), radius * np.sin(latitude), around)
 
 
-def cylinder_mesh(radius: float, height: float) -> MeshArrays:
-    """Return a closed cylinder along z."""
+def cylinder_mesh(radius: float, height: float, around: int = AROUND) -> MeshArrays:
+    """Return a closed cylinder along z, of ``around`` segments."""
     half = 0.5 * height
-    return _turned(np.array([0.0, radius, radius, 0.0]), np.array([-half, -half, half, half]))
+    return _turned(np.array([0.0, radius, radius, 0.0]), np.array([-half, -half, half, half]), around)
 
 
-def capsule_mesh(radius: float, height: float) -> MeshArrays:
+def capsule_mesh(radius: float, height: float, around: int = AROUND) -> MeshArrays:
     """Return a capsule along z: a cylinder of ``height`` [m] between the centres of two half spheres."""
-    latitude = np.linspace(0.0, 0.5 * np.pi, AROUND // 4 + 1)
+    latitude = np.linspace(0.0, 0.5 * np.pi, around // 4 + 1)
     across, up = radius * np.cos(latitude), radius * np.sin(latitude) + 0.5 * height
-    return _turned(np.concatenate([across[::-1], across]), np.concatenate([-up[::-1], up]))
+    return _turned(np.concatenate([across[::-1], across]), np.concatenate([-up[::-1], up]), around)
 
 
 def sheet_mesh(size: tuple[float, float], cells: tuple[int, int]) -> MeshArrays:
@@ -63,19 +63,19 @@ def sheet_mesh(size: tuple[float, float], cells: tuple[int, int]) -> MeshArrays:
     return vertices.reshape(-1, 3), faces.astype(np.int32)
 
 
-def _turned(across: np.ndarray, along: np.ndarray) -> MeshArrays:
+def _turned(across: np.ndarray, along: np.ndarray, around: int) -> MeshArrays:
     """Turn a profile (radius, height), from the lower pole to the upper, about z; its ends have radius 0."""
-    angle = np.arange(AROUND) * (2.0 * np.pi / AROUND)
+    angle = np.arange(around) * (2.0 * np.pi / around)
     rings = [
-        np.stack([r * np.cos(angle), r * np.sin(angle), np.full(AROUND, h)], axis=1)
+        np.stack([r * np.cos(angle), r * np.sin(angle), np.full(around, h)], axis=1)
         for r, h in zip(across[1:-1], along[1:-1], strict=True)
     ]
     poles = np.array([[0.0, 0.0, along[0]], [0.0, 0.0, along[-1]]])
-    here, there = np.arange(AROUND), (np.arange(AROUND) + 1) % AROUND
-    top = 2 + (len(rings) - 1) * AROUND
+    here, there = np.arange(around), (np.arange(around) + 1) % around
+    top = 2 + (len(rings) - 1) * around
     faces = [np.stack([np.zeros_like(here), 2 + there, 2 + here], axis=1)]
     for ring in range(len(rings) - 1):
-        low, high = 2 + ring * AROUND, 2 + (ring + 1) * AROUND
+        low, high = 2 + ring * around, 2 + (ring + 1) * around
         faces.append(np.stack([low + here, low + there, high + there], axis=1))
         faces.append(np.stack([low + here, high + there, high + here], axis=1))
     faces.append(np.stack([np.ones_like(here), top + here, top + there], axis=1))
