@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
+from triangles import rectangle
 from world_with import GRAVITY, attached, rows
 
 import nuno
@@ -45,9 +46,11 @@ def rigidity_ratio(g: float, ratio: float) -> float:
 def cantilever(
     loads: list[float], cells: int, *, length: float = 0.2, across: int = 1, along: str = "warp",
     seconds: float = 3.0, substeps: int | None = None, area_density: float = 0.2,
-    stretch_stiffness: float = 1000.0,
+    stretch_stiffness: float = 1000.0, kind: str = "sheet", seed: int = 2,
 ) -> tuple[np.ndarray, np.ndarray, int]:  # fmt: skip
     """Return H/W of strips clamped at one end, one for each G, the G that they feel, and the substeps.
+
+    ``kind`` is "sheet", or one of `triangles.KINDS` for a cloth mesh of about square cells.
 
     Both rows of vertices of the first cell are held. The clamp is where the strip is known to be level, the
     middle of that cell, and the free length, from there to the tip, is ``cells`` and a half. The drag is 1.5
@@ -65,14 +68,18 @@ def cantilever(
     size, grid = ((cells + 1) * h, across * h), (cells + 1, across)
     if along == "weft":
         size, grid = size[::-1], grid[::-1]
-    world, body = attached(nuno.sheet(size, cells=grid, position=(0, 0, 1)), material, worlds=len(g), substeps=substeps)
+    cloth = nuno.sheet(size, cells=grid, position=(0, 0, 1))
+    if kind != "sheet":
+        points, faces = rectangle(kind, size, h, seed)
+        cloth = nuno.cloth_mesh(np.column_stack([points, np.ones(len(points))]), faces)
+    world, body = attached(cloth, material, worlds=len(g), substeps=substeps)
     axis = 0 if along == "warp" else 1
     start = body.vertices.reshape(len(g), -1, 3)[0]
-    held = np.flatnonzero(start[:, axis] < start[:, axis].min() + 1.5 * h)
+    held = np.flatnonzero(start[:, axis] < start[:, axis].min() + 1.1 * h)
     world.grip(body, held, to=start[held].mean(axis=0))
     world.run(seconds)
     end = rows(body)
-    tip = end[:, start[:, axis] > start[:, axis].max() - 0.5 * h].mean(axis=1)
+    tip = end[:, start[:, axis] > start[:, axis].max() - 1e-3 * h].mean(axis=1)
     clamp = start[held].mean(axis=0)
     ratio = (clamp[2] - tip[:, 2]) / (tip[:, axis] - clamp[axis])
     substeps = body._dynamics.solver.substeps

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from elastica import drop_over_reach, rigidity_ratio
+from elastica import cantilever, rigidity_ratio
 from scipy.spatial import Delaunay
+from triangles import KINDS
 from world_with import GRAVITY, attached
 
 import nuno
@@ -44,27 +45,33 @@ def test_two_cloth_meshes_keep_their_own_elements():
         np.testing.assert_allclose(body.vertices[:, 2], 1 - 0.5 * GRAVITY * 0.01, atol=1e-3)
 
 
-@pytest.mark.parametrize(("cells", "load"), [(20, 10.0), (20, 30.0)])
-def test_an_irregular_strip_bends_by_its_rigidity(cells, load):
-    """Elastica, for a strip of irregular triangles 4 across, whose hinges are known to be less exact."""
-    length, h = 0.2, 0.2 / cells
-    points, faces = irregular((length + h, 4 * h), (cells + 1, 4))
-    points[:, 0] -= h
-    nominal = 0.2 * GRAVITY * length**3 / load
-    material = nuno.Cloth(bending_rigidity=nominal, air_drag=8.0, thickness=1e-3)
-    body = nuno.cloth_mesh(np.column_stack([points, np.ones(len(points))]), faces)
-    world, body = attached(body, material, substeps=250)
-    held, tip = np.flatnonzero(points[:, 0] < 0.2 * h), points[:, 0] > length - 1e-6
-    world.grip(body, held, to=body.vertices[held].mean(axis=0))
-    world.run(3.0)
-    x = body.vertices
-    clamp = points[held, 0].max() - 0.5 * h  # as in elastica.py: in the middle of the cell that is held level
-    ratio = (1.0 - x[tip, 2].mean()) / (x[tip, 0].mean() - clamp)
-    load *= ((length - clamp) / length) ** 3
-    # the clamp lies within a cell (5 % of the length, 15 % of G), and hinge weights on irregular triangles
-    # are off by 10 % in the mean (Grinspun et al. 2006, fig. 4, report more)
-    assert rigidity_ratio(load, ratio) == pytest.approx(1.0, abs=0.25)
-    assert ratio == pytest.approx(drop_over_reach(load), rel=0.2)
+LOADS = [1.0, 3.0, 10.0, 30.0]
+
+
+def rigidities(kind, cells, across=2):
+    """Return effective over nominal rigidity of strips of triangles, one for each of `LOADS`."""
+    # one world for each load, or the stiffest would set the substeps of all
+    found = [cantilever([load] * 2, cells, across=across, kind=kind) for load in LOADS]
+    ratios = [rigidity_ratio(felt[0], measured[0]) for measured, felt, _ in found]
+    return np.array(ratios)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_strip_of_any_triangles_has_its_nominal_rigidity_at_default_substeps(kind):
+    """Elastica within 10 %, what Nuno promises for G from 1 to 30."""
+    # squares cut both ways come out up to 11 % too stiff (docs/performance.md)
+    np.testing.assert_allclose(rigidities(kind, 10), 1.0, atol=0.12 if kind == "crossed" else 0.10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("across", [1, 4])
+@pytest.mark.parametrize("cells", [10, 20])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_strip_of_any_width_has_its_nominal_rigidity_at_default_substeps(kind, cells, across):
+    """Elastica within 10 %, also on finer meshes, and one cell wide."""
+    # a ladder of squares cut at random, all of it rim, comes out up to 11 % too soft
+    rough = kind == "crossed" or (kind == "scattered" and across == 1)
+    np.testing.assert_allclose(rigidities(kind, cells, across), 1.0, atol=0.13 if rough else 0.10)
 
 
 def test_an_irregular_mesh_hangs_like_a_sheet():

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError, MeshError
 from nuno.scene.blocks import Blocks, make_blocks
 from nuno.scene.colouring import by_colour, colour
+from nuno.scene.patches import bend_rate, curvature_weights, neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,8 @@ class ClothTopology:
         element_count: Cells of a sheet, or faces of a mesh: what a material per element counts.
         cell_size: Smallest edge of the rest shape along warp or weft [m].
         extent: Longest straight line in the rest shape [m].
+        bend_rate: Of a mesh [1/m4]: times rigidity and dt^2 over density, how much of a patch's bending one substep
+            could take away; the median by area of the stiffest way in which each bends.
     """
 
     rest: np.ndarray
@@ -83,8 +86,10 @@ class ClothTopology:
     cells: Elements
     triangles: Elements
     lines: Elements
-    hinges: Elements
+    twists: Elements
+    patches: Elements
     blocks: Blocks
+    bend_rate: float = 0.0
     device_arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -148,13 +153,11 @@ class ClothTopology:
             np.concatenate(around),
             np.concatenate([(il % 3).ravel(), (3 + jm % 3).ravel()]),
         )
-        twist = np.broadcast_to([1.0, -1.0, -1.0, 1.0], (len(corners), 4))
-        hinges = _elements(
-            corners, dx * dy / 2, 2, own, parity, weight=twist, rest=np.zeros(len(corners))
-        )  # fmt: skip
+        twists = _elements(corners, dx * dy / 2, 2, own, parity)
         return cls(
             rest, faces, area, nx * ny, min(dx, dy), float(np.hypot(*size)), edges, cells_,
-            _none(3, u=(3,), v=(3,), area=()), lines, hinges, make_blocks(rest, faces, edges.vertices, _creases(index)),
+            _none(3, u=(3,), v=(3,), area=()), lines, twists, _none(6, weight=(3, 6), rest=(3, 3), curved=()),
+            make_blocks(rest, faces, edges.vertices, _creases(index), columns=nx + 1),
         )  # fmt: skip
 
     @classmethod
@@ -201,12 +204,17 @@ class ClothTopology:
         triangles = _elements(
             faces, 2.0 / double, 0, own, colour(faces, count), u=weights[:, :, 0], v=weights[:, :, 1], area=double / 2
         )
-        edges, hinges = _mesh_hinges(rest3, faces, double / 2)
+        edges, beside = neighbours(faces)
+        corners, weight, bent, curved = curvature_weights(rest3, faces, beside, area)
+        patches = _elements(
+            corners, 1.0, 2, own, colour(corners, count), weight=weight, rest=bent, curved=curved.astype(float)
+        )  # fmt: skip
         lengths = np.linalg.norm(rest3[edges[:, 0]] - rest3[edges[:, 1]], axis=1)
         extent = float(np.linalg.norm(np.ptp(rest3, axis=0)))
         return cls(
             rest3, faces, area, len(faces), float(lengths.min()), extent, _none(2, rest=()), _none(4, quarter=()),
-            triangles, _none(3), hinges, make_blocks(rest3, faces, edges, np.zeros((0, 4), int)),
+            triangles, _none(3), _none(4), patches, make_blocks(rest3, faces, edges, np.zeros((0, 4), int)),
+            bend_rate(corners, weight, area, double),
         )  # fmt: skip
 
 
@@ -239,40 +247,3 @@ def _creases(index: np.ndarray) -> np.ndarray:
     swap = pairs[:, 0, 0] > pairs[:, 1, 0]
     pairs[swap] = pairs[swap, ::-1]
     return np.unique(pairs.reshape(-1, 4), axis=0)
-
-
-def _mesh_hinges(rest: np.ndarray, faces: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, Elements]:
-    """All edges (e, 2), and a hinge (a, b, c, d) for each inner edge (a, b) between the corners c and d."""
-    half = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    opposite = np.concatenate([faces[:, 2], faces[:, 0], faces[:, 1]])
-    face = np.tile(np.arange(len(faces)), 3)
-    key = np.sort(half, axis=1)
-    edges, inverse, counts = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    if counts.max() > 2:
-        worst = edges[counts.argmax()]
-        raise MeshError(
-            f"edge {worst[0]}-{worst[1]} belongs to {counts.max()} faces; a cloth's edges have one or two. Split "
-            "the mesh there (trimesh.graph.connected_components over face_adjacency finds the sheets)"
-        )
-    order = np.argsort(inverse.ravel(), kind="stable")
-    first = np.searchsorted(inverse.ravel()[order], np.nonzero(counts == 2)[0])
-    p, q = order[first], order[first + 1]
-    hinge = np.stack([half[p, 0], half[p, 1], opposite[p], opposite[q]], axis=1)
-    a, b, c, d = (rest[hinge[:, k]] for k in range(4))
-
-    def cot(v: np.ndarray, w: np.ndarray) -> np.ndarray:
-        return (v * w).sum(axis=1) / np.maximum(np.linalg.norm(np.cross(v, w), axis=1), 1e-12)
-
-    cab, cba = cot(b - a, c - a), cot(a - b, c - b)
-    dab, dba = cot(b - a, d - a), cot(a - b, d - b)
-    weight = np.stack([cba + dba, cab + dab, -(cab + cba), -(dab + dba)], axis=1)
-    total = areas[face[p]] + areas[face[q]]
-    curve = np.einsum("hk,hkc->hc", weight, rest[hinge])
-    # the kernel's normal is edge (a, b) x (d - c); the sign of the rest curvature follows it
-    up = np.cross(b - a, d - c)
-    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12)
-    resting = (curve * up).sum(axis=1)
-    resting[np.abs(resting) < 1e-6 * np.linalg.norm(b - a, axis=1)] = 0.0
-    faces_of = np.stack([face[p], face[q]], axis=1)
-    hinges = _elements(hinge, total, 2, faces_of, colour(hinge, len(rest)), weight=weight, rest=resting)
-    return edges.astype(np.int32), hinges

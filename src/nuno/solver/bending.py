@@ -1,10 +1,8 @@
 """Bending from a rigidity in N m, as quadratic energies of second differences (isometric bending).
 
-On a sheet's grid the energy density 1/2 B (k_xx^2 + k_yy^2 + 2 k_xy^2) is taken literally: second differences along
-grid lines give k_xx and k_yy, the twist of a cell gives k_xy. It is isotropic, and exact for cylindrical bending,
-which hinges of a triangulated grid are not. On a general triangle mesh each interior edge is a hinge with the
-weights of Bergou et al. (2006) and the energy 1/2 B / (A0 + A1) |sum k_i x_i|^2, which reproduces cylindrical
-bending of equilateral and of axis-aligned right-angled meshes (Seung and Nelson 1988).
+The energy density 1/2 B (k_xx^2 + k_yy^2 + 2 k_xy^2) is taken literally: it is isotropic and without Poisson effect.
+On a sheet's grid, second differences along grid lines give k_xx and k_yy, the twist of a cell gives k_xy. On a general
+mesh a triangle and its neighbours, up to six vertices, give all three (`nuno.scene.patches`).
 
 All are vector constraints c = sum k_i x_i of zero target, whose XPBD update needs neither a root nor a branch:
 dx_i = -w_i k_i c / (sum w_i k_i^2 + alpha / dt^2), its denominator as in `bend_stiffness`.
@@ -16,7 +14,7 @@ import warp as wp
 
 from nuno.solver.lanes import add, fill, most, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.membrane import shift
-from nuno.solver.vector import at, is_set, put, scaled, spread
+from nuno.solver.vector import at, is_set, put, scaled
 
 
 @wp.func
@@ -70,62 +68,165 @@ def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: An
 
 
 @wp.func
-def weighed(x: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any):
-    """The weighed sum of four particles' coordinates."""
-    return scaled(at(x, a), ka) + scaled(at(x, b), kb) + scaled(at(x, c), kc) + scaled(at(x, d), kd)
-
-
-@wp.func
-def bend_hinge(
-    t: Any,
-    a: Any,
-    b: Any,
-    c: Any,
-    d: Any,
-    ka: Any,
-    kb: Any,
-    kc: Any,
-    kd: Any,
-    rest: Any,
-    alpha: Any,
-    damped: int,
-    gamma: Any,
-):
-    """Four vertices: c = sum k_i x_i - rest n, n the unit normal of the hinge's two triangles.
-
-    ``rest`` is zero for all that is flat at rest, and for the twist of a grid cell.
-    """
-    cx = weighed(t.x, a, b, c, d, ka, kb, kc, kd)
-    cy = weighed(t.y, a, b, c, d, ka, kb, kc, kd)
-    cz = weighed(t.z, a, b, c, d, ka, kb, kc, kd)
+def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, gamma: Any):
+    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3; ``gamma`` is the damping over dt."""
+    cx = at(t.x, a) - at(t.x, b) - at(t.x, c) + at(t.x, d)
+    cy = at(t.y, a) - at(t.y, b) - at(t.y, c) + at(t.y, d)
+    cz = at(t.z, a) - at(t.z, b) - at(t.z, c) + at(t.z, d)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
+    wd = at(t.w, d)
+    weight = wa + wb + wc + wd
     if damped != 0:
-        cx = cx + times(gamma, cx - weighed(t.px, a, b, c, d, ka, kb, kc, kd))
-        cy = cy + times(gamma, cy - weighed(t.py, a, b, c, d, ka, kb, kc, kd))
-        cz = cz + times(gamma, cz - weighed(t.pz, a, b, c, d, ka, kb, kc, kd))
-    if is_set(rest):
-        # the normal is that of the plane through the edge (a, b) and across to (c, d)
-        ex = at(t.x, b) - at(t.x, a)
-        ey = at(t.y, b) - at(t.y, a)
-        ez = at(t.z, b) - at(t.z, a)
-        gx = at(t.x, d) - at(t.x, c)
-        gy = at(t.y, d) - at(t.y, c)
-        gz = at(t.z, d) - at(t.z, c)
-        nx = times(ey, gz) - times(ez, gy)
-        ny = times(ez, gx) - times(ex, gz)
-        nz = times(ex, gy) - times(ey, gx)
-        s = over(spread(nx, rest), root(times(nx, nx) + times(ny, ny) + times(nz, nz) + fill(nx, 1.0e-20)))
-        cx = cx - times(nx, s)
-        cy = cy - times(ny, s)
-        cz = cz - times(nz, s)
-    wa = scaled(at(t.w, a), ka)
-    wb = scaled(at(t.w, b), kb)
-    wc = scaled(at(t.w, c), kc)
-    wd = scaled(at(t.w, d), kd)
-    weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc) + scaled(wd, kd)
-    if damped != 0:
+        cx = cx + times(gamma, cx - (at(t.px, a) - at(t.px, b) - at(t.px, c) + at(t.px, d)))
+        cy = cy + times(gamma, cy - (at(t.py, a) - at(t.py, b) - at(t.py, c) + at(t.py, d)))
+        cz = cz + times(gamma, cz - (at(t.pz, a) - at(t.pz, b) - at(t.pz, c) + at(t.pz, d)))
         weight = weight + times(gamma, weight)
     s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
     shift(t, a, cx, cy, cz, times(s, wa))
-    shift(t, b, cx, cy, cz, times(s, wb))
-    shift(t, c, cx, cy, cz, times(s, wc))
+    shift(t, b, cx, cy, cz, times(-s, wb))
+    shift(t, c, cx, cy, cz, times(-s, wc))
     shift(t, d, cx, cy, cz, times(s, wd))
+
+
+@wp.func
+def total(weights: Any, row: int, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any, x5: Any):
+    """The sum of six numbers, weighed with those from ``row`` on."""
+    near = scaled(x0, weights[row]) + scaled(x1, weights[row + 1]) + scaled(x2, weights[row + 2])
+    return near + scaled(x3, weights[row + 3]) + scaled(x4, weights[row + 4]) + scaled(x5, weights[row + 5])
+
+
+@wp.func
+def total_at(x: Any, weights: Any, row: int, i0: Any, i1: Any, i2: Any, i3: Any, i4: Any, i5: Any):
+    """The weighed sum of six particles' coordinates."""
+    return total(weights, row, at(x, i0), at(x, i1), at(x, i2), at(x, i3), at(x, i4), at(x, i5))
+
+
+@wp.func
+def bend_patch(t: Any, table: Any, k: int, alpha: Any, damped: int, gamma: Any):
+    """A triangle and its neighbours: three times c = sum k_i x_i - rest, one after the other.
+
+    ``rest`` turns with the triangle: a sum of its two sides from vertex 0 and its unit normal. A triangle at the rim
+    repeats vertex 0 for neighbours that it has not, with no weight; so vertex 0 is written last.
+    """
+    i0 = table.patch[6 * k + 0]
+    i1 = table.patch[6 * k + 1]
+    i2 = table.patch[6 * k + 2]
+    i3 = table.patch[6 * k + 3]
+    i4 = table.patch[6 * k + 4]
+    i5 = table.patch[6 * k + 5]
+    w0 = at(t.w, i0)
+    w1 = at(t.w, i1)
+    w2 = at(t.w, i2)
+    w3 = at(t.w, i3)
+    w4 = at(t.w, i4)
+    w5 = at(t.w, i5)
+    x0 = at(t.x, i0)
+    x1 = at(t.x, i1)
+    x2 = at(t.x, i2)
+    x3 = at(t.x, i3)
+    x4 = at(t.x, i4)
+    x5 = at(t.x, i5)
+    y0 = at(t.y, i0)
+    y1 = at(t.y, i1)
+    y2 = at(t.y, i2)
+    y3 = at(t.y, i3)
+    y4 = at(t.y, i4)
+    y5 = at(t.y, i5)
+    z0 = at(t.z, i0)
+    z1 = at(t.z, i1)
+    z2 = at(t.z, i2)
+    z3 = at(t.z, i3)
+    z4 = at(t.z, i4)
+    z5 = at(t.z, i5)
+    parts = int(3)  # a variable: the loop stays a loop, and kernels compile sooner
+    for j in range(parts):
+        row = 18 * k + 6 * j
+        cx = total(table.patch_weight, row, x0, x1, x2, x3, x4, x5)
+        cy = total(table.patch_weight, row, y0, y1, y2, y3, y4, y5)
+        cz = total(table.patch_weight, row, z0, z1, z2, z3, z4, z5)
+        weight = fill(cx, 0.0)
+        k0 = table.patch_weight[row + 0]
+        k1 = table.patch_weight[row + 1]
+        k2 = table.patch_weight[row + 2]
+        k3 = table.patch_weight[row + 3]
+        k4 = table.patch_weight[row + 4]
+        k5 = table.patch_weight[row + 5]
+        weight = weight + scaled(scaled(w0, k0), k0)
+        weight = weight + scaled(scaled(w1, k1), k1)
+        weight = weight + scaled(scaled(w2, k2), k2)
+        weight = weight + scaled(scaled(w3, k3), k3)
+        weight = weight + scaled(scaled(w4, k4), k4)
+        weight = weight + scaled(scaled(w5, k5), k5)
+        if damped != 0:
+            before = total_at(t.px, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
+            cx = cx + times(gamma, cx - before)
+            before = total_at(t.py, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
+            cy = cy + times(gamma, cy - before)
+            before = total_at(t.pz, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
+            cz = cz + times(gamma, cz - before)
+            weight = weight + times(gamma, weight)
+        if is_set(table.patch_curved[k]):
+            r = 9 * k + 3 * j
+            ex = x1 - x0
+            ey = y1 - y0
+            ez = z1 - z0
+            fx = x2 - x0
+            fy = y2 - y0
+            fz = z2 - z0
+            nx = times(ey, fz) - times(ez, fy)
+            ny = times(ez, fx) - times(ex, fz)
+            nz = times(ex, fy) - times(ey, fx)
+            n = scaled(
+                over(fill(nx, 1.0), root(times(nx, nx) + times(ny, ny) + times(nz, nz) + fill(nx, 1.0e-20))),
+                table.patch_rest[r + 2],
+            )
+            u = table.patch_rest[r]
+            v = table.patch_rest[r + 1]
+            cx = cx - scaled(ex, u) - scaled(fx, v) - times(nx, n)
+            cy = cy - scaled(ey, u) - scaled(fy, v) - times(ny, n)
+            cz = cz - scaled(ez, u) - scaled(fz, v) - times(nz, n)
+        s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
+        s0 = scaled(times(s, w0), k0)
+        x0 = x0 + times(cx, s0)
+        y0 = y0 + times(cy, s0)
+        z0 = z0 + times(cz, s0)
+        s1 = scaled(times(s, w1), k1)
+        x1 = x1 + times(cx, s1)
+        y1 = y1 + times(cy, s1)
+        z1 = z1 + times(cz, s1)
+        s2 = scaled(times(s, w2), k2)
+        x2 = x2 + times(cx, s2)
+        y2 = y2 + times(cy, s2)
+        z2 = z2 + times(cz, s2)
+        s3 = scaled(times(s, w3), k3)
+        x3 = x3 + times(cx, s3)
+        y3 = y3 + times(cy, s3)
+        z3 = z3 + times(cz, s3)
+        s4 = scaled(times(s, w4), k4)
+        x4 = x4 + times(cx, s4)
+        y4 = y4 + times(cy, s4)
+        z4 = z4 + times(cz, s4)
+        s5 = scaled(times(s, w5), k5)
+        x5 = x5 + times(cx, s5)
+        y5 = y5 + times(cy, s5)
+        z5 = z5 + times(cz, s5)
+    put(t.x, i5, x5)
+    put(t.y, i5, y5)
+    put(t.z, i5, z5)
+    put(t.x, i4, x4)
+    put(t.y, i4, y4)
+    put(t.z, i4, z4)
+    put(t.x, i3, x3)
+    put(t.y, i3, y3)
+    put(t.z, i3, z3)
+    put(t.x, i2, x2)
+    put(t.y, i2, y2)
+    put(t.z, i2, z2)
+    put(t.x, i1, x1)
+    put(t.y, i1, y1)
+    put(t.z, i1, z1)
+    put(t.x, i0, x0)
+    put(t.y, i0, y0)
+    put(t.z, i0, z0)

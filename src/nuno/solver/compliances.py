@@ -25,7 +25,8 @@ class Compliances:
         triangle: (triangles, 3) int32, the places in ``stretch`` along warp and weft, and in ``shear``.
         cell: (cells,) int32, the place in ``shear``.
         line: (lines,) int32, the place in ``bend``.
-        hinge: (hinges,) int32, the place in ``bend``.
+        twist: (twists,) int32, the place in ``bend``.
+        patch: (patches,) int32, the place in ``bend``.
     """
 
     stretch: np.ndarray
@@ -35,7 +36,8 @@ class Compliances:
     triangle: np.ndarray
     cell: np.ndarray
     line: np.ndarray
-    hinge: np.ndarray
+    twist: np.ndarray
+    patch: np.ndarray
 
 
 def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compliances:
@@ -64,12 +66,14 @@ def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compl
         places = np.zeros((0, 3), dtype=int)
     shear_soft, cell = _of_elements(topology, topology.cells if len(topology.cells) else triangles, shear)
     lines, line = _of_elements(topology, topology.lines, bend)
-    hinges, hinge = _of_elements(topology, topology.hinges, bend)
-    indices = (edge, places, cell[: len(topology.cells)], line, hinge + lines.shape[1])
+    twists, twist = _of_elements(topology, topology.twists, bend)
+    soft, patch = _of_elements(topology, topology.patches, bend)
+    twist, patch = twist + lines.shape[1], patch + lines.shape[1] + twists.shape[1]
+    indices = (edge, places, cell[: len(topology.cells)], line, twist, patch)
     return Compliances(
         stretch_soft,
         shear_soft,
-        np.concatenate([lines, hinges], axis=1),
+        np.concatenate([lines, twists, soft], axis=1),
         *(np.ascontiguousarray(index, dtype=np.int32) for index in indices),
     )
 

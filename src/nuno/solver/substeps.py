@@ -7,7 +7,9 @@ from nuno.scene.cloth import ClothTopology
 SAG, MESH_SAG = 0.01, 0.0025
 """Strain scale 2 g L dt^2 / h^2 that the default number of substeps allows a sheet and a cloth mesh."""
 BENDING_STEP = 1.8
-"""The default number of substeps keeps B dt^2 / (rho h^4) at or under one over this."""
+"""The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
+PATCH_STEP = 0.75
+"""The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
 FEWEST, MOST_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
 
@@ -21,8 +23,9 @@ def default_substeps(
     percentile of the strain of sheets of 16 to 64 cells a side (0.3 and 1 m, 300 to 1000 N/m) that hang by two
     corners is 0 to 0.2 % of strain above its value at 160 substeps or more, which itself is 0.4 to 1.8 %; at 5000 N/m
     it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
-    the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip
-    then hangs within 10 % of its rigidity; one so stiff that this asks for more than `MOST_SUBSTEPS` comes out softer.
+    the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
+    within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. One so stiff that this asks for more than
+    `MOST_SUBSTEPS` comes out softer.
 
     Args:
         topology: The cloth's elements.
@@ -35,5 +38,8 @@ def default_substeps(
     allowed = SAG if len(topology.edges) else MESH_SAG
     step = h * math.sqrt(allowed / (2.0 * max(gravity, 1.0) * topology.extent))
     if rigidity > 0.0:
-        step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
+        if len(topology.patches):
+            step = min(step, math.sqrt(PATCH_STEP * density / (topology.bend_rate * rigidity)))
+        else:
+            step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
     return min(max(FEWEST, math.ceil(frame / step)), MOST_SUBSTEPS)

@@ -1,0 +1,43 @@
+"""The drape of a cloth over a disc: from limp to stiff. Comparison with measured fabrics: docs/performance.md."""
+
+import numpy as np
+import pytest
+from drape import drape_coefficients, seen_from_above
+from world_with import GRAVITY
+
+import nuno
+
+SIZE, PLATE, DENSITY = (0.3, 0.3), 0.18, 0.2  # [m], [m], [kg/m2]
+
+
+def drapes(lengths, cells):
+    """Return the drape coefficients of cloths with bending lengths c = (B / w)^(1/3) [m]."""
+    material = nuno.Cloth(
+        area_density=DENSITY, bending_rigidity=DENSITY * GRAVITY * np.asarray(lengths) ** 3, shear_stiffness=50.0,
+        thickness=1e-3, air_drag=3.0,
+    )  # fmt: skip
+    return drape_coefficients(SIZE, PLATE, (cells, cells), material, len(lengths))
+
+
+def test_the_area_seen_from_above_is_the_squares():
+    """Exact: a square of 0.1 m, also where triangles lie on each other."""
+    x = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0], [0.05, 0.05, 0.1]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 4]])
+    assert seen_from_above(x, faces) == pytest.approx(0.01, rel=2e-3)  # half a pixel of 0.5 mm
+
+
+def test_stiffer_cloth_drapes_less():
+    """From a fifth for a limp cloth (measured towels have 0.2, napkins less) to 1 for a board, and never falling."""
+    found = drapes([0.01, 0.025, 0.04, 0.07, 0.3], 20)
+    assert (np.diff(found) > 0.0).all()
+    # the corner over the disc's rim hangs l = 0.122 m: as a strip of G = (l / c)^3 = 0.07 it falls by l G / 8, 1 mm
+    assert found[-1] == pytest.approx(1.0, abs=0.01)
+    assert found[0] < 0.3
+
+
+@pytest.mark.slow
+def test_a_finer_mesh_drapes_the_same():
+    """Convergence: where folds are wide against cells (c = 25 to 70 mm), the mesh matters little."""
+    lengths = [0.025, 0.04, 0.07]
+    # how many folds form, four or five, is a close thing
+    np.testing.assert_allclose(drapes(lengths, 32), drapes(lengths, 20), atol=0.08)
