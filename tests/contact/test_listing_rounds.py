@@ -1,78 +1,54 @@
-"""The listing by many threads in three rounds, tried out on the CPU with a launch for each round."""
+"""The listing by a CUDA block in rounds, against a search of all pairs and against the CPU's list."""
 
 import numpy as np
 import pytest
-import warp as wp
+import trimesh
 
 import nuno
-from nuno.contact import nearness, pair_lists, rounds
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.cloth_solver import ClothSolver
-from nuno.solver.state import THICKNESS, Settings, Sizes, StateFloat, Topology, view
+from nuno.solver.state import MOTION
 
-BOUND, GROUPS, ALONE, BLOCKS, SUSPECTS, EXAMINE = range(6)
-
-
-@wp.kernel(enable_backward=False)
-def listing(s: StateFloat, topo: Topology, size: Sizes, run: Settings, phase: int, threads: int):
-    """One phase of the listing; block pairs are taken without their groups."""
-    thread = wp.tid()
-    t = view(s, 0, topo.particles, size)
-    far = t.scalars[THICKNESS] + 1.01 * run.margin
-    far2 = far * far
-    if phase == BOUND:
-        nearness.middles(t, topo, thread, threads)
-        nearness.bound_blocks(t, topo, thread, threads)
-    elif phase == GROUPS:
-        nearness.bound_groups(t, topo, thread, threads)
-    elif phase == ALONE:
-        pair_lists.find_pairs(t, topo, run.margin, thread, threads)
-    elif phase == BLOCKS:
-        for a in range(thread, topo.blocks, threads):
-            for b in range(a, topo.blocks):
-                gap = far + 1.0
-                for c in range(3):
-                    gap = wp.min(gap, t.bounds[6 * b + 3 + c] - t.bounds[6 * a + c] + far)
-                    gap = wp.min(gap, t.bounds[6 * a + 3 + c] - t.bounds[6 * b + c] + far)
-                if gap > 0.0:
-                    if rounds.put_off(t, a, b, threads) == 0:
-                        pair_lists.find_vertex_triangle(t, topo, a, b, far, far2)
-                        if a != b:
-                            pair_lists.find_vertex_triangle(t, topo, b, a, far, far2)
-                        pair_lists.find_edge_edge(t, topo, a, b, far, far2)
-        pair_lists.find_creases(t, topo, far2, thread, threads)
-    elif phase == SUSPECTS:
-        rounds.suspect_vertices(t, topo, far, far2, thread, threads)
-        rounds.suspect_edges(t, topo, far, far2, thread, threads)
-    else:
-        rounds.examine(t, topo, far2, thread, threads)
+THICKNESS = 0.004
 
 
-def listed(cloth, positions, phases, threads):
-    """The sorted vertex-triangle and edge-edge pairs, and how many entries the first two rounds asked for."""
-    made = ClothSolver(cloth, nuno.Cloth(thickness=0.004), positions[None], 0 * positions[None], plan="fused")
-    state, size, run = made._state, made._size, made.settings(0.0, 1e-3)
-    kept = state.pair_count, state.vertex_triangle, state.edge_edge
-    for phase in phases:
-        inputs = [state, made._topology, size, run, phase, threads]
-        wp.launch(listing, dim=threads, inputs=inputs, device="cpu")
-    counts = kept[0].numpy()
-    assert counts[0] <= size.vertex_triangle and counts[1] <= size.edge_edge
-    pairs = [np.array(a.numpy()).reshape(-1, 4)[:k] for a, k in zip(kept[1:], counts, strict=True)]
-    return [p[np.lexsort(p.T)] for p in pairs], state.touch_count.numpy()
+def listed(cloth, positions, device):
+    """The listed vertex-triangle and edge-edge pairs as sets, and the distance up to which they are complete [m]."""
+    made = ClothSolver(
+        cloth, nuno.Cloth(thickness=THICKNESS), positions[None], 0 * positions[None], plan="fused", device=device
+    )
+    made.open(0.0, 1e-3, 20)
+    made.step_parts(0, MOTION)
+    state, counts = made._state, made.pair_counts[0]
+    assert counts[0] <= made._size.vertex_triangle and counts[1] <= made._size.edge_edge
+    faces, edges = (
+        a.numpy().reshape(-1, 4)[:k] for a, k in zip((state.vertex_triangle, state.edge_edge), counts, strict=True)
+    )
+    near = {(int(q[0]), *sorted(map(int, q[1:]))) for q in faces}
+    return near, {frozenset((frozenset(map(int, q[:2])), frozenset(map(int, q[2:])))) for q in edges}, made
 
 
-@pytest.mark.parametrize("threads", [64, 256])
+@pytest.mark.cuda
+@pytest.mark.parametrize("scale", [0.004, 0.02])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
-def test_three_rounds_list_the_pairs_of_one_thread(kind, threads):
-    """Invariant: the same pairs, also where the suspects do not fit their list and are examined on the spot."""
+def test_a_block_lists_all_that_is_near(kind, scale):
+    """Exact: every pair nearer than thickness and margin; at 20 mm the suspects do not fit their room at once."""
     cloth = ClothTopology.sheet((14, 11), (0.28, 0.22))
     if kind == "mesh":
         cloth = ClothTopology.mesh(cloth.rest[:, :2], cloth.faces)
-    positions = cloth.rest + np.random.default_rng(3).normal(scale=0.02, size=cloth.rest.shape)
-    expected, _ = listed(cloth, positions, (BOUND, GROUPS, ALONE), 1)
-    found, asked = listed(cloth, positions, (BOUND, GROUPS, BLOCKS, SUSPECTS, EXAMINE), threads)
-    assert len(expected[0]) > 100 and len(expected[1]) > 100
-    assert asked[0] > 0 and asked[1] > 2 * (16 * len(positions) + 128), "the lists are to overflow"
-    for a, b in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(a, b)
+    positions = cloth.rest + np.random.default_rng(3).normal(scale=scale, size=cloth.rest.shape)
+    vertex_triangle, edge_edge, made = listed(cloth, positions, "cuda:0")
+    far = made._scalars[0, 3] + made.settings(0.0, 1e-3, 20).margin
+    n, m = len(positions), len(cloth.faces)
+    i, f = np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
+    found = trimesh.triangles.closest_point(positions[cloth.faces[f]], positions[i])
+    apart = (cloth.faces[f] != i[:, None]).all(axis=1)
+    # 10 um: positions are floats
+    near = apart & (np.linalg.norm(found - positions[i], axis=1) < far - 1e-5)
+    assert near.sum() > 100
+    missing = {(int(a), *sorted(map(int, cloth.faces[b]))) for a, b in zip(i[near], f[near], strict=True)}
+    assert missing <= vertex_triangle
+    # the test of two edges is exact, so that both devices list the same but for rounding
+    _, expected, _ = listed(cloth, positions, "cpu")
+    assert len(expected) > 100
+    assert len(expected ^ edge_edge) <= 2

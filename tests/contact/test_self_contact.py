@@ -38,8 +38,8 @@ def lifted(picks: list[int], seconds: float, margin: float | None = None, **mate
     if margin is not None:
         settings = solver.settings
 
-        def with_margin(time: float, dt: float) -> object:
-            run = settings(time, dt)
+        def with_margin(time: float, dt: float, frame: int) -> object:
+            run = settings(time, dt, frame)
             run.margin = margin * topology.cell_size
             return run
 
@@ -79,7 +79,7 @@ def test_lists_hold_all_near_pairs(worlds: int) -> None:
     solver = lifted(PICKS[5 : 5 + worlds], 0.7)
     state, n, faces = solver._state, solver.particle_count, solver.topology.faces
     edges = solver.topology.edges.vertices
-    far = float(solver._scalars[0, THICKNESS]) + solver.settings(0.0, 1e-3).margin
+    far = float(solver._scalars[0, THICKNESS]) + solver.settings(0.0, 1e-3, 20).margin
     listed = solver._get(state.listed, solver._size.listed)[:, : 3 * n].reshape(worlds, 3, n).transpose(0, 2, 1)
     count = solver.pair_counts
     found = 0

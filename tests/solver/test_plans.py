@@ -7,7 +7,7 @@ import warp as wp
 import nuno
 from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
-from nuno.solver.bending import bend_hinge, bend_line
+from nuno.solver.bending import bend_line, bend_twist
 from nuno.solver.cloth_solver import ClothSolver
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.membrane import shear_cell, stretch_triangle
@@ -78,12 +78,16 @@ def test_the_large_plan_gives_the_bits_of_the_fused_one(kind, worlds):
 
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_the_large_plan_lists_the_pairs_of_the_fused_one(worlds):
-    """Invariant: the listing by many threads finds as many pairs; none touches yet, so that all else is equal."""
+    """Invariant: the listing by many threads finds as many pairs of edges; none touches yet, so that all else is equal.
+
+    The test of a vertex and a triangle lets pairs through that are not near, more or fewer by how they are looked for.
+    """
     made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "large")]
     for each in made:
         each.run(0.0, 1.0 / 60.0 / 12.0)
-    assert made[0].pair_counts.max() > 0
-    np.testing.assert_array_equal(made[0].pair_counts, made[1].pair_counts)
+    assert made[0].pair_counts.min() > 0
+    np.testing.assert_array_equal(made[0].pair_counts[:, 1], made[1].pair_counts[:, 1])
+    np.testing.assert_allclose(made[0].pair_counts[:, 0], made[1].pair_counts[:, 0], rtol=0.5)
 
 
 def test_the_large_plan_keeps_layers_apart():
@@ -115,8 +119,7 @@ def test_a_run_in_pieces_is_the_run_in_one():
         whole.run(0.0, 0.1)
         for k in range(6):
             pieces.run(k / 60.0, 1.0 / 60.0)
-        # the clock starts anew in each piece and rounds otherwise: a grip is off by an ulp of a second times its speed
-        np.testing.assert_allclose(pieces.local_positions(), whole.local_positions(), atol=2e-6)
+        np.testing.assert_array_equal(pieces.local_positions(), whole.local_positions())
 
 
 def test_more_rigid_and_finer_cloth_takes_more_substeps():
@@ -142,7 +145,7 @@ def project_floats(t: StateFloat, which: int, tables: StateFloat):
         if which == 0:
             bend_line(t, a, b, c, alpha, 1, tables.y[k])
         elif which == 1:
-            bend_hinge(t, a, b, c, d, 1.0, -1.0, -1.0, 1.0, 0.1, alpha, 1, tables.y[k])
+            bend_twist(t, a, b, c, d, alpha, 1, tables.y[k])
         elif which == 2:
             shear_cell(t, a, b, c, d, 0.7, alpha)
         else:
@@ -155,11 +158,10 @@ def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int),
     a, b, c, d = index[0], index[1], index[2], index[3]
     alpha = alphas[0]
     gamma = alphas[1]
-    one = lane(1.0)
     if which == 0:
         bend_line(t, a, b, c, alpha, 1, gamma)
     elif which == 1:
-        bend_hinge(t, a, b, c, d, one, -one, -one, one, lane(0.1), alpha, 1, gamma)
+        bend_twist(t, a, b, c, d, alpha, 1, gamma)
     elif which == 2:
         shear_cell(t, a, b, c, d, lane(0.7), alpha)
     else:
@@ -174,7 +176,7 @@ def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
     if which == 0:
         bend_line(t, 0, 1, 2, alpha, 1, gamma)
     elif which == 1:
-        bend_hinge(t, 0, 1, 2, 3, 1.0, -1.0, -1.0, 1.0, 0.1, alpha, 1, gamma)
+        bend_twist(t, 0, 1, 2, 3, alpha, 1, gamma)
     elif which == 2:
         shear_cell(t, 0, 1, 2, 3, 0.7, alpha)
     else:
@@ -189,7 +191,7 @@ def filled(kind, values, dtype):
     return t
 
 
-@pytest.mark.parametrize("which", range(4), ids=["line", "hinge", "cell", "triangle"])
+@pytest.mark.parametrize("which", range(4), ids=["line", "twist", "cell", "triangle"])
 def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     """Promise: float, sixteen worlds and sixteen elements are one function."""
     random = np.random.default_rng(which)
@@ -224,9 +226,12 @@ def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
 @pytest.mark.cuda
 @pytest.mark.parametrize("plan", ["fused", "large"])
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
-    """Promise: same input, same bits, in any place of a batch, self-contact included."""
+    """Promise: same input, same bits, in any place of a batch, self-contact included.
+
+    Many worlds run with fewer threads each than few do.
+    """
     alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
-    for worlds in (1, 5):
+    for worlds in (1, 5, 300) if plan == "fused" else (1, 5):
         again = solver("sheet", plan, worlds, device="cuda:0", self_contact=True)
         np.testing.assert_array_equal(outcome(again), alone)
         np.testing.assert_array_equal(again.local_positions()[-1], alone[0])

@@ -22,6 +22,7 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
 )
 from nuno.solver.state import Topology
+from nuno.solver.warps import leads_warp, most_of_warp
 
 GROUP = 8
 """Consecutive blocks that are passed over together where their common box is far."""
@@ -89,30 +90,6 @@ def append(
     c: lane_int,
     d: lane_int,
 ): ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-if (threads % 32 == 0)
-    for (int k = 16; k > 0; k /= 2) value = fmaxf(value, __shfl_xor_sync(0xffffffffu, value, k));
-#endif
-return value;
-""")
-def most_of_warp(value: float, threads: int) -> float:
-    """The largest value of the 32 threads that run together, all of which must come here."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-return threads % 32 != 0 || thread % 32 == 0;
-#else
-return true;
-#endif
-""")
-def leads_warp(thread: int, threads: int) -> bool:
-    """Whether the thread speaks for those that `most_of_warp` has looked at."""
-    ...
 
 
 @wp.func

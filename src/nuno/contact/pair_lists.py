@@ -11,16 +11,10 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.nearness import (
-    GROUP,
     append,
-    bound_blocks,
-    bound_groups,
-    measure_span,
-    middles,
     near_edges,
     near_triangle,
 )
-from nuno.contact.rounds import examine, put_off, suspect_edges, suspect_vertices
 from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     add,
     anywhere,
@@ -36,7 +30,7 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
     within,
 )
-from nuno.solver.state import LISTINGS, PICK_REACH, PICKED, SPEED, THICKNESS, TRAVEL, Settings, Topology
+from nuno.solver.state import PICK_REACH, PICKED, SPEED, THICKNESS, Settings, Topology
 
 PICK_AHEAD = wp.constant(1.5)
 """Substeps for which the pairs that may touch are picked, at the speed of the moment."""
@@ -120,46 +114,6 @@ def find_creases(t: Any, topo: Topology, far2: Any, thread: int, threads: int):
 
 
 @wp.func
-def find_pairs(t: Any, topo: Topology, margin: float, thread: int, threads: int):
-    """List all pairs that share no vertex and are nearer than the thickness and the margin."""
-    m = topo.blocks
-    # the last percent is for rounding, in here and in the displacements
-    far = t.scalars[THICKNESS] + fill(t.x[0], 1.01 * margin)
-    far2 = times(far, far)
-    for a in range(thread, m, threads):
-        lx = t.bounds[6 * a] - far
-        ly = t.bounds[6 * a + 1] - far
-        lz = t.bounds[6 * a + 2] - far
-        hx = t.bounds[6 * a + 3] + far
-        hy = t.bounds[6 * a + 4] + far
-        hz = t.bounds[6 * a + 5] + far
-        for g in range(a / GROUP, (m + GROUP - 1) / GROUP):
-            k = 6 * (m + g)
-            gx = least(t.bounds[k + 3] - lx, hx - t.bounds[k])
-            gy = least(t.bounds[k + 4] - ly, hy - t.bounds[k + 1])
-            gz = least(t.bounds[k + 5] - lz, hz - t.bounds[k + 2])
-            if anywhere(least(gx, least(gy, gz))):
-                for b in range(wp.max(a, GROUP * g), wp.min(GROUP * g + GROUP, m)):
-                    k = 6 * b
-                    gx = least(t.bounds[k + 3] - lx, hx - t.bounds[k])
-                    gy = least(t.bounds[k + 4] - ly, hy - t.bounds[k + 1])
-                    gz = least(t.bounds[k + 5] - lz, hz - t.bounds[k + 2])
-                    if anywhere(least(gx, least(gy, gz))):
-                        if put_off(t, a, b, threads) == 0:
-                            find_vertex_triangle(t, topo, a, b, far, far2)
-                            if a != b:
-                                find_vertex_triangle(t, topo, b, a, far, far2)
-                            find_edge_edge(t, topo, a, b, far, far2)
-    find_creases(t, topo, far2, thread, threads)
-    if threads > 1:
-        barrier(threads)
-        suspect_vertices(t, topo, far, far2, thread, threads)
-        suspect_edges(t, topo, far, far2, thread, threads)
-        barrier(threads)
-        examine(t, topo, far2, thread, threads)
-
-
-@wp.func
 def swept(t: Any, run: Settings):
     """How far beyond its thickness a pair is looked at [m], when a substep begins.
 
@@ -207,52 +161,3 @@ def pick_touching(t: Any, run: Settings, fresh: int, thread: int, threads: int):
             hit = choose(within(like, k, t.pair_count[1]), near_edges(t, a, b, c, d, far2), none)
             append(hit, t.touch_count, 1, t.touch_edge, a, b, c, d)
         barrier(threads)
-
-
-@wp.func
-def find_contacts(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
-    """List self-contact pairs anew where two points may have come closer by the margin since.
-
-    Twice the sum of the largest speeds is a bound on that; where it is used up, the displacements are measured.
-    """
-    n = topo.particles
-    fresh = int(0)
-    left = fill(t.x[0], run.margin) - swept(t, run)
-    if anywhere(t.notes[TRAVEL] * 2.0 - left):
-        barrier(threads)
-        if thread == 0:
-            for k in range(6):
-                t.listed[3 * n + k] = fill(left, -1.0e30)
-        barrier(threads)
-        measure_span(t, n, thread, threads)
-        barrier(threads)
-        dx = t.listed[3 * n] + t.listed[3 * n + 3]
-        dy = t.listed[3 * n + 1] + t.listed[3 * n + 4]
-        dz = t.listed[3 * n + 2] + t.listed[3 * n + 5]
-        span = root(times(dx, dx) + times(dy, dy) + times(dz, dz))
-        span = most(span, t.notes[TRAVEL] - fill(left, FORGET))
-        barrier(threads)
-        if anywhere(span - left):
-            fresh = 1
-            if thread == 0:
-                t.pair_count[0] = t.pair_count[0] * 0
-                t.pair_count[1] = t.pair_count[1] * 0
-                t.touch_count[0] = t.touch_count[0] * 0
-                t.touch_count[1] = t.touch_count[1] * 0
-                t.notes[TRAVEL] = fill(left, 0.0)
-                t.notes[LISTINGS] = t.notes[LISTINGS] + fill(left, 1.0)
-            for i in range(thread, n, threads):
-                t.listed[i] = t.x[i]
-                t.listed[n + i] = t.y[i]
-                t.listed[2 * n + i] = t.z[i]
-            middles(t, topo, thread, threads)
-            bound_blocks(t, topo, thread, threads)
-            barrier(threads)
-            bound_groups(t, topo, thread, threads)
-            barrier(threads)
-            find_pairs(t, topo, run.margin, thread, threads)
-        else:
-            if thread == 0:
-                t.notes[TRAVEL] = span * 0.5
-        barrier(threads)
-    pick_touching(t, run, fresh, thread, threads)

@@ -14,6 +14,12 @@ BLOCK_VERTICES = 4
 """Vertices of a block, at most."""
 
 
+REGION = 16
+"""Consecutive blocks whose displacements are looked at together, to tell how long a list is good."""
+WINDOW = 5
+"""Vertices along a side of the windows of a sheet's grid that are found to be flat enough to be passed over."""
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Vertices, triangles and edges sorted by block; each belongs to one block.
@@ -28,6 +34,12 @@ class Blocks:
         corner: (k,) int, all vertices that a block's own elements have, sorted by block.
         corner_start: (count + 1,) int.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
+        region_corner: (r,) int, all vertices of the elements of each region of `REGION` consecutive blocks.
+        region_start: (regions + 1,) int.
+        columns: Vertices in a row of a sheet's grid, if the grid has windows of `WINDOW` vertices a side; else 0.
+        span: (4 w,) int, the first and last column and the first and last row of each block's corners on that grid,
+            each of the four for all blocks, in a row of whole sixteens.
+        crease_window: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
     """
 
     vertex: np.ndarray
@@ -39,6 +51,11 @@ class Blocks:
     corner: np.ndarray
     corner_start: np.ndarray
     crease: np.ndarray
+    region_corner: np.ndarray
+    region_start: np.ndarray
+    columns: int
+    span: np.ndarray
+    crease_window: np.ndarray
 
     @property
     def count(self) -> int:
@@ -47,7 +64,12 @@ class Blocks:
 
 
 def make_blocks(
-    rest: np.ndarray, faces: np.ndarray, edges: np.ndarray, crease: np.ndarray, size: int = BLOCK_VERTICES
+    rest: np.ndarray,
+    faces: np.ndarray,
+    edges: np.ndarray,
+    crease: np.ndarray,
+    size: int = BLOCK_VERTICES,
+    columns: int = 0,
 ) -> Blocks:
     """Halve the rest shape again and again along its axes until at most ``size`` vertices are left in a block.
 
@@ -57,6 +79,7 @@ def make_blocks(
         edges: (e, 2) int, the edges that collide.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
         size: Vertices of a block, at most.
+        columns: Vertices in a row of a sheet's grid; 0 for what is no sheet.
     """
     count = len(rest)
     levels = max(0, int(np.ceil(np.log2(max(1.0, count / size)))))
@@ -89,7 +112,28 @@ def make_blocks(
     own = np.concatenate([group * count + np.arange(count), (face_owner[:, None] * count + face).ravel()])
     own = np.unique(np.concatenate([own, (edge_owner[:, None] * count + edge).ravel()]))
     starts = np.arange(blocks + 1)
+    region = np.unique(own // count // REGION * count + own % count)
+    region_start = np.searchsorted(region // count, np.arange(-(-blocks // REGION) + 1))
+    corner, corner_start = own % count, np.searchsorted(own // count, starts)
+    if min(columns, count // max(1, columns)) < WINDOW:
+        columns = 0
     return Blocks(
-        order, np.searchsorted(group[order], starts), face, face_start, edge, edge_start,
-        own % count, np.searchsorted(own // count, starts), crease,
+        order, np.searchsorted(group[order], starts), face, face_start, edge, edge_start, corner, corner_start, crease,
+        region % count, region_start, columns, *_grid(corner, corner_start, crease, columns, count),
     )  # fmt: skip
+
+
+def _grid(
+    corner: np.ndarray, start: np.ndarray, crease: np.ndarray, columns: int, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where blocks and creases are on a sheet's grid: `Blocks.span` and `Blocks.crease_window`."""
+    blocks = len(start) - 1
+    span = np.zeros((4, -(-blocks // 16) * 16), dtype=np.int64)
+    if columns == 0:
+        return span.ravel(), np.zeros(len(crease), dtype=np.int64)
+    for k, place in enumerate((corner % columns, corner // columns)):
+        span[2 * k, :blocks] = np.minimum.reduceat(place, start[:-1])
+        span[2 * k + 1, :blocks] = np.maximum.reduceat(place, start[:-1])
+    left = np.minimum((crease % columns).min(axis=1), columns - 3)
+    low = np.minimum((crease // columns).min(axis=1), count // columns - 3)
+    return span.ravel(), low * columns + left

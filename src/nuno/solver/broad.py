@@ -1,6 +1,6 @@
 """The listing of self-contact pairs over the whole device, for the plan of large scenes.
 
-`nuno.contact.pair_lists.find_contacts` in phases, a launch each: whether to list is decided on the device, and a phase
+What `nuno.contact.renewal` does, in phases, a launch each: whether to list is decided on the device, and a phase
 does nothing in a world where it is not due. A thread looks at one block and the blocks of `REACH` groups of later ones,
 which gives work to a whole device and passes over far groups at a comparison each.
 """
@@ -103,7 +103,7 @@ def find(s: StateFloat, topo: Topology, size: Sizes, run: Settings, due: wp.arra
     if due[world] != LIST or last * GROUP <= a:
         return
     t = view(s, world, topo.particles, size)
-    # as in find_pairs, the last percent is for rounding
+    # the last percent is for rounding, in here and in the displacements
     far = t.scalars[THICKNESS] + 1.01 * run.margin
     grow = wp.vec3(far, far, far)
     lo = wp.vec3(t.bounds[6 * a], t.bounds[6 * a + 1], t.bounds[6 * a + 2]) - grow

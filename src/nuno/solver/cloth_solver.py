@@ -9,12 +9,13 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.nearness import GROUP
+from nuno.contact.world_room import listing_room
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.frame import run_lanes, run_worlds
-from nuno.solver.large import CELLS, HINGES, LINES, TRIANGLES, YARNS, LargePlan
+from nuno.solver.large import CELLS, LINES, PATCHES, TRIANGLES, TWISTS, YARNS, LargePlan
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.shared import SHARED_PARTICLES, run_blocks, run_blocks_shared
+from nuno.solver.shared import FEW_THREADS, MANY_THREADS, SHARED_PARTICLES, run_blocks, run_blocks_shared
 from nuno.solver.state import ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
 from nuno.solver.substeps import default_substeps
 from nuno.solver.upload import upload
@@ -23,8 +24,6 @@ from nuno.solver.wide import run_wide, widen_topology
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
-BLOCK_THREADS = 256
-"""Threads of a CUDA block, which runs one world."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
 
@@ -92,7 +91,7 @@ class ClothSolver(ParticleSolver):
         shared = upload(topology, self.device)
         for name, value in shared.items():
             setattr(topo, name, value)
-        topo.particles, topo.blocks = n, topology.blocks.count
+        topo.particles, topo.blocks, topo.columns = n, topology.blocks.count, topology.blocks.columns
         self._size, self._state, self._topology = size, state, topo
 
         soft = compliances(topology, values)
@@ -100,7 +99,7 @@ class ClothSolver(ParticleSolver):
             table = getattr(soft, kind)
             setattr(state, f"{kind}_soft", self._put(table))
             setattr(size, f"{kind}_soft", table.shape[1])
-        for kind in ("edge", "cell", "line", "hinge"):
+        for kind in ("edge", "cell", "line", "twist", "patch"):
             setattr(topo, f"{kind}_soft", wp.array(getattr(soft, kind), dtype=int, device=self.device))
         topo.triangle_soft = wp.array(soft.triangle, dtype=wp.vec3i, device=self.device)
         self.mass = vertex_masses(topology, values["area_density"])
@@ -123,8 +122,17 @@ class ClothSolver(ParticleSolver):
         blocks = self.topology.blocks
         # boxes of blocks, and of groups of blocks, six numbers each
         size.blocks = 6 * (blocks.count + -(-blocks.count // GROUP))
-        size.listed = 3 * n + 6 if self.self_contact else 1
-        size.middle = 4 * (len(blocks.face) + len(blocks.edge)) if self.self_contact else 1
+        size.listed = 3 * n + 8 if self.self_contact else 1
+        size.near_blocks = 1
+        if self._cuda and self.plan != "large" and self.self_contact:
+            # and boxes of what each block moved; pairs of blocks: all, or of many 128 each
+            size.blocks += 6 * blocks.count
+            size.near_blocks = 1 + min(blocks.count * (blocks.count + 1) // 2, 128 * blocks.count)
+        elements = len(blocks.face), len(blocks.edge)
+        # spheres of all elements, or on the CPU the room in which one world after the other is listed
+        alone = not self._cuda and self.plan != "large"
+        room = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
+        size.middle = room if self.self_contact else 1
         # candidates seen in crumpled cloths: under 3 a vertex (vertex-triangle) and 8 a vertex (edge-edge)
         size.vertex_triangle, size.edge_edge = 6 * n + 64, 16 * n + 128
         if not self.self_contact:
@@ -148,6 +156,7 @@ class ClothSolver(ParticleSolver):
             state.touch_triangle = empty(4 * size.vertex_triangle, self._integer)
             state.touch_edge = empty(4 * size.edge_edge, self._integer)
             state.touch_count = empty(2, self._integer)
+        state.near_blocks = empty(size.near_blocks, self._integer)
         state.moved = empty(size.moved, int)
 
     @property
@@ -164,9 +173,10 @@ class ClothSolver(ParticleSolver):
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
             fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
+            threads = FEW_THREADS if self.world_count <= wp.get_device(self.device).sm_count else MANY_THREADS
             wp.launch(
-                run_blocks_shared if fits else run_blocks, dim=self.group_count * BLOCK_THREADS,
-                inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
+                run_blocks_shared if fits else run_blocks, dim=self.group_count * threads,
+                inputs=[*common, substeps, threads], device=self.device, block_dim=threads,
             )  # fmt: skip
         elif self.plan == "vector":
             if self._wide is None:
@@ -185,7 +195,7 @@ class ClothSolver(ParticleSolver):
 
     def _large_plan(self) -> LargePlan:
         topology = self.topology
-        kinds = {HINGES: topology.hinges, LINES: topology.lines, CELLS: topology.cells}
+        kinds = {PATCHES: topology.patches, TWISTS: topology.twists, LINES: topology.lines, CELLS: topology.cells}
         colours = {kind: elements.offsets for kind, elements in kinds.items()}
         colours |= {TRIANGLES: topology.triangles.offsets, YARNS: self._topology.yarn_kind.numpy()}
         parts = (self._state, self._topology, self._size, self._shapes)

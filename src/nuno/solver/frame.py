@@ -9,11 +9,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.pair_lists import find_contacts
-from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.renewal import renew_lists
+from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
-from nuno.solver.bending import bend_hinge, bend_line
-from nuno.solver.grips import hold_vertices, pull_points
+from nuno.solver.bending import bend_line, bend_patch, bend_twist
+from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
@@ -33,6 +33,8 @@ from nuno.solver.state import (
     view,
 )
 from nuno.solver.vector import at, corner, scaled, spread
+from nuno.solver.warps import WARP, in_warps
+from nuno.solver.yarns import WARP_EDGES, stretch_yarn_together
 
 
 @wp.func
@@ -49,22 +51,27 @@ def bend_lines(t: Any, table: Any, run: Settings, first: int, last: int, thread:
 
 
 @wp.func
-def bend_hinges(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The hinges and cell twists of one colour."""
+def bend_twists(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The cell twists of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
-        alpha = scaled(at(t.bend_soft, table.hinge_soft[k]), table.hinge_scale[k] * rate)
-        a = corner(table.hinge, k, 0, 4)
-        b = corner(table.hinge, k, 1, 4)
-        c = corner(table.hinge, k, 2, 4)
-        d = corner(table.hinge, k, 3, 4)
-        ka = corner(table.hinge_weight, k, 0, 4)
-        kb = corner(table.hinge_weight, k, 1, 4)
-        kc = corner(table.hinge_weight, k, 2, 4)
-        kd = corner(table.hinge_weight, k, 3, 4)
-        gamma = spread(alpha, damping)
-        bend_hinge(t, a, b, c, d, ka, kb, kc, kd, table.hinge_rest[k], alpha, run.damped, gamma)
+        alpha = scaled(at(t.bend_soft, table.twist_soft[k]), table.twist_scale[k] * rate)
+        a = corner(table.twist, k, 0, 4)
+        b = corner(table.twist, k, 1, 4)
+        c = corner(table.twist, k, 2, 4)
+        d = corner(table.twist, k, 3, 4)
+        bend_twist(t, a, b, c, d, alpha, run.damped, spread(alpha, damping))
+
+
+@wp.func
+def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The triangles' curvatures of one colour."""
+    rate = 1.0 / (run.dt * run.dt)
+    damping = t.scalars[DAMPING] * (1.0 / run.dt)
+    for k in range(first + thread, last, threads):
+        alpha = scaled(at(t.bend_soft, table.patch_soft[k]), rate)
+        bend_patch(t, table, k, alpha, run.damped, spread(alpha, damping))
 
 
 @wp.func
@@ -105,8 +112,38 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
 
 
 @wp.func
+def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The yarns of one direction: on CUDA each by a warp, else by a thread."""
+    rate = 1.0 / (run.dt * run.dt)
+    if in_warps(threads):
+        for k in range(first + thread / WARP, last, threads / WARP):
+            start = table.yarn[k]
+            stop = table.yarn[k + 1]
+            if stop - start <= WARP_EDGES:
+                stretch_yarn_together(
+                    t.x,
+                    t.y,
+                    t.z,
+                    t.w,
+                    t.stretch_soft,
+                    table.edge,
+                    table.edge_rest,
+                    table.edge_scale,
+                    table.edge_soft,
+                    start,
+                    stop,
+                    rate,
+                )
+            elif thread % WARP == 0:
+                stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
+    else:
+        for k in range(first + thread, last, threads):
+            start = table.yarn[k]
+            stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+
+
+@wp.func
 def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The yarns of one direction."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         start = table.yarn[k]
@@ -116,8 +153,11 @@ def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thre
 @wp.func
 def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
     """One pass over the elastic constraints, the stiffest last."""
-    for c in range(topo.hinge_colour.shape[0] - 1):
-        bend_hinges(t, topo, run, topo.hinge_colour[c], topo.hinge_colour[c + 1], thread, threads)
+    for c in range(topo.patch_colour.shape[0] - 1):
+        bend_patches(t, topo, run, topo.patch_colour[c], topo.patch_colour[c + 1], thread, threads)
+        barrier(threads)
+    for c in range(topo.twist_colour.shape[0] - 1):
+        bend_twists(t, topo, run, topo.twist_colour[c], topo.twist_colour[c + 1], thread, threads)
         barrier(threads)
     for c in range(topo.line_colour.shape[0] - 1):
         bend_lines(t, topo, run, topo.line_colour[c], topo.line_colour[c + 1], thread, threads)
@@ -155,11 +195,12 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(t, n, run, shapes, thread, threads)
+                forget_loads(t, run, thread, threads)
             # before the listing, which asks how far anything went in the substep before
             tick(t, run, thread)
             barrier(threads)
             if run.touching != 0:
-                find_contacts(t, topo, run, thread, threads)
+                renew_lists(t, topo, run, thread, threads)
             predict(t, n, run, thread, threads)
             barrier(threads)
             hold_vertices(t, run, thread, threads)
@@ -169,12 +210,15 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            touch_edge_edge(t, n, run, thread, threads)
-            touch_vertex_triangle(t, n, run, thread, threads)
-            barrier(threads)
-            take_moves(t, n, thread, threads)
-            barrier(threads)
+            for _again in range(wp.where(threads > 1, PASSES, 1)):
+                touch_edge_edge(t, n, run, thread, threads)
+                touch_vertex_triangle(t, n, run, thread, threads)
+                barrier(threads)
+                take_moves(t, n, thread, threads)
+                barrier(threads)
         if run.parts & SHAPES != 0:
+            read_loads(t, run, thread, threads)
+            barrier(threads)
             touch_shapes(t, n, shapes, run.dt, thread, threads)
             barrier(threads)
         if run.parts & VELOCITIES != 0:

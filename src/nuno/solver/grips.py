@@ -5,13 +5,13 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.lanes import add, choose, clipped, fill, gather, known, largest, mul, over, place, sub, times  # noqa: F401
-from nuno.solver.state import CLOCK, Settings
+from nuno.solver.state import CLOCK, LOADS, Settings
 
 
 @wp.func
 def key_position(t: Any, run: Settings, g: int):
     """Where grip g should be now: linear or quintic minimum jerk between its key frames."""
-    now = largest(t.notes[CLOCK]) * run.dt
+    now = run.grip_start[0] + wp.float64(largest(t.notes[CLOCK])) * run.step
     first = g * run.keys
     k = int(0)
     while k < run.keys - 2 and now > run.grip_time[first + k + 1]:
@@ -20,8 +20,8 @@ def key_position(t: Any, run: Settings, g: int):
     begin = run.grip_time[first + k]
     span = run.grip_time[first + last] - begin
     s = float(1.0)
-    if span > 0.0:
-        s = wp.clamp((now - begin) / span, 0.0, 1.0)
+    if span > wp.float64(0.0):
+        s = wp.clamp(float((now - begin) / span), 0.0, 1.0)
     if run.grip_ease[g] != 0:
         s = s * s * s * (10.0 + s * (6.0 * s - 15.0))
     a = first + k
@@ -34,7 +34,11 @@ def key_position(t: Any, run: Settings, g: int):
 
 @wp.func
 def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
-    """Stiff grips on vertices: the vertex has no inverse mass and stands where its path is."""
+    """Stiff grips on vertices: the vertex stands where its path is, all but immovable.
+
+    For the time of the constraints it has a small share of its inverse mass, so that where they move it tells what they
+    pull with; `read_loads` puts it back.
+    """
     one = fill(t.x[0], 1.0)
     for g in range(thread, run.grips, threads):
         if run.grip_fixed[g] != 0:
@@ -42,8 +46,7 @@ def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
             i = clipped(t.grip_corner[3 * g])
             # a world without this grip writes back what was there
             on = known(one, t.grip_corner[3 * g])
-            if run.probing == 0:
-                on = times(on, one - choose(gather(t.w, i), one, one - one))
+            place(t.w, i, choose(on, t.grip_ghost[g], gather(t.w, i)))
             place(t.x, i, choose(on, x, gather(t.x, i)))
             place(t.y, i, choose(on, y, gather(t.y, i)))
             place(t.z, i, choose(on, z, gather(t.z, i)))
@@ -71,9 +74,44 @@ def pull_points(t: Any, run: Settings, thread: int, threads: int):
                 wc = times(kc, gather(t.w, c))
                 weight = times(wa, ka) + times(wb, kb) + times(wc, kc)
                 s = over(-on, weight + fill(x, run.grip_soft[g] + 1.0e-9))
+                add_load(t, g, dx, dy, dz, -s)
                 nudge(t, a, dx, dy, dz, times(s, wa))
                 nudge(t, b, dx, dy, dz, times(s, wb))
                 nudge(t, c, dx, dy, dz, times(s, wc))
+
+
+@wp.func
+def read_loads(t: Any, run: Settings, thread: int, threads: int):
+    """Sum up what the constraints pulled stiffly gripped vertices with, and put the vertices back."""
+    for g in range(thread, run.grips, threads):
+        if run.grip_fixed[g] != 0:
+            x, y, z = key_position(t, run, g)
+            i = clipped(t.grip_corner[3 * g])
+            on = known(x, t.grip_corner[3 * g])
+            ghost = t.grip_ghost[g]
+            share = over(on, ghost + fill(x, 1.0e-30))
+            add_load(t, g, gather(t.x, i) - x, gather(t.y, i) - y, gather(t.z, i) - z, share)
+            place(t.x, i, choose(on, x, gather(t.x, i)))
+            place(t.y, i, choose(on, y, gather(t.y, i)))
+            place(t.z, i, choose(on, z, gather(t.z, i)))
+            place(t.w, i, choose(on, x - x, gather(t.w, i)))
+
+
+@wp.func
+def add_load(t: Any, g: int, dx: Any, dy: Any, dz: Any, s: Any):
+    """Add s (dx, dy, dz) to a grip's load, one substep's."""
+    k = LOADS * g
+    t.grip_load[k] = t.grip_load[k] + times(dx, s)
+    t.grip_load[k + 1] = t.grip_load[k + 1] + times(dy, s)
+    t.grip_load[k + 2] = t.grip_load[k + 2] + times(dz, s)
+    t.grip_load[k + 3] = t.grip_load[k + 3] + fill(dx, 1.0)
+
+
+@wp.func
+def forget_loads(t: Any, run: Settings, thread: int, threads: int):
+    """Start the sums of a frame."""
+    for k in range(thread, LOADS * run.grips, threads):
+        t.grip_load[k] = fill(t.x[0], 0.0)
 
 
 @wp.func

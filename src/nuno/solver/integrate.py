@@ -4,8 +4,9 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, choose, fill, largest, most, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, choose, fill, most, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings
+from nuno.solver.warps import leads_warp, most_of_warp
 
 
 @wp.func
@@ -46,18 +47,19 @@ def predict(t: Any, n: int, run: Settings, thread: int, threads: int):
 
 
 @wp.func
-def raise_speed(notes: wp.array(dtype=float), value: float, threads: int):
+def raise_speed(notes: wp.array(dtype=float), value: float, thread: int, threads: int):
     """Keep the largest squared speed."""
     if threads > 1:
+        high = most_of_warp(value, threads)
         # most values are below what is there already; only the others queue up for the atomic
-        if value > notes[SPEED]:
-            wp.atomic_max(notes, SPEED, value)
+        if leads_warp(thread, threads) and high > notes[SPEED]:
+            wp.atomic_max(notes, SPEED, high)
     else:
         notes[SPEED] = most(notes[SPEED], value)
 
 
 @wp.func
-def raise_speed(notes: wp.array(dtype=Any), value: Any, threads: int):
+def raise_speed(notes: wp.array(dtype=Any), value: Any, thread: int, threads: int):
     notes[SPEED] = most(notes[SPEED], value)
 
 
@@ -78,8 +80,7 @@ def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
         t.vy[i] = vy
         t.vz[i] = vz
         top = most(top, times(vx, vx) + times(vy, vy) + times(vz, vz))
-    if thread < n:
-        raise_speed(t.notes, top, threads)
+    raise_speed(t.notes, top, thread, threads)
 
 
 @wp.func
@@ -95,4 +96,4 @@ def tick(t: Any, run: Settings, thread: int):
     if thread == 0:
         t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], 1.0)
         t.notes[PICKED] = t.notes[PICKED] + root(t.notes[SPEED]) * run.dt
-        t.notes[TRAVEL] = t.notes[TRAVEL] + wp.sqrt(largest(t.notes[SPEED])) * fill(t.x[0], run.dt)
+        t.notes[TRAVEL] = t.notes[TRAVEL] + root(t.notes[SPEED]) * run.dt

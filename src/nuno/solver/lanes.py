@@ -71,6 +71,42 @@ def over(a: float, b: float):
 def over(a: lane, b: lane) -> lane: ...
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return fmaf(a, b, c);
+#else
+return __builtin_fmaf(a, b, c);
+#endif
+""")
+def fused(a: float, b: float, c: float) -> float:
+    """The elementwise a b + c, rounded once; CUDA, a core and its vectors give the same bits."""
+    ...
+
+
+@wp.func_native(_simd("__builtin_elementwise_fma(A, B, C)", "a", "b", "c"))
+def fused(a: lane, b: lane, c: lane) -> lane: ...
+
+
+@wp.func_native(_simd("__builtin_elementwise_fma(A, (V){} + b, C)", "a", "c"))
+def fused(a: lane, b: float, c: lane) -> lane: ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return fmaf(-a, b, c);
+#else
+return __builtin_fmaf(-a, b, c);
+#endif
+""")
+def lessened(a: float, b: float, c: float) -> float:
+    """The elementwise c - a b, rounded once."""
+    ...
+
+
+@wp.func_native(_simd("__builtin_elementwise_fma(-A, B, C)", "a", "b", "c"))
+def lessened(a: lane, b: lane, c: lane) -> lane: ...
+
+
 @wp.func
 def root(a: float):
     """The elementwise square root."""

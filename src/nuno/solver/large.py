@@ -13,11 +13,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
 from nuno.solver.broad import PairFinder
-from nuno.solver.frame import bend_hinges, bend_lines, shear_cells, strain_triangles, stretch_yarns
-from nuno.solver.grips import hold_vertices, pull_points
+from nuno.solver.frame import bend_lines, bend_patches, bend_twists, shear_cells, strain_triangles, stretch_yarns
+from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.state import (
     LAYERS,
@@ -32,8 +32,9 @@ from nuno.solver.state import (
     Topology,
     view,
 )
+from nuno.solver.warps import WARP
 
-HINGES, LINES, CELLS, TRIANGLES, YARNS = range(5)
+PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS = range(6)
 RESET, MEASURE, SELECT, SORT = range(4)
 
 FEW = 1024
@@ -89,8 +90,10 @@ def project(s: StateFloat, topo: Topology, size: Sizes, run: Settings, kind: int
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     thread = tid % threads
-    if kind == HINGES:
-        bend_hinges(t, topo, run, first, last, thread, threads)
+    if kind == PATCHES:
+        bend_patches(t, topo, run, first, last, thread, threads)
+    elif kind == TWISTS:
+        bend_twists(t, topo, run, first, last, thread, threads)
     elif kind == LINES:
         bend_lines(t, topo, run, first, last, thread, threads)
     elif kind == CELLS:
@@ -99,6 +102,17 @@ def project(s: StateFloat, topo: Topology, size: Sizes, run: Settings, kind: int
         strain_triangles(t, topo, run, first, last, thread, threads)
     else:
         stretch_yarns(t, topo, run, first, last, thread, threads)
+
+
+@wp.kernel(enable_backward=False)
+def unload(s: StateFloat, topo: Topology, size: Sizes, run: Settings, start: int, threads: int):
+    """The loads of stiff grips: what this substep's were, or the sums set to zero."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    if start != 0:
+        forget_loads(t, run, tid % threads, threads)
+    else:
+        read_loads(t, run, tid % threads, threads)
 
 
 @wp.kernel(enable_backward=False)
@@ -118,12 +132,13 @@ def touch(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: in
 
 
 @wp.kernel(enable_backward=False)
-def settle(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
-    """Apply the sums; the old speed has served."""
+def settle(s: StateFloat, topo: Topology, size: Sizes, run: Settings, last: int, threads: int):
+    """Apply the sums; in the end the old speed has served."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     take_moves(t, topo.particles, tid % threads, threads)
-    reset_speed(t, tid % threads)
+    if last != 0:
+        reset_speed(t, tid % threads)
 
 
 @wp.kernel(enable_backward=False)
@@ -147,7 +162,7 @@ class LargePlan:
         shapes: Static shapes.
         device: "cpu" or "cuda:0" ...
         worlds: How many.
-        colours: Where each colour starts, by kind (HINGES ... YARNS).
+        colours: Where each colour starts, by kind (PATCHES ... YARNS).
     """
 
     def __init__(
@@ -157,7 +172,7 @@ class LargePlan:
         self._device, self._worlds = device, worlds
         self._colours = [
             (kind, int(first), int(last))
-            for kind in (HINGES, LINES, CELLS, TRIANGLES, YARNS)
+            for kind in (PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS)
             for first, last in pairwise(colours[kind])
             if last > first
         ]
@@ -172,6 +187,8 @@ class LargePlan:
         for k in range(substeps):
             if run.parts & MOTION and (run.first + k) % run.frame == 0:
                 self._survey(run)
+                if run.grips:
+                    self._launch(unload, run.grips, run, 1)
             if graph is None:
                 self._substep(run)
             else:
@@ -184,7 +201,6 @@ class LargePlan:
             run.reach,
             run.frame,
             run.parts,
-            run.probing,
             run.grips,
             run.keys,
             run.grip_ease.ptr,
@@ -192,7 +208,7 @@ class LargePlan:
         )
         found = self._graphs.get(key)
         if found is None:
-            run.grip_time, run.grip_soft = wp.clone(run.grip_time), wp.clone(run.grip_soft)
+            run.grip_start, run.grip_soft = wp.clone(run.grip_start), wp.clone(run.grip_soft)
             wp.load_module(survey.module, device=self._device)
             self._finder.load()
             with wp.ScopedCapture(device=self._device, force_module_load=False) as capture:
@@ -200,7 +216,7 @@ class LargePlan:
             found = self._graphs[key] = (capture.graph, run)
             return found[0]
         kept = found[1]
-        wp.copy(kept.grip_time, run.grip_time)
+        wp.copy(kept.grip_start, run.grip_start)
         wp.copy(kept.grip_soft, run.grip_soft)
         return found[0]
 
@@ -225,12 +241,19 @@ class LargePlan:
             if run.grips:
                 self._launch(hold, run.grips, run)
             for kind, first, last in self._colours:
-                self._launch(project, last - first, run, kind, first, last)
+                # a yarn is a warp's work
+                count = (last - first) * (WARP if kind == YARNS and self._cuda else 1)
+                self._launch(project, count, run, kind, first, last)
         if run.parts & PULLS and run.grips:
             wp.launch(pull, dim=self._worlds, inputs=common, device=self._device)
         if run.parts & LAYERS:
             if run.touching:
-                self._launch(touch, MANY, run)
-            self._launch(settle, n if run.touching else 1, run)
+                for again in range(PASSES):
+                    self._launch(touch, MANY, run)
+                    self._launch(settle, n, run, int(again + 1 == PASSES))
+            else:
+                self._launch(settle, 1, run, 1)
+        if run.parts & SHAPES and run.grips:
+            self._launch(unload, run.grips, run, 0)
         if run.parts & (SHAPES | VELOCITIES):
             self._launch(finish, n, run, self._shapes)

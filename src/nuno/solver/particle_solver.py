@@ -14,12 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.shapes import COLUMNS
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.state import (
     ALL_PARTS,
+    LAYERS,
+    LOADS,
+    MOTION,
     NOTES,
     ORIGIN,
     PARTICLE_ARRAYS,
+    PULLS,
+    SHAPES,
     SPEED,
     TRAVEL,
     Settings,
@@ -29,6 +35,12 @@ from nuno.solver.state import (
 if TYPE_CHECKING:
     from nuno.grip import GripSpec
     from nuno.scene.colliders import Colliders
+
+MU = 15
+"""Where a row of the table of static shapes has its friction, and that of the pair."""
+GHOST = 2.0e-3
+"""Share of its inverse mass that a stiffly held vertex has while constraints pull at it: enough that rounding is 0.1 %
+of a load in the mean of a frame, and too little to give way."""
 
 _threads: ThreadPoolExecutor | None = None
 
@@ -87,6 +99,7 @@ class ParticleSolver:
 
     def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set the first state; nothing acts yet."""
+        self._last_dt = 1.0
         self.set_state(positions, velocities)
         self.set_colliders(None)
         self.set_grips(())
@@ -249,9 +262,11 @@ class ParticleSolver:
         """The static shapes that the body meets; None for none."""
         if colliders is None:
             shapes = Shapes()
-            shapes.count = shapes.stride = shapes.mesh_stride = 0
-            shapes.kind = wp.zeros(1, dtype=int, device=self.device)
-            shapes.table = wp.zeros(1, dtype=float, device=self.device)
+            shapes.count = shapes.stride = shapes.mesh_stride = shapes.pose_stride = 0
+            for name in ("kind", "slot", "timing"):
+                setattr(shapes, name, wp.zeros(2, dtype=int, device=self.device))
+            for name in ("table", "pose", "haste"):
+                setattr(shapes, name, wp.zeros(1, dtype=float, device=self.device))
             shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
         else:
             shapes = colliders.shapes
@@ -305,7 +320,7 @@ class ParticleSolver:
         weight = np.zeros((worlds, count, 3), dtype=np.float32)
         place = np.zeros((worlds, count, keys, 3), dtype=np.float32)
         self._grip_times = np.zeros((count, keys))
-        mass = self._inverse_mass.copy()
+        mass, ghost = self._inverse_mass.copy(), np.ones((worlds, count), dtype=np.float32)
         for g, e in enumerate(entries):
             corner[:, g], weight[:, g] = e["corners"], e["weights"]
             m = len(e["times"])
@@ -315,21 +330,96 @@ class ParticleSolver:
             if e["fixed"]:
                 held = np.nonzero(e["corners"][:, 0] >= 0)[0]
                 mass[held, e["corners"][held, 0]] = 0.0
+                ghost[held, g] = GHOST * self._inverse_mass[held, e["corners"][held, 0]]
         s, size = self._state, self._size
         size.keys, size.grips = count * keys, count
         for k, name in enumerate(("grip_x", "grip_y", "grip_z")):
             setattr(s, name, self._put(place[..., k]))
         s.grip_weight, s.grip_corner = self._put(weight), self._put(corner, integer=True)
+        s.grip_ghost, s.grip_load = self._put(ghost), self._put(np.zeros((worlds, LOADS * count)))
         wp.copy(s.w, self._put(mass))
         self._grip_count, self._grip_keys = len(entries), keys
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
             return wp.array(values, dtype=dtype, device=self.device)
 
+        self._grip_time = put(self._grip_times.ravel(), wp.float64)
         self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
         self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
         self._grip_soft = np.array([e["compliance"] for e in entries] or [0.0])
         self._forget_launches()
+
+    def grip_forces(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """What each point of each grip bore in the last frame, and the mass that it moves with.
+
+        Returns:
+            For each grip: forces (worlds, k, 3) [N] that constraints pulled its points with, in the mean over the
+            frame's substeps, and masses (worlds, k) [kg] of stiffly held vertices, whose own weight and inertia come
+            on top.
+        """
+        worlds, rows = self.world_count, np.arange(self.world_count)[:, None]
+        loads = self._get(self._state.grip_load, LOADS * max(1, self._grip_count)).astype(float)
+        loads = loads.reshape(worlds, -1, LOADS)
+        forces = loads[..., :3] / np.maximum(loads[..., 3:], 1.0) / self._last_dt**2
+        result, first = [], 0
+        fixed = self._grip_fixed.numpy()
+        for grip in self._grips:
+            corners = grip.vertices if grip.vertices is not None else grip.corners[..., 0]  # type: ignore[index]
+            k = corners.shape[1]
+            held = (corners >= 0) & (fixed[first : first + k] != 0)
+            mass = np.where(held, self.mass[rows, np.maximum(corners, 0)], 0.0)
+            result.append((np.where((corners >= 0)[..., None], forces[:, first : first + k], 0.0), mass))
+            first += k
+        return result
+
+    def shape_forces(self, time: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """What each static shape nearby would do in the substep that comes next; nothing is changed.
+
+        Returns:
+            The shape's number in the table, the normals (worlds, n, 3) at the particles that it pushes, zero elsewhere,
+            and the forces [N] on them, (worlds, n, 3).
+        """
+        s, saved, loads = self._state, self.save_state(), wp.clone(self._state.grip_load)
+        dt = 1.0 / self.frame_rate / self.substeps
+        self.open(time, dt, self.substeps)
+        self.step_parts(0, MOTION | PULLS | LAYERS)
+        near = s.near.numpy().reshape(self.group_count, -1)
+        shapes = sorted({int(k) for row in near for k in row[1 : 1 + row[0]]})
+        before, held = [wp.clone(a) for a in (s.x, s.y, s.z)], wp.clone(s.w)
+        table: Any = wp.clone(self._shapes.table)
+        slick = table.numpy().reshape(-1, COLUMNS).copy()
+        slick[:, MU : MU + 2] = 0.0
+
+        def moved(shape: int) -> np.ndarray:
+            for array, first in zip((s.x, s.y, s.z), before, strict=True):
+                wp.copy(array, first)
+            wp.copy(s.w, held)
+            only = np.zeros_like(near)
+            only[:, 0], only[:, 1] = 1, shape
+            s.near.assign(only.ravel())
+            start = self.local_positions().astype(float)
+            self.step_parts(0, SHAPES)
+            return self.local_positions() - start
+
+        result = []
+        for shape in shapes:
+            forces = moved(shape) * (self.mass / dt**2)[..., None]
+            self._shapes.table.assign(slick.ravel())
+            push = moved(shape)
+            self._shapes.table.assign(table)
+            size = np.linalg.norm(push, axis=-1, keepdims=True)
+            forces[self._inverse_mass_now(held) == 0.0] = 0.0
+            if size.any():
+                result.append((shape, np.divide(push, size, out=np.zeros_like(push), where=size > 0.0), forces))
+        self.load_state(saved)
+        wp.copy(s.grip_load, loads)
+        return result
+
+    def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
+        """(worlds, n), zero for what is held."""
+        fixed = self._get(array, self.particle_count).copy()
+        fixed[fixed < 0.5 * self._inverse_mass] = 0.0
+        return fixed
 
     # -- running
 
@@ -367,16 +457,19 @@ class ParticleSolver:
 
     def settings(self, time: float, dt: float, frame: int) -> Settings:
         """The run's settings, paths counted from ``time``, with ``frame`` substeps of ``dt`` [s] a frame."""
+        if self._colliders is not None:
+            self._colliders.begin(time, dt)
         run = Settings()
-        run.dt = dt
+        run.dt = self._last_dt = dt
         run.gravity = wp.vec3(*(float(g) for g in self.gravity))
         run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
         # candidates within a third of a cell: few enough to look at, and good for several substeps
         run.margin = 0.35 * self._cell_size
         run.reach = 0.25 * self._cell_size
-        run.frame, run.first, run.parts, run.probing = frame, 0, ALL_PARTS, 0
+        run.frame, run.first, run.parts = frame, 0, ALL_PARTS
         run.grips, run.keys = self._grip_count, self._grip_keys
-        run.grip_time = wp.array((self._grip_times - time).ravel(), dtype=float, device=self.device)
+        run.grip_start = wp.array([time], dtype=wp.float64, device=self.device)
+        run.grip_time, run.step = self._grip_time, wp.float64(dt)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
         run.grip_soft = wp.array(self._grip_soft / dt**2, dtype=float, device=self.device)
         return run

@@ -17,6 +17,9 @@ TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
 PICKED, PICK_REACH = 4, 5
 NOTES = 6
 
+LOADS = 4
+"""Numbers in `State.grip_load` for each grip: what it bore in the frame's substeps [kg m], and how many these were."""
+
 PARTICLE_ARRAYS = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w")
 """Positions, those at the substep's start, velocities and inverse masses."""
 
@@ -31,7 +34,7 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz")
     numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
     numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
-    numbers += ("grip_x", "grip_y", "grip_z", "grip_weight")
+    numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
     integers = (
         "grip_corner",
         "vertex_triangle",
@@ -40,6 +43,7 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
         "touch_triangle",
         "touch_edge",
         "touch_count",
+        "near_blocks",
     )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
@@ -82,12 +86,17 @@ class Topology:
     line_scale: wp.array(dtype=float)
     line_soft: wp.array(dtype=int)
     line_colour: wp.array(dtype=int)
-    hinge: wp.array(dtype=wp.vec4i)
-    hinge_weight: wp.array(dtype=wp.vec4)
-    hinge_rest: wp.array(dtype=float)
-    hinge_scale: wp.array(dtype=float)
-    hinge_soft: wp.array(dtype=int)
-    hinge_colour: wp.array(dtype=int)
+    twist: wp.array(dtype=wp.vec4i)
+    twist_scale: wp.array(dtype=float)
+    twist_soft: wp.array(dtype=int)
+    twist_colour: wp.array(dtype=int)
+    # six vertices, three rows of six weights and three rest vectors of three numbers each
+    patch: wp.array(dtype=int)
+    patch_weight: wp.array(dtype=float)
+    patch_rest: wp.array(dtype=float)
+    patch_curved: wp.array(dtype=float)
+    patch_soft: wp.array(dtype=int)
+    patch_colour: wp.array(dtype=int)
     # self-contact: elements sorted by block of neighbouring vertices
     blocks: int
     block_vertex: wp.array(dtype=int)
@@ -99,6 +108,11 @@ class Topology:
     block_corner: wp.array(dtype=int)
     block_corner_start: wp.array(dtype=int)
     crease: wp.array(dtype=wp.vec4i)
+    region_corner: wp.array(dtype=int)
+    region_start: wp.array(dtype=int)
+    columns: int
+    block_span: wp.array(dtype=int)
+    crease_window: wp.array(dtype=int)
 
 
 @wp.struct
@@ -119,6 +133,7 @@ class Sizes:
     middle: int
     moved: int
     near: int
+    near_blocks: int
 
 
 @wp.struct
@@ -135,10 +150,12 @@ class Settings:
     frame: int
     first: int
     parts: int
-    probing: int
     grips: int
     keys: int
-    grip_time: wp.array(dtype=float)
+    # of the world's clock: keys, and where the run starts; of a step [s]. A float has too few digits for them
+    grip_time: wp.array(dtype=wp.float64)
+    grip_start: wp.array(dtype=wp.float64)
+    step: wp.float64
     grip_ease: wp.array(dtype=int)
     grip_fixed: wp.array(dtype=int)
     grip_soft: wp.array(dtype=float)
@@ -146,14 +163,23 @@ class Settings:
 
 @wp.struct
 class Shapes:
-    """Static shapes: a row of numbers each, for all worlds (stride 0) or per world."""
+    """Static shapes: a row of numbers each, for all worlds (stride 0) or per world.
+
+    What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
+    each, ``haste`` how fast any of it moves [m/s].
+    """
 
     count: int
     stride: int
     mesh_stride: int
+    pose_stride: int
     kind: wp.array(dtype=int)
     table: wp.array(dtype=float)
     mesh: wp.array(dtype=wp.uint64)
+    slot: wp.array(dtype=int)
+    pose: wp.array(dtype=float)
+    timing: wp.array(dtype=int)
+    haste: wp.array(dtype=float)
 
 
 @wp.func
@@ -190,6 +216,8 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.grip_y = window(s.grip_y, group * size.keys, size.keys)
     t.grip_z = window(s.grip_z, group * size.keys, size.keys)
     t.grip_weight = window(s.grip_weight, group * 3 * size.grips, 3 * size.grips)
+    t.grip_ghost = window(s.grip_ghost, group * size.grips, size.grips)
+    t.grip_load = window(s.grip_load, group * LOADS * size.grips, LOADS * size.grips)
     t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
     t.vertex_triangle = window(s.vertex_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
     t.edge_edge = window(s.edge_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
@@ -199,4 +227,5 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.pair_count = window(s.pair_count, group * 2, 2)
     t.moved = window(s.moved, group * size.moved, size.moved)
     t.near = window(s.near, group * size.near, size.near)
+    t.near_blocks = window(s.near_blocks, group * size.near_blocks, size.near_blocks)
     return t

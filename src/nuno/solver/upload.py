@@ -33,14 +33,18 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         triangle_soft=put(np.zeros((len(t.triangles), 3)), wp.vec3i),
         line=put(t.lines.vertices, wp.vec3i), line_scale=put(t.lines.scale, float),
         line_colour=put(t.lines.offsets, int), line_soft=put(t.lines.axis, int),
-        hinge=put(t.hinges.vertices, wp.vec4i), hinge_weight=put(t.hinges.extra["weight"], wp.vec4),
-        hinge_rest=put(t.hinges.extra["rest"], float), hinge_scale=put(t.hinges.scale, float),
-        hinge_colour=put(t.hinges.offsets, int), hinge_soft=put(t.hinges.axis, int),
+        twist=put(t.twists.vertices, wp.vec4i), twist_scale=put(t.twists.scale, float),
+        twist_colour=put(t.twists.offsets, int), twist_soft=put(t.twists.axis, int),
+        patch=put(t.patches.vertices.ravel(), int), patch_weight=put(t.patches.extra["weight"].ravel(), float),
+        patch_rest=put(t.patches.extra["rest"].ravel(), float), patch_curved=put(t.patches.extra["curved"], float),
+        patch_colour=put(t.patches.offsets, int), patch_soft=put(t.patches.axis, int),
         block_vertex=put(b.vertex, int), block_vertex_start=put(b.vertex_start, int),
         block_face=put(b.face, wp.vec3i), block_face_start=put(b.face_start, int),
         block_edge=put(b.edge, wp.vec2i), block_edge_start=put(b.edge_start, int),
         block_corner=put(b.corner, int), block_corner_start=put(b.corner_start, int),
         crease=put(b.crease, wp.vec4i),
+        region_corner=put(b.region_corner, int), region_start=put(b.region_start, int), block_span=put(b.span, int),
+        crease_window=put(b.crease_window, int),
     )  # fmt: skip
     topology.device_arrays[device] = made
     return made

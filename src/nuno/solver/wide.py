@@ -14,21 +14,23 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.contact.pair_lists import find_contacts
+from nuno.contact.renewal import renew_lists
 from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.frame import (
-    bend_hinges,
     bend_lines,
+    bend_patches,
+    bend_twists,
     near_shapes,
     shear_cells,
     strain_triangles,
 )
-from nuno.solver.grips import hold_vertices, pull_points
+from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import LANES, fill, lane, lane_int, largest
 from nuno.solver.membrane import stretch_yarn
 from nuno.solver.state import (
+    CLOCK,
     LAYERS,
     MOTION,
     NOTES,
@@ -71,12 +73,16 @@ class Wide:
     line_scale: wp.array(dtype=lane)
     line_soft: wp.array(dtype=lane_int)
     line_colour: wp.array(dtype=int)
-    hinge: wp.array(dtype=lane_int)
-    hinge_weight: wp.array(dtype=lane)
-    hinge_rest: wp.array(dtype=lane)
-    hinge_scale: wp.array(dtype=lane)
-    hinge_soft: wp.array(dtype=lane_int)
-    hinge_colour: wp.array(dtype=int)
+    twist: wp.array(dtype=lane_int)
+    twist_scale: wp.array(dtype=lane)
+    twist_soft: wp.array(dtype=lane_int)
+    twist_colour: wp.array(dtype=int)
+    patch: wp.array(dtype=lane_int)
+    patch_weight: wp.array(dtype=lane)
+    patch_rest: wp.array(dtype=lane)
+    patch_curved: wp.array(dtype=lane)
+    patch_soft: wp.array(dtype=lane_int)
+    patch_colour: wp.array(dtype=int)
     yarn_gain: wp.array(dtype=lane)
     yarn_pull: wp.array(dtype=lane)
     yarn_inverse: wp.array(dtype=lane)
@@ -120,8 +126,10 @@ def by_sixteen(t: StateFloat, wide: Wide, m: int):
 @wp.func
 def elastic_wide(t: StateFloat, wide: Wide, run: Settings):
     """One pass over the elastic constraints: `nuno.solver.frame.elastic` by sixteen."""
-    for c in range(wide.hinge_colour.shape[0] - 1):
-        bend_hinges(t, wide, run, wide.hinge_colour[c], wide.hinge_colour[c + 1], 0, 1)
+    for c in range(wide.patch_colour.shape[0] - 1):
+        bend_patches(t, wide, run, wide.patch_colour[c], wide.patch_colour[c + 1], 0, 1)
+    for c in range(wide.twist_colour.shape[0] - 1):
+        bend_twists(t, wide, run, wide.twist_colour[c], wide.twist_colour[c + 1], 0, 1)
     for c in range(wide.line_colour.shape[0] - 1):
         bend_lines(t, wide, run, wide.line_colour[c], wide.line_colour[c + 1], 0, 1)
     for c in range(wide.cell_colour.shape[0] - 1):
@@ -145,9 +153,10 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(t, n, run, shapes, 0, 1)
+                forget_loads(t, run, 0, 1)
             tick(t, run, 0)
             if run.touching != 0:
-                find_contacts(t, topo, run, 0, 1)
+                renew_lists(t, topo, run, 0, 1)
             predict(p, m, run, 0, 1)
             hold_vertices(t, run, 0, 1)
             elastic_wide(t, wide, run)
@@ -158,6 +167,8 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
             touch_vertex_triangle(t, n, run, 0, 1)
             take_moves(t, n, 0, 1)
         if run.parts & SHAPES != 0:
+            read_loads(t, run, 0, 1)
+            p.notes[CLOCK] = fill(p.x[0], t.notes[CLOCK])  # moving shapes are where the clock says
             touch_shapes(p, m, shapes, run.dt, 0, 1)
         if run.parts & VELOCITIES != 0:
             reset_speed(p, 0)
@@ -190,14 +201,17 @@ def widen_topology(topology: Any, arrays: Any) -> Any:
         table = np.ascontiguousarray(table, dtype=np.int32 if whole else np.float32)
         return wp.array(table, dtype=lane_int if whole else lane, device="cpu")
 
-    kinds = {"cell": ("scale", "soft"), "line": ("scale", "soft"), "hinge": ("weight", "rest", "scale", "soft")}
+    kinds = {"cell": ("scale", "soft"), "line": ("scale", "soft"), "twist": ("scale", "soft")}
     kinds["triangle"] = ("u", "v", "area", "soft")
+    kinds["patch"] = ("weight", "rest", "curved", "soft")
     for name, columns in kinds.items():
-        rows, starts = groups(getattr(topology, name + "s").offsets)
+        elements = topology.patches if name == "patch" else getattr(topology, name + "s")
+        rows, starts = groups(elements.offsets)
         setattr(wide, name + "_colour", wp.array(starts, dtype=int, device="cpu"))
-        setattr(wide, name, gathered(getattr(arrays, name).numpy(), rows))
-        for column in columns:
-            setattr(wide, f"{name}_{column}", gathered(getattr(arrays, f"{name}_{column}").numpy(), rows))
+        for full in (name, *(f"{name}_{column}" for column in columns)):
+            values = getattr(arrays, full).numpy()
+            # a flat table has the elements' rows one after the other
+            setattr(wide, full, gathered(values.reshape(len(elements), -1) if len(elements) else values[:0], rows))
     _widen_yarns(wide, arrays, gathered)
     wide.scalars = wp.zeros(SCALARS, dtype=lane, device="cpu")
     wide.notes = wp.zeros(NOTES, dtype=lane, device="cpu")

@@ -1,0 +1,167 @@
+"""When the lists of pairs that may touch are made anew: on the CPU for each world by itself, on CUDA by a block."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.block_renewal import find_together
+from nuno.contact.pair_lists import FORGET, PICK_AHEAD, swept
+from nuno.contact.world_listing import list_world, pick_world
+from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+    LANES,
+    add,
+    anywhere,
+    fill,
+    least,
+    most,
+    mul,
+    root,
+    sub,
+    times,
+)
+from nuno.solver.state import (
+    LISTINGS,
+    PICK_REACH,
+    PICKED,
+    SPEED,
+    THICKNESS,
+    TRAVEL,
+    Settings,
+    StateFloat,
+    StateLanes,
+    Topology,
+)
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return true;
+#else
+return threads > 1;
+#endif
+""")
+def shares_work(threads: int) -> bool:
+    """Whether threads list the pairs together; told to CUDA's compiler at once, which then leaves the rest out."""
+    ...
+
+
+@wp.func
+def measure_moves(t: Any, topo: Topology):
+    """The box of the displacements since the list was made, for each region: behind the regions' own boxes."""
+    n = topo.particles
+    regions = topo.region_start.shape[0] - 1
+    for g in range(regions):
+        i = topo.region_corner[topo.region_start[g]]
+        lx = t.x[i] - t.listed[i]
+        ly = t.y[i] - t.listed[n + i]
+        lz = t.z[i] - t.listed[2 * n + i]
+        hx = lx
+        hy = ly
+        hz = lz
+        for k in range(topo.region_start[g] + 1, topo.region_start[g + 1]):
+            i = topo.region_corner[k]
+            dx = t.x[i] - t.listed[i]
+            dy = t.y[i] - t.listed[n + i]
+            dz = t.z[i] - t.listed[2 * n + i]
+            lx = least(lx, dx)
+            ly = least(ly, dy)
+            lz = least(lz, dz)
+            hx = most(hx, dx)
+            hy = most(hy, dy)
+            hz = most(hz, dz)
+        k = 6 * (regions + g)
+        t.bounds[k] = lx
+        t.bounds[k + 1] = ly
+        t.bounds[k + 2] = lz
+        t.bounds[k + 3] = hx
+        t.bounds[k + 4] = hy
+        t.bounds[k + 5] = hz
+
+
+@wp.func
+def most_closer(t: Any, topo: Topology, far: Any):
+    """How much of the margin is used up by two points that have come closer since the list was made [m].
+
+    Points of two regions that were farther from each other than ``far`` have that much more before they matter.
+    """
+    regions = topo.region_start.shape[0] - 1
+    zero = fill(far, 0.0)
+    worst = zero
+    for g in range(regions):
+        for h in range(g, regions):
+            gap = zero
+            square = zero
+            for c in range(3):
+                a = 6 * g + c
+                b = 6 * h + c
+                gap = most(gap, most(t.bounds[a] - t.bounds[b + 3], t.bounds[b] - t.bounds[a + 3]))
+                a = a + 6 * regions
+                b = b + 6 * regions
+                span = most(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
+                square = square + times(span, span)
+            worst = most(worst, root(square) - most(gap - far, zero))
+    return worst
+
+
+@wp.func
+def look_ahead(t: Any, run: Settings, near: Any):
+    """How far beyond its thickness a pair is picked [m]: for a few substeps, at the speed of the moment."""
+    return near + root(t.notes[SPEED]) * (2.0 * PICK_AHEAD * run.dt) + fill(near, 0.1 * run.reach)
+
+
+@wp.func
+def renew_lists(t: StateLanes, topo: Topology, run: Settings, thread: int, threads: int):
+    """List the self-contact pairs anew in those worlds whose list is used up, and pick those that may touch soon.
+
+    Few of the listed pairs ever touch before the list is made anew, and solving looks at each in every substep.
+    """
+    lanes = int(LANES)  # variables, or Warp would unroll the loops
+    # the lanes beyond the last world only repeat it, and nobody looks at them: they go without contact
+    worlds = wp.min(lanes, t.worlds - lanes * t.group)
+    near = swept(t, run)
+    left = fill(near, run.margin) - near
+    if anywhere(t.notes[TRAVEL] * 2.0 - left):
+        measure_moves(t, topo)
+        worst = most_closer(t, topo, t.scalars[THICKNESS] + fill(near, run.margin))
+        worst = most(worst, t.notes[TRAVEL] - fill(near, FORGET))
+        t.notes[TRAVEL] = worst * 0.5
+        late = worst - left
+        for k in range(lanes):
+            if late[k] > 0.0:
+                t.notes[TRAVEL][k] = 0.0
+                if k < worlds:
+                    # what was picked of the old list is not to be trusted any more
+                    t.notes[PICKED][k] = FORGET
+                    t.notes[LISTINGS][k] = t.notes[LISTINGS][k] + 1.0
+                    list_world(t, topo, t.scalars[THICKNESS][k] + 1.01 * run.margin, k, lanes)
+    due = t.notes[PICKED] * 2.0 + near - t.notes[PICK_REACH]
+    if anywhere(due):
+        ahead = look_ahead(t, run, near)
+        for k in range(worlds):
+            if due[k] > 0.0:
+                t.notes[PICKED][k] = 0.0
+                t.notes[PICK_REACH][k] = ahead[k]
+                pick_world(t, t.scalars[THICKNESS][k] + 1.01 * ahead[k], k, lanes)
+
+
+@wp.func
+def renew_lists(t: StateFloat, topo: Topology, run: Settings, thread: int, threads: int):
+    if shares_work(threads):
+        find_together(t, topo, run, thread, threads)
+    else:
+        near = swept(t, run)
+        left = run.margin - near
+        if t.notes[TRAVEL] * 2.0 > left:
+            measure_moves(t, topo)
+            worst = wp.max(most_closer(t, topo, t.scalars[THICKNESS] + run.margin), t.notes[TRAVEL] - FORGET)
+            t.notes[TRAVEL] = 0.5 * worst
+            if worst > left:
+                t.notes[TRAVEL] = 0.0
+                t.notes[PICKED] = FORGET
+                t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
+                list_world(t, topo, t.scalars[THICKNESS] + 1.01 * run.margin, 0, 1)
+        if t.notes[PICKED] * 2.0 + near > t.notes[PICK_REACH]:
+            ahead = look_ahead(t, run, near)
+            t.notes[PICKED] = 0.0
+            t.notes[PICK_REACH] = ahead
+            pick_world(t, t.scalars[THICKNESS] + 1.01 * ahead, 0, 1)

@@ -1,0 +1,332 @@
+"""The listing of one world's self-contact pairs on the CPU, sixteen elements at a time.
+
+The sixteen worlds of a lane vector fold in different places and at different times. So each is listed by itself, when
+it needs it: its positions are copied out of the lanes, and the vector then holds sixteen boxes, triangles or edges of
+that one world. One world alone is listed by the same code.
+
+The order of a list is that of the vertices and edges sorted by block, whatever its margin and the moment it was made.
+Pairs that touch are solved one after the other on the CPU, and so in the same order in every plan.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.flat_windows import survey_world
+from nuno.contact.near_lanes import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
+from nuno.contact.world_room import ROOM, bound_world, copy_world
+from nuno.scene.blocks import WINDOW
+from nuno.solver.state import Topology
+
+RANGES = 48
+"""Ranges of consecutive blocks near a block that are kept apart."""
+
+
+@wp.func_native(
+    PRELUDE
+    + ROOM
+    + NEAR_TRIANGLES
+    + NEAR_EDGES
+    + KEEP
+    + """
+const int spans = boxes;
+const int *face_start = block_face_start.data, *edge_start = block_edge_start.data;
+const V limit = (V){} + far * far;
+auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        gap = least(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
+        gap = least(gap, high[c] - *(const V*)(rows + c * count + k));
+    }
+    return bits(gap > 0.f);
+};
+auto within = [&](const float* rows, int count, int k, float x, float y, float z, float reach) {
+    const V dx = x - *(const V*)(rows + k), dy = y - *(const V*)(rows + count + k);
+    const V dz = z - *(const V*)(rows + 2 * count + k), r = reach + *(const V*)(rows + 3 * count + k);
+    return r * r > dx * dx + dy * dy + dz * dz;
+};
+// the spheres that reach into a box
+auto reach = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    const V r = *(const V*)(rows + 3 * count + k);
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        const V x = *(const V*)(rows + c * count + k);
+        gap = least(gap, least(x - low[c], high[c] - x));
+    }
+    return gap + r > 0.f;
+};
+// the blocks, of sixteen, that fit a tame window together with block a: no two of their elements are near
+auto safe = [&](int a, int start) ALONE {
+    const int* span = block_span.data;
+    const I left = smaller(*(const I*)(span + start), span[a]);
+    const I right = larger(*(const I*)(span + spans + start), span[spans + a]);
+    const I low = smaller(*(const I*)(span + 2 * spans + start), span[2 * spans + a]);
+    const I high = larger(*(const I*)(span + 3 * spans + start), span[3 * spans + a]);
+    const I at = smaller(low, points / columns - WINDOW) * columns + smaller(left, columns - WINDOW);
+    return bits((right - left < WINDOW) & (high - low < WINDOW) & take_int(tame, at));
+};
+// suspects wait until there are sixteen
+int vertex_of[32], face_of[32], edge_of[32], other_of[32], faces_waiting = 0, edges_waiting = 0;
+auto test_faces = [&](int count) ALONE {
+    const I i = *(const I*)vertex_of, f = *(const I*)face_of;
+    const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
+    const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit) > 0.f);
+    keep(hit & ((1u << count) - 1), i, a, b, c, pair_count, 0, triangles, most_triangles);
+};
+auto test_edges = [&](int count) ALONE {
+    const I e = *(const I*)edge_of, f = *(const I*)other_of;
+    const I a = take_int(end, e), b = take_int(end + edges, e), c = take_int(end, f), d = take_int(end + edges, f);
+    const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
+    keep(hit & ((1u << count) - 1), a, b, c, d, pair_count, 1, pairs, most_pairs);
+};
+((int*)pair_count)[0] = ((int*)pair_count)[lanes] = 0;
+for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
+for (int a = 0; a < blocks; ++a) {
+    float low[3], high[3];
+    for (int c = 0; c < 3; ++c) {
+        low[c] = box[c * boxes + a] - far;
+        high[c] = box[(c + 3) * boxes + a] + far;
+    }
+    // ranges of consecutive blocks that meet block a; where there are too many, the last one stretches
+    int first[RANGES], last[RANGES], ranges = 0;
+    for (int g = 0; g < blocks_16; g += 16)
+        for (unsigned some = meet(group, groups, g, low, high); some; some &= some - 1) {
+            const int start = 16 * (g + __builtin_ctz(some));
+            unsigned near = meet(box, boxes, start, low, high);
+            if (near && columns > 0) near &= ~safe(a, start);
+            while (near) {
+                const int skip = __builtin_ctz(near), length = __builtin_ctz(~(near >> skip));
+                near &= ~(((1u << length) - 1) << skip);
+                const bool apart = ranges == 0 || last[ranges - 1] != start + skip;
+                if (apart && ranges < RANGES) first[ranges++] = start + skip;
+                last[ranges - 1] = start + skip + length;
+            }
+        }
+    if (ranges == 0) continue;
+    // the elements near the block, side by side
+    int face_count = 0, edge_count = 0;
+    for (int r = 0; r < ranges; ++r) {
+        const int face_stop = face_start[last[r]], edge_stop = edge_start[last[r]];
+        for (int j = face_start[first[r]]; j < face_stop; j += 16) {
+            const unsigned some = bits(reach(ball, faces, j, low, high) & (OWN + j < face_stop));
+            if (some == 0) continue;
+            ROLLED for (int c = 0; c < 4; ++c)
+                pack((int*)near_ball + c * faces, face_count, *(const I*)(ball + c * faces + j), some);
+            ROLLED for (int c = 0; c < 3; ++c)
+                pack(near_corner + c * faces, face_count, *(const I*)(corner + c * faces + j), some);
+            face_count = pack(near_face, face_count, OWN + j, some);
+        }
+        const int begin = edge_start[first[r]];
+        for (int j = begin > edge_start[a] ? begin : edge_start[a]; j < edge_stop; j += 16) {
+            const unsigned some = bits(reach(rod, edges, j, low, high) & (OWN + j < edge_stop));
+            if (some == 0) continue;
+            ROLLED for (int c = 0; c < 4; ++c)
+                pack((int*)near_rod + c * edges, edge_count, *(const I*)(rod + c * edges + j), some);
+            ROLLED for (int c = 0; c < 2; ++c)
+                pack(near_end + c * edges, edge_count, *(const I*)(end + c * edges + j), some);
+            edge_count = pack(near_edge, edge_count, OWN + j, some);
+        }
+    }
+    for (int k = block_vertex_start.data[a]; k < block_vertex_start.data[a + 1]; ++k) {
+        const int i = block_vertex.data[k];
+        const float x = point[4 * i], y = point[4 * i + 1], z = point[4 * i + 2];
+        for (int j = 0; j < face_count; j += 16) {
+            I near = within(near_ball, faces, j, x, y, z, far) & (OWN + j < face_count);
+            for (int c = 0; c < 3; ++c) near &= *(const I*)(near_corner + c * faces + j) != i;
+            const unsigned some = bits(near);
+            if (some) {
+                *(I*)(vertex_of + faces_waiting) = (I){} + i;
+                faces_waiting = pack(face_of, faces_waiting, *(const I*)(near_face + j), some);
+                if (faces_waiting >= 16) {
+                    test_faces(16);
+                    faces_waiting -= 16;
+                    *(I*)vertex_of = *(const I*)(vertex_of + 16);
+                    *(I*)face_of = *(const I*)(face_of + 16);
+                }
+            }
+        }
+    }
+    for (int k = edge_start[a]; k < edge_start[a + 1]; ++k) {
+        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k], wide = rod[3 * edges + k] + far;
+        const int p = end[k], q = end[edges + k];
+        for (int j = 0; j < edge_count; j += 16) {
+            const I other = *(const I*)(near_edge + j);
+            I near = within(near_rod, edges, j, x, y, z, wide) & (OWN + j < edge_count) & (other > k);
+            for (int c = 0; c < 2; ++c) {
+                const I ends = *(const I*)(near_end + c * edges + j);
+                near &= (ends != p) & (ends != q);
+            }
+            const unsigned some = bits(near);
+            if (some) {
+                *(I*)(edge_of + edges_waiting) = (I){} + k;
+                edges_waiting = pack(other_of, edges_waiting, other, some);
+                if (edges_waiting >= 16) {
+                    test_edges(16);
+                    edges_waiting -= 16;
+                    *(I*)edge_of = *(const I*)(edge_of + 16);
+                    *(I*)other_of = *(const I*)(other_of + 16);
+                }
+            }
+        }
+    }
+}
+if (faces_waiting) test_faces(faces_waiting);
+if (edges_waiting) test_edges(edges_waiting);
+const int creases = crease.shape[0];
+for (int k = 0; k < creases; k += 16) {
+    I near = OWN + k < creases;
+    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_window.data, smaller(OWN + k, creases - 1)));
+    if (bits(near) == 0) continue;
+    const I row = smaller(OWN + k, creases - 1) * 4;
+    const int* table = (const int*)crease.data;
+    const I a = take_int(table, row), b = take_int(table + 1, row);
+    const I c = take_int(table + 2, row), d = take_int(table + 3, row);
+    const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
+    keep(hit, a, b, c, d, pair_count, 1, pairs, most_pairs);
+}
+#endif
+""".replace("RANGES", str(RANGES)).replace("WINDOW", str(WINDOW))
+)
+def search_world(
+    face: wp.array(dtype=wp.vec3i),
+    edge: wp.array(dtype=wp.vec2i),
+    block_vertex: wp.array(dtype=int),
+    block_vertex_start: wp.array(dtype=int),
+    block_face_start: wp.array(dtype=int),
+    block_edge_start: wp.array(dtype=int),
+    block_span: wp.array(dtype=int),
+    crease: wp.array(dtype=wp.vec4i),
+    crease_window: wp.array(dtype=int),
+    columns: int,
+    points: int,
+    blocks: int,
+    room: wp.uint64,
+    far: float,
+    lanes: int,
+    pair_count: wp.uint64,
+    triangles: wp.uint64,
+    most_triangles: int,
+    pairs: wp.uint64,
+    most_pairs: int,
+):
+    """List the pairs that share no vertex and are nearer than ``far`` [m].
+
+    The lists have every ``lanes``-th number; what does not fit is counted but not kept.
+    """
+    ...
+
+
+@wp.func_native(
+    PRELUDE
+    + NEAR_TRIANGLES
+    + NEAR_EDGES
+    + KEEP
+    + """
+const float *x0 = (const float*)x, *y0 = (const float*)y, *z0 = (const float*)z;
+const V limit = (V){} + far * far;
+const int* listed[2] = {(const int*)triangles, (const int*)pairs};
+const wp::uint64 picked[2] = {touch_triangles, touch_pairs};
+const int room[2] = {most_triangles, most_pairs};
+for (int kind = 0; kind < 2; ++kind) {
+    ((int*)touch_count)[kind * lanes] = 0;
+    const int found = ((const int*)pair_count)[kind * lanes], count = found < room[kind] ? found : room[kind];
+    for (int k = 0; k < count; k += 16) {
+        const I row = smaller(OWN + k, count - 1) * (4 * lanes);
+        I q[4];
+        for (int c = 0; c < 4; ++c) q[c] = take_int(listed[kind] + c * lanes, row);
+        V near;
+        if (kind == 0)
+            near = near_triangles(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
+        else
+            near = near_edges(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
+        const unsigned hit = bits((near > 0.f) & (OWN + k < count));
+        keep(hit, q[0], q[1], q[2], q[3], touch_count, kind, picked[kind], room[kind]);
+    }
+}
+#endif
+"""
+)
+def filter_world(
+    x: wp.uint64,
+    y: wp.uint64,
+    z: wp.uint64,
+    far: float,
+    lanes: int,
+    pair_count: wp.uint64,
+    triangles: wp.uint64,
+    most_triangles: int,
+    pairs: wp.uint64,
+    most_pairs: int,
+    touch_count: wp.uint64,
+    touch_triangles: wp.uint64,
+    touch_pairs: wp.uint64,
+):
+    """Copy those of the listed pairs that are nearer than ``far`` [m] to the list of what may touch, in their order."""
+    ...
+
+
+@wp.func
+def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
+    """List anew the pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
+    n = topo.particles
+    skip = wp.uint64(4 * which)
+    room = t.middle.ptr
+    copy_world(t.x.ptr + skip, t.y.ptr + skip, t.z.ptr + skip, t.listed.ptr + skip, lanes, n, room)
+    bound_world(
+        topo.block_face,
+        topo.block_edge,
+        topo.block_corner,
+        topo.block_corner_start,
+        n,
+        topo.blocks,
+        room,
+        lanes,
+        t.bounds.ptr + skip,
+    )
+    if topo.columns > 0:
+        survey_world(
+            topo.block_face, topo.block_edge, topo.columns, n, topo.blocks, room, far
+        )  # fmt: skip
+    search_world(
+        topo.block_face,
+        topo.block_edge,
+        topo.block_vertex,
+        topo.block_vertex_start,
+        topo.block_face_start,
+        topo.block_edge_start,
+        topo.block_span,
+        topo.crease,
+        topo.crease_window,
+        topo.columns,
+        n,
+        topo.blocks,
+        room,
+        far,
+        lanes,
+        t.pair_count.ptr + skip,
+        t.vertex_triangle.ptr + skip,
+        t.vertex_triangle.shape[0] / 4,
+        t.edge_edge.ptr + skip,
+        t.edge_edge.shape[0] / 4,
+    )
+
+
+@wp.func
+def pick_world(t: Any, far: float, which: int, lanes: int):
+    """Pick the listed pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
+    skip = wp.uint64(4 * which)
+    filter_world(
+        t.x.ptr + skip,
+        t.y.ptr + skip,
+        t.z.ptr + skip,
+        far,
+        lanes,
+        t.pair_count.ptr + skip,
+        t.vertex_triangle.ptr + skip,
+        t.vertex_triangle.shape[0] / 4,
+        t.edge_edge.ptr + skip,
+        t.edge_edge.shape[0] / 4,
+        t.touch_count.ptr + skip,
+        t.touch_triangle.ptr + skip,
+        t.touch_edge.ptr + skip,
+    )

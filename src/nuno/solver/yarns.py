@@ -1,0 +1,160 @@
+"""A yarn's stretch by the 32 threads of a warp on CUDA.
+
+What `nuno.solver.membrane.stretch_yarn` does from one end to the other takes a step an edge, each waiting for the one
+before. Cyclic reduction of all rows at once (Hockney and Jesshope, "Parallel Computers", 1981) takes log2(edges): in
+each step a row is freed of its neighbours and linked to those twice as far.
+"""
+
+import warp as wp
+
+WARP_EDGES = wp.constant(256)
+"""Edges of the longest yarn that a warp takes together: eight rows a thread."""
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+const unsigned all = 0xffffffffu;
+const int lane = threadIdx.x % 32;
+const int count = last - first;
+struct One { enum { rows = 1 }; };
+struct Two { enum { rows = 2 }; };
+struct Eight { enum { rows = 8 }; };
+auto solve = [&](auto kind) {
+    // row k of the system is in thread k % 32
+    constexpr int ROWS = decltype(kind)::rows;
+    int end[ROWS];
+    float ex[ROWS], ey[ROWS], ez[ROWS], inverse[ROWS], low[ROWS], high[ROWS], pull[ROWS];
+    // what row k - shift, or k + shift, has
+    auto before = [&](const float* v, int shift, float* r) {
+        if (shift < 32) {
+            float s[ROWS];
+            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane - shift) & 31);
+            for (int j = ROWS - 1; j >= 0; --j) r[j] = lane >= shift ? s[j] : (j > 0 ? s[j > 0 ? j - 1 : 0] : 0.f);
+        } else {
+            #pragma unroll
+            for (int j = 0; j < ROWS; ++j) {
+                r[j] = 0.f;
+                #pragma unroll
+                for (int i = 0; i < ROWS; ++i) if (32 * (j - i) == shift) r[j] = v[i];
+            }
+        }
+    };
+    auto after = [&](const float* v, int shift, float* r) {
+        if (shift < 32) {
+            float s[ROWS];
+            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane + shift) & 31);
+            for (int j = 0; j < ROWS; ++j)
+                r[j] = lane + shift < 32 ? s[j] : (j < ROWS - 1 ? s[j < ROWS - 1 ? j + 1 : j] : 0.f);
+        } else {
+            #pragma unroll
+            for (int j = 0; j < ROWS; ++j) {
+                r[j] = 0.f;
+                #pragma unroll
+                for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == shift) r[j] = v[i];
+            }
+        }
+    };
+    float wa[ROWS], wb[ROWS], px[ROWS], py[ROWS], pz[ROWS];
+    #pragma unroll
+    for (int j = 0; j < ROWS; ++j) {
+        const int k = first + 32 * j + lane;
+        const bool own = k < last;
+        const int e = own ? k : first;
+        const int a = edge.data[e][0], b = edge.data[e][1];
+        px[j] = x.data[b]; py[j] = y.data[b]; pz[j] = z.data[b];
+        wa[j] = w.data[a]; wb[j] = w.data[b];
+        end[j] = own ? b : -1;
+        const float dx = x.data[a] - px[j], dy = y.data[a] - py[j], dz = z.data[a] - pz[j];
+        const float length = sqrtf(dx * dx + dy * dy + dz * dz + 1.0e-20f);
+        inverse[j] = 1.f / length;
+        ex[j] = dx * inverse[j]; ey[j] = dy * inverse[j]; ez[j] = dz * inverse[j];
+        pull[j] = own ? rest.data[e] - length : 0.f;
+        inverse[j] = wa[j] + wb[j] + soft.data[which.data[e]] * (scale.data[e] * rate) + 1.0e-12f;
+    }
+    {
+        float bx[ROWS], by[ROWS], bz[ROWS], beside[ROWS];
+        before(ex, 1, bx); before(ey, 1, by); before(ez, 1, bz);
+        #pragma unroll
+        for (int j = 0; j < ROWS; ++j) {
+            const int k = 32 * j + lane;
+            beside[j] = k > 0 && k < count ? -wa[j] * (bx[j] * ex[j] + by[j] * ey[j] + bz[j] * ez[j]) : 0.f;
+        }
+        after(beside, 1, high);
+        #pragma unroll
+        for (int j = 0; j < ROWS; ++j) {
+            const float s = 1.f / inverse[j];
+            low[j] = beside[j] * s; high[j] *= s; pull[j] *= s;
+        }
+    }
+    // unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
+    #pragma unroll
+    for (int shift = 1; shift < 32 * ROWS; shift *= 2) {
+        float lb[ROWS], hb[ROWS], pb[ROWS], la[ROWS], ha[ROWS], pa[ROWS];
+        before(low, shift, lb); before(high, shift, hb); before(pull, shift, pb);
+        after(low, shift, la); after(high, shift, ha); after(pull, shift, pa);
+        #pragma unroll
+        for (int j = 0; j < ROWS; ++j) {
+            const float s = 1.f / (1.f - low[j] * hb[j] - high[j] * la[j]);
+            pull[j] = (pull[j] - low[j] * pb[j] - high[j] * pa[j]) * s;
+            low[j] = -low[j] * lb[j] * s;
+            high[j] = -high[j] * ha[j] * s;
+        }
+    }
+    float nx[ROWS], ny[ROWS], nz[ROWS];
+    #pragma unroll
+    for (int j = 0; j < ROWS; ++j) { ex[j] *= pull[j]; ey[j] *= pull[j]; ez[j] *= pull[j]; }
+    after(ex, 1, nx); after(ey, 1, ny); after(ez, 1, nz);
+    #pragma unroll
+    for (int j = 0; j < ROWS; ++j) {
+        // all have read their ends in the first shuffles, so that nothing is overwritten too soon
+        const int k = 32 * j + lane;
+        if (end[j] >= 0) {
+            const bool more = k + 1 < count;
+            x.data[end[j]] = px[j] + wb[j] * ((more ? nx[j] : 0.f) - ex[j]);
+            y.data[end[j]] = py[j] + wb[j] * ((more ? ny[j] : 0.f) - ey[j]);
+            z.data[end[j]] = pz[j] + wb[j] * ((more ? nz[j] : 0.f) - ez[j]);
+        }
+        if (k == 0) {
+            const int head = edge.data[first][0];
+            x.data[head] += wa[j] * ex[j];
+            y.data[head] += wa[j] * ey[j];
+            z.data[head] += wa[j] * ez[j];
+        }
+    }
+};
+if (count <= 32) solve(One());
+else if (count <= 64) solve(Two());
+else solve(Eight());
+#endif
+""")
+def stretch_yarn_together(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    w: wp.array(dtype=float),
+    soft: wp.array(dtype=float),
+    edge: wp.array(dtype=wp.vec2i),
+    rest: wp.array(dtype=float),
+    scale: wp.array(dtype=float),
+    which: wp.array(dtype=int),
+    first: int,
+    last: int,
+    rate: float,
+):
+    """Solve the edges first to last, a yarn's, at once and move its vertices.
+
+    Args:
+        x: Coordinates; so are ``y`` and ``z`` [m].
+        y: See ``x``.
+        z: See ``x``.
+        w: Inverse masses [1/kg].
+        soft: The world's compliances.
+        edge: Vertices of the edges.
+        rest: Their lengths [m].
+        scale: What the compliance of each is multiplied with.
+        which: The place of each in ``soft``.
+        first: The yarn's first edge.
+        last: One past its last.
+        rate: 1 / dt^2 [1/s2].
+    """
+    ...
