@@ -146,6 +146,7 @@ class Coordinates:
             ancestor = ancestor._parent
         child._follow(self)
         self._children.append(child)
+        child._moved()  # not yet, but it may from now on
         return child
 
     def dissoc(self, child: Coordinates) -> Coordinates:
@@ -160,6 +161,7 @@ class Coordinates:
         self._children = [c for c in self._children if c is not child]
         child._parent = None
         child._position, child._quaternion = pose
+        child._moved()
         return child
 
     def _follow(self, parent: Coordinates) -> None:

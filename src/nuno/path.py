@@ -63,13 +63,13 @@ class Path:
 
     def at(self, time: ArrayLike) -> np.ndarray:
         """Return positions at ``time`` [s], a number or (m,): (3,) or (m, 3), or (worlds, ...) of these."""
-        first, last, s = self._between(time)
+        first, last, s = self._between(finite_array("time", time, (), ("m",)))
         a, b = self.positions[..., first, :], self.positions[..., last, :]
         return a + s[..., None] * (b - a)
 
     def quaternion_at(self, time: ArrayLike) -> np.ndarray:
         """Return orientations, as ``at`` returns positions; the identity where none is given."""
-        first, last, s = self._between(time)
+        first, last, s = self._between(finite_array("time", time, (), ("m",)))
         if self.quaternions is None:
             return np.broadcast_to(quat.IDENTITY, (*s.shape, 4)).copy()
         return quat.slerp(self.quaternions[..., first, :], self.quaternions[..., last, :], s)
@@ -80,14 +80,13 @@ class Path:
         turns = None if self.quaternions is None else self.quaternion_at(when)
         return Path(when, self.at(when), turns)
 
-    def _between(self, time: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _between(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the keys before and after and the eased fraction between them."""
-        t = finite_array("time", time, (), ("m",))
         k = len(self.times)
-        first = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, max(k - 2, 0))
+        first = np.minimum(np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0), max(k - 2, 0))
         last = np.minimum(first + 1, k - 1)
         span = np.where(last > first, self.times[last] - self.times[first], 1.0)
-        s = np.clip((t - self.times[first]) / span, 0.0, 1.0)
+        s = np.minimum(np.maximum((t - self.times[first]) / span, 0.0), 1.0)
         if self.interpolation == "minimum_jerk":
             s = s**3 * (10.0 + s * (6.0 * s - 15.0))
         return first, last, s

@@ -1,16 +1,20 @@
-"""Static shapes as tables for the contact kernels."""
+"""Static and moving shapes as tables for the contact kernels."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
+from nuno import quaternion as quat
+from nuno.contact.led import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
 from nuno.contact.shapes import BOX, CAPSULE, COLUMNS, CYLINDER, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
 from nuno.errors import BodyStateError
-from nuno.shape import Box, Capsule, Cylinder, Plane, Sphere
+from nuno.motion import Schedule, is_led
+from nuno.shape import Box, Capsule, Cylinder, Plane, Shape, Sphere
 from nuno.solver.state import Shapes
 
 if TYPE_CHECKING:
@@ -36,13 +40,23 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 class Colliders:
     """The static bodies as the kernels see them.
 
+    A body that follows a path, or a body that does, has a slot of key poses, which `follow` sets for each run without
+    making any table anew.
+
     Attributes:
         shapes: The Warp struct.
         count: Number of shapes.
+        led: Bodies with a slot, in the slots' order.
     """
 
-    def __init__(self, shapes: Shapes, count: int, meshes: list[Any]) -> None:
-        self.shapes, self.count, self._meshes = shapes, count, meshes
+    def __init__(
+        self, shapes: Shapes, count: int, meshes: list[Any], led: Sequence[Body], centres: Sequence[np.ndarray]
+    ) -> None:
+        self.shapes, self.count, self.led = shapes, count, tuple(led)
+        self._meshes = meshes
+        # (worlds, led, 3) [m], where the led bodies' meshes have their origins in the bodies' frames
+        self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
+        self._times = np.zeros(0)
 
     @classmethod
     def from_bodies(
@@ -63,66 +77,148 @@ class Colliders:
                 geometric mean.
         """
         pair_friction = pair_friction or {}
-        flat: list[tuple[Any, int, np.ndarray]] = []
         per_world = any(_differs(body, pair_friction.get(body.name)) for body in bodies)
         worlds = world_count if per_world else 1
         meshes: list[Any] = []
+        led: list[Body] = []
+        centres: list[np.ndarray] = []
+        kinds = np.full(max(1, len(bodies)), PLANE, dtype=np.int32)
+        slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
+        table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
         for k, body in enumerate(bodies):
-            kind, sizes, radius = _describe(body)
-            row = np.zeros((worlds, COLUMNS), dtype=np.float32)
-            row[:, 12:15] = sizes
+            row = table[:, k]
             row[:, 15] = body.friction
             row[:, 16] = pair_friction.get(body.name, -1.0)
-            row[:, 18] = radius
-            if kind in (SOLID_MESH, SHELL_MESH):
-                # meshes stand in world coordinates: their pose is the identity
-                row[:, 3:12] = np.eye(3).ravel()
-                row[:, 17] = 0.5 * float(getattr(body, "thickness", 0.0) or 0.0) if kind == SHELL_MESH else 0.0
-                surface, faces = body.surface()
-                vertices = np.asarray(surface, dtype=np.float32)
-                vertices = vertices if vertices.ndim == 3 else vertices[None]
-                made: list[Any] = []
-                for v in range(worlds):
-                    points = vertices[v if len(vertices) > 1 else 0]
-                    if v == 0 or len(vertices) > 1:
-                        made.append(
-                            wp.Mesh(
-                                points=wp.array(points, dtype=wp.vec3, device=device),
-                                indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
-                            )
-                        )
-                    ids[v, k] = made[-1].id
-                    low, high = points.min(axis=0), points.max(axis=0)
-                    row[v, :3] = 0.0
-                    row[v, 18] = float(np.abs(np.concatenate([low, high])).max())
+            position, quaternion = body.position, np.asarray(body.quaternion)
+            primitive, centre = _describe(body), np.zeros(3)
+            if primitive is None:
+                kinds[k] = SOLID_MESH if body.is_solid else SHELL_MESH
+                made, centre, row[:, 12:15] = _meshes_of(body, device)
                 meshes += made
+                ids[:, k] = [mesh.id for mesh in made] if len(made) > 1 else made[0].id
+                row[:, 17] = 0.0 if body.is_solid else 0.5 * body.thickness
+                row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
+                position = position + quat.rotate(quaternion, centre)
             else:
-                row[:, :3] = body.position
-                row[:, 3:12] = rotation_matrices(np.asarray(body.quaternion)).reshape(-1, 9)
-            flat.append((None, kind, row))
+                kinds[k], row[:, 12:15], row[:, 18] = primitive
+            row[:, :3] = position
+            row[:, 3:12] = rotation_matrices(quaternion).reshape(-1, 9)
+            if is_led(body):
+                slots[k] = len(led)
+                led.append(body)
+                centres.append(np.broadcast_to(centre, (worlds, 3)))
         shapes = Shapes()
         shapes.count = len(bodies)
-        kinds = np.array([kind for _, kind, _ in flat] or [PLANE], dtype=np.int32)
-        table = np.stack([row for _, _, row in flat], axis=1) if flat else np.zeros((1, 1, COLUMNS), np.float32)
-        shapes.stride = table.shape[1] * COLUMNS if table.shape[0] > 1 else 0
+        shapes.stride = table.shape[1] * COLUMNS if worlds > 1 else 0
         shapes.mesh_stride = ids.shape[1] if worlds > 1 else 0
+        size = max(1, len(led)) * SLOT_SIZE
+        shapes.pose_stride = size if worlds > 1 else 0
         shapes.kind = wp.array(kinds, dtype=int, device=device)
-        shapes.table = wp.array(np.ascontiguousarray(table).ravel(), dtype=float, device=device)
+        shapes.table = wp.array(table.ravel(), dtype=float, device=device)
         shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
-        return cls(shapes, len(bodies), meshes)
+        shapes.slot = wp.array(slots, dtype=int, device=device)
+        shapes.pose = wp.zeros(worlds * size if led else 1, dtype=float, device=device)
+        shapes.timing = wp.zeros(2, dtype=int, device=device)
+        shapes.haste = wp.zeros(1, dtype=float, device=device)
+        return cls(shapes, len(bodies), meshes, led, centres)
+
+    def follow(self, schedule: Schedule) -> None:
+        """Take where the led bodies are during the next run; arrays keep their places on the device."""
+        if not self.led:
+            return
+        frames = len(schedule.times) // 2
+        if not 1 <= frames < FRAMES:
+            raise ValueError(f"a run may have 1 to {FRAMES - 1} frames, got {frames}")
+        worlds = len(self.shapes.pose) // (len(self.led) * SLOT_SIZE)
+        place = np.empty((worlds, len(self.led), 2 * frames + 1, 3))
+        turn = np.empty((worlds, len(self.led), 2 * frames + 1, 4))
+        for slot, body in enumerate(self.led):
+            place[:, slot], turn[:, slot] = schedule.poses[body.key]
+        if self._centres.any():
+            place += quat.rotate(turn, self._centres[:, :, None])
+        # the short way round between neighbours, which the kernels blend number by number
+        flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
+        turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
+        table = np.zeros((worlds, len(self.led), FRAMES, FRAME_SIZE), dtype=np.float32)
+        first = 2 * np.arange(frames + 1)
+        base = np.round(place[:, :, first] * 1024.0) / 1024.0
+        table[:, :, : frames + 1, :3] = base
+        for k in range(3):
+            # the frame that begins at the end stands still
+            which = np.minimum(first + k, 2 * frames)
+            key = table[:, :, : frames + 1, 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
+            key[..., :3] = place[:, :, which] - base
+            key[..., 3:] = turn[:, :, which]
+        self.shapes.pose.assign(table.ravel())
+        self.shapes.haste.assign(np.array([self._haste(schedule.times, place, turn)], dtype=np.float32))
+        self._times = schedule.times
+
+    def _haste(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray) -> float:
+        """The fastest that any point of the led bodies moves [m/s]."""
+        span = np.diff(times)
+        radii = self._radii[:, None]
+        speed = np.linalg.norm(np.diff(place, axis=2), axis=-1) / span
+        dot = np.clip(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 0.0, 1.0)
+        return float((speed + 2.0 * np.arccos(dot) / span * radii).max())
+
+    @cached_property
+    def _radii(self) -> np.ndarray:
+        """Bounding radii of the led bodies [m]; 0 for a plane, of which no bound is needed."""
+        slots = self.shapes.slot.numpy()
+        rows = np.argsort(slots)[len(slots) - len(self.led) :]
+        radii = self.shapes.table.numpy().reshape(-1, len(slots), COLUMNS)[0, rows, 18]
+        return np.where(radii < UNBOUNDED, radii, 0.0)
+
+    def begin(self, time: float, dt: float) -> None:
+        """Be told that a launch begins at ``time`` with substeps of ``dt`` [s]."""
+        if self.led and len(self._times) > 1:
+            starts = self._times[::2]
+            first = int(np.argmin(np.abs(starts - time)))
+            # at the end all stand still, for however long
+            span = round((starts[first + 1] - starts[first]) / dt) if first + 1 < len(starts) else 1
+            self.shapes.timing.assign(np.array([first, max(1, span)], dtype=np.int32))
+
+
+@lru_cache(maxsize=256)
+def _rigid_mesh(shape: Shape, device: str) -> tuple[Any, np.ndarray, np.ndarray]:
+    """A shape's triangles on a device about the middle of their bounding box; the middle, and the half sides."""
+    return _centred(*shape.mesh(), device)
+
+
+def _centred(points: np.ndarray, faces: np.ndarray, device: str) -> tuple[Any, np.ndarray, np.ndarray]:
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    mesh = wp.Mesh(
+        points=wp.array((points - middle).astype(np.float32), dtype=wp.vec3, device=device),
+        indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
+    )
+    return mesh, middle, 0.5 * (high - low)
+
+
+def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarray]:
+    """Meshes of a body, one or one a world, their frames' origins in the body's frame and half sides, (..., 3)."""
+    if len(body.faces) == 0:
+        raise BodyStateError(f"{body.name!r} has neither a known shape nor faces to collide with")
+    if not body.is_deformed:
+        mesh, middle, half = _rigid_mesh(body.shape, device)
+        return [mesh], middle, half
+    points = body.local_vertices()
+    made = [_centred(p, body.faces, device) for p in points.reshape(-1, *points.shape[-2:])]
+    middles, halves = np.stack([m for _, m, _ in made]), np.stack([h for _, _, h in made])
+    return [mesh for mesh, _, _ in made], middles if len(made) > 1 else middles[0], halves
 
 
 def _differs(body: Body, pair: Any) -> bool:
     """Whether anything about a body is given per world."""
     posed = np.ndim(body.position) == 2 or np.ndim(body.quaternion) == 2
     rubs = np.ndim(body.friction) == 1 or np.ndim(pair if pair is not None else 0.0) == 1
-    curved = not isinstance(body.shape, Box | Sphere | Cylinder | Capsule | Plane)
-    return posed or rubs or (curved and np.ndim(body.surface()[0]) == 3)
+    curved = body.is_deformed and np.ndim(body.surface()[0]) == 3 and len(body.surface()[0]) > 1
+    return posed or rubs or curved
 
 
-def _describe(body: Body) -> tuple[int, tuple[float, float, float], float]:
-    """Kind, sizes and bounding radius of a body's shape."""
+def _describe(body: Body) -> tuple[int, tuple[float, float, float], float] | None:
+    """Kind, sizes and bounding radius of a body's shape; None for triangles."""
     shape = body.shape
     if isinstance(shape, Box):
         half = np.asarray(shape.size, dtype=float) / 2
@@ -135,7 +231,4 @@ def _describe(body: Body) -> tuple[int, tuple[float, float, float], float]:
         return CAPSULE, (shape.radius, shape.height / 2, 0.0), shape.radius + shape.height / 2
     if isinstance(shape, Plane):
         return PLANE, (0.0, 0.0, 0.0), UNBOUNDED
-    if body.faces is None or len(body.faces) == 0:
-        raise BodyStateError(f"{body.name!r} has neither a known shape nor faces to collide with")
-    solid = bool(getattr(body, "is_solid", False))
-    return (SOLID_MESH if solid else SHELL_MESH), (0.0, 0.0, 0.0), UNBOUNDED
+    return None

@@ -1,0 +1,81 @@
+"""Moving shapes: where one is after any substep, between key poses half a frame apart.
+
+Three keys of a frame are joined by the parabola through them: at a constant acceleration the surface's speed then has
+no steps, each of which would let slip what lies on it.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import add, fill, mul, over, per_world, root, sub, times  # noqa: F401
+from nuno.solver.state import Shapes
+
+FRAMES = 32
+"""Frames of a run, at most 30 whole ones and a shorter last one, and one that begins where it ends."""
+KEY_SIZE = 7
+"""Position 0-2 [m], relative to the frame's base, and quaternion 3-6 (w, x, y, z)."""
+FRAME_SIZE = 3 + 3 * KEY_SIZE
+"""Numbers of a frame: its base 0-2 [m], a whole number of 1/1024 m, then the keys at its start, middle and end."""
+SLOT_SIZE = FRAMES * FRAME_SIZE
+"""Numbers of a slot in `Shapes.pose`."""
+
+
+@wp.func
+def frame_of(shapes: Shapes, slot: int, clock: int):
+    """Where the numbers of the frame begin in which the ``clock``-th substep ends, and how much of it is gone then."""
+    span = wp.max(shapes.timing[1], 1)
+    k = wp.clamp(clock / span, 0, FRAMES - 1 - shapes.timing[0])
+    part = wp.min(float(clock - k * span) / float(span), 1.0)
+    return slot * SLOT_SIZE + (shapes.timing[0] + k) * FRAME_SIZE, part
+
+
+@wp.func
+def led_number(like: Any, shapes: Shapes, entry: int, part: float, group: int, worlds: int):
+    """One number on the parabola through three keys, all of which it meets exactly."""
+    a = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, entry)
+    b = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, entry + KEY_SIZE)
+    c = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, entry + 2 * KEY_SIZE)
+    rest = 1.0 - part
+    return a * (rest * (1.0 - 2.0 * part)) + b * (4.0 * part * rest) + c * (part * (2.0 * part - 1.0))
+
+
+@wp.func
+def led_place(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, ox: Any, oy: Any, oz: Any):
+    """Position [m] relative to ``o``, of which base and origins lose no digits."""
+    base, part = frame_of(shapes, slot, clock)
+    entry = base + 3
+    x = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, base) - ox
+    y = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, base + 1) - oy
+    z = per_world(like, shapes.pose, group, shapes.pose_stride, worlds, base + 2) - oz
+    x = x + led_number(like, shapes, entry, part, group, worlds)
+    y = y + led_number(like, shapes, entry + 1, part, group, worlds)
+    z = z + led_number(like, shapes, entry + 2, part, group, worlds)
+    return x, y, z
+
+
+@wp.func
+def led_turn(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int):
+    """Rotation matrix, row major, shape to world."""
+    base, part = frame_of(shapes, slot, clock)
+    entry = base + 6
+    w = led_number(like, shapes, entry, part, group, worlds)
+    x = led_number(like, shapes, entry + 1, part, group, worlds)
+    y = led_number(like, shapes, entry + 2, part, group, worlds)
+    z = led_number(like, shapes, entry + 3, part, group, worlds)
+    one = fill(w, 1.0)
+    scale = over(one, root(times(w, w) + times(x, x) + times(y, y) + times(z, z)))
+    w = times(w, scale)
+    x = times(x, scale)
+    y = times(y, scale)
+    z = times(z, scale)
+    r00 = one - (times(y, y) + times(z, z)) * 2.0
+    r01 = (times(x, y) - times(w, z)) * 2.0
+    r02 = (times(x, z) + times(w, y)) * 2.0
+    r10 = (times(x, y) + times(w, z)) * 2.0
+    r11 = one - (times(x, x) + times(z, z)) * 2.0
+    r12 = (times(y, z) - times(w, x)) * 2.0
+    r20 = (times(x, z) - times(w, y)) * 2.0
+    r21 = (times(y, z) + times(w, x)) * 2.0
+    r22 = one - (times(x, x) + times(y, y)) * 2.0
+    return r00, r01, r02, r10, r11, r12, r20, r21, r22

@@ -1,0 +1,133 @@
+"""Motions: static bodies that follow paths, and where they are at the frames of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno import quaternion as quat
+from nuno.coordinates import Coordinates, Pose, compose
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.path import Path
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """Where led bodies are in a run: at its start, and in the middle and at the end of each frame.
+
+    Attributes:
+        times: (k,) float [s].
+        poses: By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4).
+    """
+
+    times: np.ndarray
+    poses: dict[str, Pose]
+
+
+def is_led(frame: Coordinates) -> bool:
+    """Return whether a frame follows a path, or a frame that does."""
+    return _led_by(frame) is not None
+
+
+def make_schedule(bodies: Iterable[Body], start: float, duration: float, frame: float) -> Schedule:
+    """Return where bodies are from ``start`` on, for whole frames of ``frame`` and a shorter last one [s]."""
+    whole = math.floor(duration / frame + 1e-6)
+    times = start + 0.5 * frame * np.arange(2 * whole + 1)
+    rest = duration - whole * frame
+    if rest > 1e-9:
+        times = np.append(times, [start + duration - 0.5 * rest, start + duration])
+    # the same instants, to the bit, whether a span is gone through at once or in pieces
+    times = np.round(times, 9)
+    bodies = list(bodies)
+    led = {root.key: root for body in bodies if (root := _led_by(body)) is not None}
+    roots = dict(zip(led, paths_at([body._path for body in led.values()], times), strict=True))
+    return Schedule(times, {body.key: _pose_of(body, roots) for body in bodies})
+
+
+def paths_at(paths: Sequence[Path | None], times: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Return positions and quaternions (None of a path without) of many paths at ``times`` (k,) [s].
+
+    Paths with the same keys in time, such as those of a robot's links, are worked out together.
+    """
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for k, path in enumerate(paths):
+        assert path is not None
+        shape = None if path.quaternions is None else path.quaternions.shape
+        groups.setdefault((path.times.tobytes(), path.interpolation, path.positions.shape, shape), []).append(k)
+    found: list[Any] = [None] * len(paths)
+    for group in groups.values():
+        alike = [path for k in group if (path := paths[k]) is not None]
+        first, last, s = alike[0]._between(times)
+        places = np.stack([path.positions for path in alike])
+        a, b = places[..., first, :], places[..., last, :]
+        placed = a + s[..., None] * (b - a)
+        turns = [path.quaternions for path in alike if path.quaternions is not None]
+        turned: Any = [None] * len(group)
+        if turns:
+            stack = np.stack(turns)
+            turned = quat.slerp(stack[..., first, :], stack[..., last, :], s)
+        for k, place, turn in zip(group, placed, turned, strict=True):
+            found[k] = (place, turn)
+    return found
+
+
+def _led_by(frame: Coordinates) -> Any:
+    """Return the body at or above a frame that follows a path."""
+    above: Coordinates | None = frame
+    while above is not None and getattr(above, "_path", None) is None:
+        above = above._parent
+    return above
+
+
+def _pose_of(frame: Any, roots: dict[str, Any]) -> Pose:
+    """Return a led frame's pose from those of the bodies with paths: parts with an axis of times, or of 1."""
+    if getattr(frame, "_path", None) is not None:
+        place, turn = roots[frame.key]
+        return place, frame._quaternion[..., None, :] if turn is None else turn
+    return compose(_pose_of(frame._parent, roots), (frame._position[..., None, :], frame._quaternion[..., None, :]))
+
+
+def path_for(body: Body, to: Path, world_count: int) -> Path:
+    """Return ``to`` as ``body`` can follow it in a batch of so many worlds.
+
+    Raises:
+        BodyStateError: the body is dynamic, or follows another frame.
+        InvalidInputError: it is no path, or one for another number of worlds.
+    """
+    if not isinstance(to, Path):
+        raise InvalidInputError(f"a body moves along a Path, or None ends it; got {type(to).__name__}")
+    if body._dynamics is not None:
+        raise BodyStateError(f"{body.name!r} is dynamic and cannot follow a path; grip it instead")
+    if body._parent is not None:
+        raise BodyStateError(f"{body.name!r} follows another frame; dissoc it first")
+    if to.world_count not in (None, world_count):
+        raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {world_count}")
+    if world_count == 1 and to.world_count == 1:
+        to = of_world(to, 0)
+    return to
+
+
+def of_world(path: Path, world: int) -> Path:
+    """Return the path of one world."""
+    turns = path.quaternions
+    return replace(
+        path,
+        positions=path.positions[world] if path.positions.ndim == 3 else path.positions,
+        quaternions=turns[world] if turns is not None and turns.ndim == 3 else turns,
+    )
+
+
+def arrive(bodies: Iterable[Body], time: float) -> None:
+    """Set the poses of bodies that follow paths to where those are at ``time`` [s]."""
+    led = [body for body in bodies if body._path is not None]
+    for body, (place, turn) in zip(led, paths_at([body._path for body in led], np.array(time)), strict=True):
+        body._position = place
+        if turn is not None:
+            body._quaternion = turn
