@@ -1,0 +1,84 @@
+"""What a soft body's elements are going through: volume, strain and stress, from where the vertices are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.scene.soft import SoftTopology, edge_matrices, moduli
+
+if TYPE_CHECKING:
+    from nuno.materials import Soft
+
+
+def deformation_gradients(topology: SoftTopology, positions: ArrayLike) -> np.ndarray:
+    """Return (..., m, 3, 3) float64: F of each element, how it maps small steps at rest to steps now.
+
+    Args:
+        topology: The body's elements.
+        positions: (..., n, 3) [m].
+    """
+    return edge_matrices(np.asarray(positions, dtype=np.float64), topology.tets) @ topology.inverse
+
+
+def element_volumes(topology: SoftTopology, positions: ArrayLike) -> np.ndarray:
+    """Return (..., m) [m3]: each element's volume now, negative where it is inside out; `topology.volume` at rest.
+
+    Args:
+        topology: The body's elements.
+        positions: (..., n, 3) [m].
+    """
+    return np.linalg.det(edge_matrices(np.asarray(positions, dtype=np.float64), topology.tets)) / 6.0
+
+
+def strains(topology: SoftTopology, positions: ArrayLike) -> np.ndarray:
+    """Return (..., m, 3, 3): Green's strain (F^T F - 1) / 2 of each element, along the rest shape's axes.
+
+    Args:
+        topology: The body's elements.
+        positions: (..., n, 3) [m].
+    """
+    f = deformation_gradients(topology, positions)
+    return 0.5 * (np.swapaxes(f, -1, -2) @ f - np.eye(3))
+
+
+def stresses(topology: SoftTopology, positions: ArrayLike, material: Soft, worlds: int = 1) -> np.ndarray:
+    """Return (..., m, 3, 3) [Pa]: Cauchy's stress of each element, along the world's axes; tension is positive.
+
+    sigma = (mu F F^T + (bulk (J - 1) - mu) J 1) / J, of the energy in `nuno.solver.tetrahedron`. An element that is
+    only partly filled carries ``fraction`` of it. It is not finite where an element is flat.
+
+    Args:
+        topology: The body's elements.
+        positions: (n, 3) or (worlds, n, 3) [m].
+        material: What the body is made of.
+        worlds: How many worlds the material's arrays may tell apart.
+    """
+    f = deformation_gradients(topology, positions)
+    mu, bulk = moduli(material.resolved(worlds, topology.element_count))
+    if f.ndim == 3:
+        mu, bulk = mu[0], bulk[0]
+    mu, bulk = mu[..., None, None], bulk[..., None, None]
+    j = np.linalg.det(f)[..., None, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return mu / j * (f @ np.swapaxes(f, -1, -2)) + (bulk * (j - 1.0) - mu) * np.eye(3)
+
+
+def elastic_energy(topology: SoftTopology, positions: ArrayLike, material: Soft, worlds: int = 1) -> np.ndarray:
+    """Return (...,) [J]: the body's elastic energy, zero at rest.
+
+    Args:
+        topology: The body's elements.
+        positions: (n, 3) or (worlds, n, 3) [m].
+        material: What the body is made of.
+        worlds: How many worlds the material's arrays may tell apart.
+    """
+    f = deformation_gradients(topology, positions)
+    mu, bulk = moduli(material.resolved(worlds, topology.element_count))
+    if f.ndim == 3:
+        mu, bulk = mu[0], bulk[0]
+    j = np.linalg.det(f)
+    density = 0.5 * mu * ((f**2).sum(axis=(-1, -2)) - 3.0) - mu * (j - 1.0) + 0.5 * bulk * (j - 1.0) ** 2
+    return (density * topology.volume * topology.fraction).sum(axis=-1)

@@ -1,0 +1,254 @@
+"""A soft body's substep as a list of phases, and the kernels that walk through it.
+
+The phases around the tetrahedra are those of a cloth (`nuno.solver.frame`); so are the plans, and what ``thread`` and
+``threads`` mean.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.shapes import touch_shapes
+from nuno.solver.frame import near_shapes
+from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
+from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
+from nuno.solver.shared import BLOCKS_AT_ONCE, shared_buffer
+from nuno.solver.soft_state import CRUMPLED, SEEN, SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra, view
+from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SCALARS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
+from nuno.solver.tetrahedron import entry, solve_tetrahedron
+from nuno.solver.vector import at, corner, scaled, spread
+from nuno.solver.viscosity import damp_tetrahedron
+from nuno.solver.wide import as_lanes
+
+
+@wp.func
+def turn_notes(t: Any, thread: int):
+    """What was seen in the last substep holds in this one; one thread does it."""
+    if thread == 0:
+        t.notes[CRUMPLED] = t.notes[SEEN]
+        t.notes[SEEN] = fill(t.x[0], 0.0)
+
+
+@wp.func
+def solve_tetrahedra(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The elasticity of the tetrahedra of one colour."""
+    n = table.rows
+    square = run.dt * run.dt
+    limit = wp.min(table.speed * run.dt, 0.5 * table.height)
+    for k in range(first + thread, last, threads):
+        which = table.soft[k]
+        filled = entry(table.number, k, 7, n)
+        a = corner(table.tet, k, 0, 4)
+        b = corner(table.tet, k, 1, 4)
+        c = corner(table.tet, k, 2, 4)
+        d = corner(table.tet, k, 3, 4)
+        m11 = entry(table.number, k, 0, n)
+        m22 = entry(table.number, k, 1, n)
+        m33 = entry(table.number, k, 2, n)
+        m12 = entry(table.number, k, 3, n)
+        m13 = entry(table.number, k, 4, n)
+        m23 = entry(table.number, k, 5, n)
+        inverse = entry(table.number, k, 6, n)
+        mu = scaled(at(t.mu, which) * square, filled)
+        bulk = scaled(at(t.bulk, which) * square, filled)
+        solve_tetrahedron(t, a, b, c, d, m11, m22, m33, m12, m13, m23, inverse, mu, bulk, limit)
+
+
+@wp.func
+def damp_tetrahedra(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The viscosity of the tetrahedra of one colour, over ``run.damped`` substeps."""
+    n = table.rows
+    time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
+    for k in range(first + thread, last, threads):
+        mu = at(t.mu, table.soft[k])
+        eta = scaled(scaled(mu, spread(mu, time)), entry(table.number, k, 7, n))
+        a = corner(table.tet, k, 0, 4)
+        b = corner(table.tet, k, 1, 4)
+        c = corner(table.tet, k, 2, 4)
+        d = corner(table.tet, k, 3, 4)
+        m11 = entry(table.number, k, 0, n)
+        m22 = entry(table.number, k, 1, n)
+        m33 = entry(table.number, k, 2, n)
+        m12 = entry(table.number, k, 3, n)
+        m13 = entry(table.number, k, 4, n)
+        m23 = entry(table.number, k, 5, n)
+        inverse = entry(table.number, k, 6, n)
+        damp_tetrahedron(t, a, b, c, d, m11, m22, m33, m12, m13, m23, inverse, eta)
+
+
+@wp.func
+def viscous(t: Any, table: Any, run: Settings, thread: int, threads: int):
+    """One pass over the tetrahedra's viscosity, colour by colour."""
+    for c in range(table.colour.shape[0] - 1):
+        damp_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
+        barrier(threads)
+
+
+@wp.func
+def elastic(t: Any, table: Any, run: Settings, thread: int, threads: int):
+    """One pass over the tetrahedra's elasticity, colour by colour, always in this order: at rest nothing moves."""
+    for c in range(table.colour.shape[0] - 1):
+        solve_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
+        barrier(threads)
+
+
+@wp.func
+def advance(t: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
+    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for."""
+    n = topo.particles
+    for k in range(substeps):
+        if run.parts & MOTION != 0:
+            if (run.first + k) % run.frame == 0:
+                near_shapes(t, n, run, shapes, thread, threads)
+                forget_loads(t, run, thread, threads)
+            tick(t, run, thread)
+            turn_notes(t, thread)
+            if run.damped != 0 and (run.first + k) % run.frame % wp.max(run.damped, 1) == 0:
+                viscous(t, topo, run, thread, threads)
+            predict(t, n, run, thread, threads)
+            barrier(threads)
+            hold_vertices(t, run, thread, threads)
+            barrier(threads)
+            elastic(t, topo, run, thread, threads)
+        if run.parts & PULLS != 0:
+            pull_points(t, run, thread, threads)
+            barrier(threads)
+        if run.parts & SHAPES != 0:
+            read_loads(t, run, thread, threads)
+            barrier(threads)
+            touch_shapes(t, n, shapes, run.dt, thread, threads)
+            barrier(threads)
+        if run.parts & VELOCITIES != 0:
+            reset_speed(t, thread)
+            barrier(threads)
+            read_velocities(t, n, run, thread, threads)
+            barrier(threads)
+
+
+@wp.func
+def by_sixteen(t: SoftFloat, wide: WideTetrahedra, m: int):
+    """The particles of one world as m vectors of sixteen, for the loops over particles."""
+    p = SoftLanes()
+    p.group = t.group
+    p.worlds = t.worlds
+    p.x = as_lanes(t.x, m)
+    p.y = as_lanes(t.y, m)
+    p.z = as_lanes(t.z, m)
+    p.px = as_lanes(t.px, m)
+    p.py = as_lanes(t.py, m)
+    p.pz = as_lanes(t.pz, m)
+    p.vx = as_lanes(t.vx, m)
+    p.vy = as_lanes(t.vy, m)
+    p.vz = as_lanes(t.vz, m)
+    p.w = as_lanes(t.w, m)
+    p.fx = as_lanes(t.fx, m)
+    p.fy = as_lanes(t.fy, m)
+    p.fz = as_lanes(t.fz, m)
+    p.scalars = wide.scalars
+    p.notes = wide.notes
+    p.near = t.near
+    for k in range(SCALARS):
+        p.scalars[k] = fill(p.x[0], t.scalars[k])
+    return p
+
+
+# A module each, so that only the kind that is run is compiled.
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_worlds")
+def run_soft_worlds(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, first: int, substeps: int
+):
+    """Every world by itself, by one thread on the CPU."""
+    t = view(s, first + wp.tid(), topo.particles, size)
+    advance(t, topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_lanes")
+def run_soft_lanes(
+    s: SoftLanes, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, first: int, substeps: int
+):
+    """Sixteen worlds at once, by one thread on the CPU."""
+    t = view(s, first + wp.tid(), topo.particles, size)
+    advance(t, topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_wide")
+def run_soft_wide(
+    s: SoftFloat,
+    topo: Tetrahedra,
+    wide: WideTetrahedra,
+    size: SoftSizes,
+    run: Settings,
+    shapes: Shapes,
+    substeps: int,
+):
+    """One world by one thread, sixteen tetrahedra or particles at a time: `advance` with its loops by sixteen."""
+    n = topo.particles
+    m = (n + LANES - 1) / LANES
+    t = view(s, wp.tid(), n, size)
+    p = by_sixteen(t, wide, m)
+    for k in range(substeps):
+        if run.parts & MOTION != 0:
+            if (run.first + k) % run.frame == 0:
+                near_shapes(t, n, run, shapes, 0, 1)
+                forget_loads(t, run, 0, 1)
+            tick(t, run, 0)
+            turn_notes(t, 0)
+            if run.damped != 0 and (run.first + k) % run.frame % wp.max(run.damped, 1) == 0:
+                viscous(t, wide, run, 0, 1)
+            predict(p, m, run, 0, 1)
+            hold_vertices(t, run, 0, 1)
+            elastic(t, wide, run, 0, 1)
+        if run.parts & PULLS != 0:
+            pull_points(t, run, 0, 1)
+        if run.parts & SHAPES != 0:
+            read_loads(t, run, 0, 1)
+            p.notes[CLOCK] = fill(p.x[0], t.notes[CLOCK])  # moving shapes are where the clock says
+            touch_shapes(p, m, shapes, run.dt, 0, 1)
+        if run.parts & VELOCITIES != 0:
+            reset_speed(p, 0)
+            read_velocities(p, m, run, 0, 1)
+            t.notes[SPEED] = largest(p.notes[SPEED])
+
+
+@wp.kernel(
+    enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks"
+)  # fmt: skip
+def run_soft_blocks(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """Every world by a block of ``threads`` threads."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    advance(t, topo, run, shapes, substeps, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_shared")
+def run_soft_blocks_shared(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """The same with x, y, z and w in shared memory for as long as the launch takes."""
+    tid = wp.tid()
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    buffer = shared_buffer()
+    step = wp.uint64(n) * wp.uint64(4)
+    t.x = wp.array(ptr=buffer, shape=(n,), dtype=float)
+    t.y = wp.array(ptr=buffer + step, shape=(n,), dtype=float)
+    t.z = wp.array(ptr=buffer + step * wp.uint64(2), shape=(n,), dtype=float)
+    t.w = wp.array(ptr=buffer + step * wp.uint64(3), shape=(n,), dtype=float)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+    barrier(threads)
+    advance(t, topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]

@@ -1,0 +1,214 @@
+"""One dynamic soft body in one or many worlds: its arrays on the device, and the plan that runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.scene.soft import SoftTopology, moduli, shape_gradients
+from nuno.solver.lanes import LANES, lane, lane_int
+from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.shared import SHARED_PARTICLES
+from nuno.solver.soft_frame import (
+    run_soft_blocks,
+    run_soft_blocks_shared,
+    run_soft_lanes,
+    run_soft_wide,
+    run_soft_worlds,
+)
+from nuno.solver.soft_state import SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra
+from nuno.solver.soft_substeps import soft_substeps, wave_speed
+from nuno.solver.state import NOTES, SCALARS, Settings
+from nuno.solver.tetrahedron import COLUMNS
+
+if TYPE_CHECKING:
+    from nuno.materials import Soft
+
+BLOCK_THREADS = 256
+"""Threads of a CUDA block, which runs one world."""
+COLLAPSED = 1e-3
+"""Width of a body, in cells, below which it is a line or a point, from where no force of its own leads back."""
+MOST_REPLY, MOST_BETWEEN = 0.7, 4
+"""Viscosity works on every so many substeps (at most 4) that an element's reply to its own viscosity stays below 0.7 on
+average; smooth motions are then damped at 0.85 to 0.95 of the stated rate, and at 0.95 to 0.99 at half the reply."""
+LOOSENING = 0.1
+"""How far, in cells, a body that is a line or a point is shaken."""
+
+
+class SoftSolver(ParticleSolver):
+    """A soft body's state and how it advances: neo-Hookean tetrahedra (see `nuno.solver.tetrahedron`).
+
+    Args:
+        topology: The body's elements.
+        material: A `nuno.materials.Soft`, whose elements are the tetrahedra.
+        positions: (worlds, n, 3) float [m].
+        velocities: (worlds, n, 3) float [m/s].
+        device: "cpu" or "cuda:0" ...
+        gravity: (3,) [m/s2].
+        frame_rate: Frames a second.
+        substeps: Substeps a frame; None takes `soft_substeps`.
+        friction: Friction coefficient of the body; None takes the material's. A number or one per world.
+        self_contact: Kept, but without effect: see the limitations.
+        plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world) or "vector" (one world on
+            the CPU by sixteen elements at a time).
+
+    A vertex touches shapes where it is, without a thickness. Inner vertices are tested too: in a cube of ten cells a
+    side that is 2 % of a substep.
+
+    Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated; a
+    soft body does not touch itself; linear tetrahedra are too stiff in bending, and near a Poisson ratio of 0.5, where
+    a crumpled body may stay crumpled; on CUDA a world is one block, however large.
+    """
+
+    def __init__(
+        self,
+        topology: SoftTopology,
+        material: Soft,
+        positions: np.ndarray,
+        velocities: np.ndarray,
+        *,
+        device: str = "cpu",
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        frame_rate: float = 60.0,
+        substeps: int | None = None,
+        friction: float | np.ndarray | None = None,
+        self_contact: bool = False,
+        plan: str = "auto",
+    ) -> None:
+        self._prepare(positions, device, gravity, frame_rate)
+        self.topology, self._cell_size = topology, topology.cell_size
+        values = material.resolved(self.world_count, topology.element_count)
+        self._speed = wave_speed(values)
+        self.substeps = int(substeps) if substeps else soft_substeps(topology, 1.0 / frame_rate, self._speed)
+        self.self_contact = self_contact
+        self.shared_memory = True
+        one = "vector" if not self._cuda and self.world_count == 1 else "fused"
+        self.plan = one if plan == "auto" else plan
+        self._wide: WideTetrahedra | None = None
+        self._build(values, friction)
+        self._start(positions, velocities)
+
+    def settings(self, time: float, dt: float, frame: int) -> Settings:
+        """The run's settings; ``damped`` is every how many substeps viscosity works, 0 for never."""
+        run = super().settings(time, dt, frame)
+        if self._damped:
+            often = max(1, min(MOST_BETWEEN, int(MOST_REPLY / (self._reply * dt))))
+            run.damped = max(k for k in range(1, often + 1) if frame % k == 0)
+        return run
+
+    def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
+        """Set positions [m] and velocities [m/s], (worlds, n, 3) each.
+
+        A world whose vertices are all on a line or at a point is shaken a little, always alike.
+        """
+        super().set_state(loosened(np.asarray(positions, dtype=np.float64), self._cell_size), velocities)
+
+    def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
+        topology, worlds = self.topology, self.world_count
+        state = SoftLanes() if self.lanes > 1 else SoftFloat()
+        size = SoftSizes()
+        self._state, self._size = state, size
+        mu, bulk = moduli(values)
+        size.soft = mu.shape[1]
+        state.mu, state.bulk = (self._put(np.broadcast_to(m, (worlds, size.soft))) for m in (mu, bulk))
+        self._topology = self._upload(shared=size.soft == 1)
+        self.mass = np.repeat(topology.masses(values["density"]), worlds // len(values["density"]), axis=0)
+        self._inverse_mass = (1.0 / self.mass).astype(np.float32)
+        own = values["friction"] if friction is None else np.asarray(friction, float).reshape(-1, 1)
+        self._scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
+        for column, value in enumerate((values["air_drag"], own, values["damping"], np.zeros((1, 1)))):
+            self._scalars[:, column] = value[:, 0]
+        self._damped = bool(np.any(values["damping"] > 0))
+        self._reply = viscous_reply(topology, 2.0 * mu * values["damping"], self._inverse_mass)
+        self._allocate_particles()
+
+    def _upload(self, shared: bool) -> Tetrahedra:
+        """The elements on the device, sorted by colour; ``shared`` where all have the same moduli."""
+        topology, made = self.topology, Tetrahedra()
+        order = topology.order
+        inverse, volume = topology.inverse[order], topology.volume[order]
+        m = (inverse @ inverse.transpose(0, 2, 1) * volume[:, None, None]).reshape(-1, 9)
+        number = [*m[:, [0, 4, 8, 1, 2, 5]].T, 1.0 / (6.0 * volume), topology.fraction[order]]
+
+        def put(values: np.ndarray, dtype: Any) -> wp.array:
+            kind = np.float32 if dtype is float else np.int32
+            return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=self.device)
+
+        made.particles, made.rows = self.particle_count, len(order)
+        made.speed, made.height = self._speed, topology.cell_size
+        made.tet = put(topology.tets[order], wp.vec4i)
+        made.number = put(np.concatenate(number), float)
+        made.soft = put(np.zeros(len(order)) if shared else order, int)
+        made.colour = put(topology.offsets, int)
+        return made
+
+    def _widen(self) -> WideTetrahedra:
+        """The elements by groups of sixteen; a group that would be short repeats its last element."""
+        narrow, wide = self._topology, WideTetrahedra()
+        rows, starts = [], [0]
+        for first, last in pairwise(self.topology.offsets.tolist()):
+            count = -(-(last - first) // LANES)
+            rows.append(np.minimum(first + np.arange(count * LANES), last - 1).reshape(count, LANES))
+            starts.append(starts[-1] + count)
+        table = np.concatenate(rows)
+
+        def put(values: np.ndarray, dtype: Any) -> wp.array:
+            return wp.array(np.ascontiguousarray(values).reshape(-1, LANES), dtype=dtype, device="cpu")
+
+        wide.rows, wide.speed, wide.height = len(table), narrow.speed, narrow.height
+        wide.tet = put(narrow.tet.numpy()[table].transpose(0, 2, 1), lane_int)
+        wide.number = put(narrow.number.numpy().reshape(COLUMNS, -1)[:, table].transpose(1, 0, 2), lane)
+        wide.soft = put(narrow.soft.numpy()[table], lane_int)
+        wide.colour = wp.array(np.array(starts, np.int32), dtype=int, device="cpu")
+        wide.scalars = wp.zeros(SCALARS, dtype=lane, device="cpu")
+        wide.notes = wp.zeros(NOTES, dtype=lane, device="cpu")
+        return wide
+
+    def _advance(self, run: Settings, substeps: int) -> None:
+        common = [self._state, self._topology, self._size, run, self._shapes]
+        if self._cuda:
+            fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
+            wp.launch(
+                run_soft_blocks_shared if fits else run_soft_blocks, dim=self.group_count * BLOCK_THREADS,
+                inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
+            )  # fmt: skip
+        elif self.plan == "vector":
+            if self._wide is None:
+                self._wide = self._widen()
+            inputs = [self._state, self._topology, self._wide, self._size, run, self._shapes, substeps]
+            wp.launch(run_soft_wide, dim=1, inputs=inputs, device=self.device)
+        else:
+            kernel = run_soft_lanes if self.lanes > 1 else run_soft_worlds
+            self._over_groups(
+                lambda first: wp.launch(kernel, dim=1, inputs=[*common, first, substeps], device=self.device),
+                kernel.module,
+            )
+
+
+def viscous_reply(topology: SoftTopology, viscosity: np.ndarray, inverse_mass: np.ndarray) -> float:
+    """Return the mean over the elements of viscosity x volume x sum of w_i |grad N_i|^2 [1/s], of the fastest world.
+
+    Args:
+        topology: The body's elements.
+        viscosity: (worlds, m or 1) [Pa s].
+        inverse_mass: (worlds, n) [1/kg].
+    """
+    steep = (shape_gradients(topology.inverse) ** 2).sum(axis=2)
+    weight = (inverse_mass[:, topology.tets] * steep).sum(axis=2) * topology.volume * topology.fraction
+    return float((weight * viscosity).mean(axis=1).max())
+
+
+def loosened(positions: np.ndarray, cell: float) -> np.ndarray:
+    """Return positions (worlds, n, 3) [m], shaken by a tenth of ``cell`` where a world is a line or a point."""
+    spread = positions - positions.mean(axis=1, keepdims=True)
+    # widths across the line that fits best: root mean squares
+    width = np.sqrt(np.maximum(np.linalg.eigvalsh(np.swapaxes(spread, 1, 2) @ spread)[:, :2].sum(axis=1), 0.0))
+    flat = width < COLLAPSED * cell * np.sqrt(positions.shape[1])
+    if not flat.any():
+        return positions
+    shake = np.random.default_rng(0).normal(scale=LOOSENING * cell, size=positions.shape[1:])
+    return np.where(flat[:, None, None], positions + shake, positions)

@@ -1,0 +1,105 @@
+"""What a kernel sees of a soft body: the state of its worlds, and the tetrahedra that they share."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import lane, lane_int, window
+from nuno.solver.state import LISTINGS, LOADS, PARTICLE_ARRAYS, PICK_REACH
+
+CRUMPLED, SEEN = LISTINGS, PICK_REACH
+"""Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
+whether one is in this."""
+
+
+def _make(name: str, number: type, integer: type) -> Any:
+    """A struct under the names that `nuno.solver.state` has for the arrays that all particles have."""
+    numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box")
+    numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
+    fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
+    fields |= {"grip_corner": wp.array(dtype=integer), "near": wp.array(dtype=int), "group": int, "worlds": int}
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+
+
+SoftFloat = _make("SoftFloat", float, int)
+"""One world after the other: CUDA, and one world alone on the CPU."""
+
+SoftLanes = _make("SoftLanes", lane, lane_int)
+"""Sixteen worlds in the lanes of each element: batches on the CPU."""
+
+
+@wp.struct
+class Tetrahedra:
+    """A soft body's elements, the same in every world, sorted by colour.
+
+    ``number`` holds the columns of `nuno.solver.tetrahedron`; ``soft`` is which of a world's moduli an element has.
+    """
+
+    particles: int
+    rows: int
+    speed: float
+    height: float
+    tet: wp.array(dtype=wp.vec4i)
+    number: wp.array(dtype=float)
+    soft: wp.array(dtype=int)
+    colour: wp.array(dtype=int)
+
+
+@wp.struct
+class WideTetrahedra:
+    """The same by groups of sixteen, and room for what all particles of a world have in common."""
+
+    rows: int
+    speed: float
+    height: float
+    tet: wp.array(dtype=lane_int)
+    number: wp.array(dtype=lane)
+    soft: wp.array(dtype=lane_int)
+    colour: wp.array(dtype=int)
+    scalars: wp.array(dtype=lane)
+    notes: wp.array(dtype=lane)
+
+
+@wp.struct
+class SoftSizes:
+    """How many elements of each per-world array belong to one world."""
+
+    soft: int
+    forces: int
+    keys: int
+    grips: int
+    near: int
+
+
+@wp.func
+def view(s: Any, group: int, n: int, size: SoftSizes):
+    """The part of the state that belongs to one world, or to one group of lanes."""
+    t = s
+    t.group = group
+    t.x = window(s.x, group * n, n)
+    t.y = window(s.y, group * n, n)
+    t.z = window(s.z, group * n, n)
+    t.px = window(s.px, group * n, n)
+    t.py = window(s.py, group * n, n)
+    t.pz = window(s.pz, group * n, n)
+    t.vx = window(s.vx, group * n, n)
+    t.vy = window(s.vy, group * n, n)
+    t.vz = window(s.vz, group * n, n)
+    t.w = window(s.w, group * n, n)
+    t.fx = window(s.fx, group * size.forces, size.forces)
+    t.fy = window(s.fy, group * size.forces, size.forces)
+    t.fz = window(s.fz, group * size.forces, size.forces)
+    t.mu = window(s.mu, group * size.soft, size.soft)
+    t.bulk = window(s.bulk, group * size.soft, size.soft)
+    t.scalars = window(s.scalars, group * 7, 7)
+    t.notes = window(s.notes, group * 6, 6)
+    t.box = window(s.box, group * 6, 6)
+    t.grip_x = window(s.grip_x, group * size.keys, size.keys)
+    t.grip_y = window(s.grip_y, group * size.keys, size.keys)
+    t.grip_z = window(s.grip_z, group * size.keys, size.keys)
+    t.grip_weight = window(s.grip_weight, group * 3 * size.grips, 3 * size.grips)
+    t.grip_ghost = window(s.grip_ghost, group * size.grips, size.grips)
+    t.grip_load = window(s.grip_load, group * LOADS * size.grips, LOADS * size.grips)
+    t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
+    t.near = window(s.near, group * size.near, size.near)
+    return t

@@ -1,0 +1,312 @@
+"""A neo-Hookean tetrahedron, elastic: both of its constraints at once, of one element, 16 worlds or 16 elements."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import (  # noqa: F401
+    add,
+    anywhere,
+    choose,
+    fill,
+    fused,
+    lane,
+    largest,
+    least,
+    lessened,
+    most,
+    mul,
+    over,
+    root,
+    sub,
+    times,
+)
+from nuno.solver.soft_state import CRUMPLED, SEEN
+from nuno.solver.vector import at, put, scaled, spread
+
+COLUMNS = 8
+"""Numbers of an element: with B the inverse rest matrix and v the rest volume, v B B^T as 11, 22, 33, 12, 13, 23; then
+1 / (6 v), and the filled fraction."""
+
+SHARE, SHARE_STIFF = wp.constant(0.4), wp.constant(1.0)
+VOLUME_SHARE, VOLUME_STIFF = wp.constant(0.5), wp.constant(0.5)
+"""An element's reply T to its own shear, dt^2 mu v times the sum of w |grad N|^2 over its corners N, counts as
+0.4 T + T^2, the reply Z to its change of volume as Z / 2 + Z^2 / 2. What the rest of the pass does not undo of an
+element's own work is about half of it; and T is the sum over three directions, of which one is nearly all where a
+corner is steep."""
+CARRIED = wp.constant(0.5)
+"""The largest reply to its own shear or change of volume that an element may have; its moduli are cut to that. At the
+default substeps both together are 0.09 in a lattice of voxels. Elements that were let reply at 1.5 or more made
+energy."""
+LOOSE = wp.constant(4.0)
+"""While some element of a world is inside out, the second modulus is at most 4 mu everywhere, which is that of a
+Poisson ratio of 0.375: crumpled bodies with stiffer volumes stay crumpled."""
+STRETCHED = wp.constant(12.0)
+"""The sum of squares of the three stretches from which on an element is handled like one that is inside out: 3 at
+rest, 12 at twice its size."""
+
+
+@wp.func
+def entry(table: wp.array(dtype=float), k: int, column: int, rows: int):
+    """Column ``column`` of element k; with sixteen elements in a vector, of all of them."""
+    return table[column * rows + k]
+
+
+@wp.func
+def entry(table: wp.array(dtype=lane), k: int, column: int, rows: int):
+    return table[k * COLUMNS + column]
+
+
+@wp.func
+def dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
+    """The scalar product."""
+    return fused(az, bz, fused(ay, by, times(ax, bx)))
+
+
+@wp.func
+def cross(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
+    """The vector product."""
+    x = lessened(az, by, times(ay, bz))
+    y = lessened(ax, bz, times(az, bx))
+    z = lessened(ay, bx, times(ax, by))
+    return x, y, z
+
+
+@wp.func
+def add_dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any, c: Any):
+    """The scalar product plus c."""
+    return fused(az, bz, fused(ay, by, fused(ax, bx, c)))
+
+
+@wp.func
+def solve_tetrahedron(
+    t: Any,
+    a: Any,
+    b: Any,
+    c: Any,
+    d: Any,
+    m11: Any,
+    m22: Any,
+    m33: Any,
+    m12: Any,
+    m13: Any,
+    m23: Any,
+    inverse: Any,
+    mu: Any,
+    bulk: Any,
+    limit: float,
+):
+    """Energy v (mu / 2 (|F|^2 - 3) + bulk / 2 (J - 1 - mu / bulk)^2), F the deformation gradient, J its determinant.
+
+    The stable neo-Hookean energy (Smith et al. 2018) in the form of Macklin and Mueller 2021, whose two constraints
+    push against each other at rest, which is what mu / bulk is for. So both are solved at once. With r the gradient of
+    the whole energy by the corners, n that of the volume, and W the inverse masses, the corners
+    move by
+
+        dx = -sigma W (r + h s n),    s = -sigma n W r / (1 + sigma h n W n),    sigma = 1 / (1 + T):
+
+    a Newton step for the volume, while the shear's stiffness stands in as a number T, the element's reply to its own
+    shear. A number and not a matrix, for then forces are a sum of gradients that no motion of the whole changes: the
+    momentum and the angular momentum stay. Replies are counted by the shares above, and limited by `CARRIED`.
+
+    Where |F|^2 is below 1 (a cube at 58 % of its edges) the shear's forces are multiplied by it: else they
+    would hold an element that is at a point there.
+
+    An element that is inside out or stretched beyond `STRETCHED` moves no corner farther than ``limit``, and where its
+    forces work with the corners' motion it moves them without making them faster: it is put right, but gives nobody
+    energy.
+
+    Args:
+        t: The state.
+        a: The element's first vertex.
+        b: Its second.
+        c: Its third.
+        d: Its fourth.
+        m11: Column 0 of the element's numbers (see `COLUMNS`), and so on.
+        m22: Column 1.
+        m33: Column 2.
+        m12: Column 3.
+        m13: Column 4.
+        m23: Column 5.
+        inverse: 1 / (6 v).
+        mu: Shear modulus times dt^2 and the filled fraction.
+        bulk: First Lame parameter plus shear modulus, times the same.
+        limit: The farthest that such an element moves a corner [m].
+    """
+    ax = at(t.x, a)
+    ay = at(t.y, a)
+    az = at(t.z, a)
+    bx = at(t.x, b)
+    by = at(t.y, b)
+    bz = at(t.z, b)
+    cx = at(t.x, c)
+    cy = at(t.y, c)
+    cz = at(t.z, c)
+    dx = at(t.x, d)
+    dy = at(t.y, d)
+    dz = at(t.z, d)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
+    wd = at(t.w, d)
+    ex = bx - ax
+    ey = by - ay
+    ez = bz - az
+    fx = cx - ax
+    fy = cy - ay
+    fz = cz - az
+    gx = dx - ax
+    gy = dy - ay
+    gz = dz - az
+    # the gradient of six times the volume by b, c and d
+    nbx, nby, nbz = cross(fx, fy, fz, gx, gy, gz)
+    ncx, ncy, ncz = cross(gx, gy, gz, ex, ey, ez)
+    ndx, ndy, ndz = cross(ex, ey, ez, fx, fy, fz)
+    one = fill(ax, 1.0)
+    j = scaled(dot(ex, ey, ez, nbx, nby, nbz), inverse)
+    maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
+    reply = fused(wd, spread(wd, m33), fused(wc, spread(wc, m22), fused(wb, spread(wb, m11), scaled(wa, maa))))
+    most_stiff = over(fill(one, CARRIED), reply + fill(one, 1.0e-30))
+    mu = least(mu, most_stiff)
+    bulk = least(bulk, most_stiff)
+    # a crumpled body must rearrange, for which its volume may be too stiff
+    bulk = least(bulk, choose(spread(mu, t.notes[CRUMPLED]), mu * LOOSE, bulk))
+    pressure = (times(bulk, j - one) - mu) * (1.0 / 6.0)
+    k11 = scaled(mu, m11)
+    k22 = scaled(mu, m22)
+    k33 = scaled(mu, m33)
+    k12 = scaled(mu, m12)
+    k13 = scaled(mu, m13)
+    k23 = scaled(mu, m23)
+    kbx, kby, kbz = combine(k11, k12, k13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    kcx, kcy, kcz = combine(k12, k22, k23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    kdx, kdy, kdz = combine(k13, k23, k33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    # |F|^2 mu v = e k: k is the gradient of half of it
+    squares = add_dot(ex, ey, ez, kbx, kby, kbz, add_dot(fx, fy, fz, kcx, kcy, kcz, dot(gx, gy, gz, kdx, kdy, kdz)))
+    stretched = over(scaled(squares, inverse) * 6.0, mu)
+    if anywhere(one - stretched):
+        small = least(stretched, one)
+        kbx = times(kbx, small)
+        kby = times(kby, small)
+        kbz = times(kbz, small)
+        kcx = times(kcx, small)
+        kcy = times(kcy, small)
+        kcz = times(kcz, small)
+        kdx = times(kdx, small)
+        kdy = times(kdy, small)
+        kdz = times(kdz, small)
+    # W n: how the edges go where the corners follow the volume's gradient
+    ux = times(wa, nbx + ncx + ndx)
+    uy = times(wa, nby + ncy + ndy)
+    uz = times(wa, nbz + ncz + ndz)
+    ubx = fused(wb, nbx, ux)
+    uby = fused(wb, nby, uy)
+    ubz = fused(wb, nbz, uz)
+    ucx = fused(wc, ncx, ux)
+    ucy = fused(wc, ncy, uy)
+    ucz = fused(wc, ncz, uz)
+    udx = fused(wd, ndx, ux)
+    udy = fused(wd, ndy, uy)
+    udz = fused(wd, ndz, uz)
+    uk = add_dot(ubx, uby, ubz, kbx, kby, kbz, add_dot(ucx, ucy, ucz, kcx, kcy, kcz, dot(udx, udy, udz, kdx, kdy, kdz)))
+    un = add_dot(ubx, uby, ubz, nbx, nby, nbz, add_dot(ucx, ucy, ucz, ncx, ncy, ncz, dot(udx, udy, udz, ndx, ndy, ndz)))
+    shear = times(mu, reply)
+    sigma = over(one, fused(shear, fused(shear, fill(one, SHARE_STIFF), fill(one, SHARE)), one))
+    h = scaled(bulk, inverse) * (1.0 / 6.0)
+    volume = times(times(sigma, h), un)
+    replied = fused(volume, fused(volume, fill(one, VOLUME_STIFF), fill(one, VOLUME_SHARE)), one)
+    p = lessened(h, over(times(sigma, fused(pressure, un, uk)), replied), pressure)
+    rbx = fused(p, nbx, kbx)
+    rby = fused(p, nby, kby)
+    rbz = fused(p, nbz, kbz)
+    rcx = fused(p, ncx, kcx)
+    rcy = fused(p, ncy, kcy)
+    rcz = fused(p, ncz, kcz)
+    rdx = fused(p, ndx, kdx)
+    rdy = fused(p, ndy, kdy)
+    rdz = fused(p, ndz, kdz)
+    rax = rbx + rcx + rdx
+    ray = rby + rcy + rdy
+    raz = rbz + rcz + rdz
+    ha = times(sigma, wa)
+    hb = times(sigma, wb)
+    hc = times(sigma, wc)
+    hd = times(sigma, wd)
+    bad = most(fill(one, 0.0) - j, stretched - fill(one, STRETCHED))
+    if anywhere(bad):
+        zero = fill(one, 0.0)
+        note_crumpled(t.notes, choose(zero - j, one, zero))
+        far = most(
+            most(
+                times(times(ha, ha), dot(rax, ray, raz, rax, ray, raz)),
+                times(times(hb, hb), dot(rbx, rby, rbz, rbx, rby, rbz)),
+            ),
+            most(
+                times(times(hc, hc), dot(rcx, rcy, rcz, rcx, rcy, rcz)),
+                times(times(hd, hd), dot(rdx, rdy, rdz, rdx, rdy, rdz)),
+            ),
+        )
+        farthest = fill(one, limit)
+        keep = choose(bad, over(farthest, most(root(far), farthest)), one)
+        ha = times(ha, keep)
+        hb = times(hb, keep)
+        hc = times(hc, keep)
+        hd = times(hd, keep)
+        # where the forces work on the corners' motion so far, the substep's start moves along
+        work = (
+            dot(rax, ray, raz, ax - at(t.px, a), ay - at(t.py, a), az - at(t.pz, a))
+            - dot(rbx, rby, rbz, bx - at(t.px, b), by - at(t.py, b), bz - at(t.pz, b))
+            - dot(rcx, rcy, rcz, cx - at(t.px, c), cy - at(t.py, c), cz - at(t.pz, c))
+            - dot(rdx, rdy, rdz, dx - at(t.px, d), dy - at(t.py, d), dz - at(t.pz, d))
+        )
+        idle = choose(bad, choose(work, one, zero), zero)
+        shift_start(t, a, rax, ray, raz, times(ha, idle))
+        shift_start(t, b, rbx, rby, rbz, zero - times(hb, idle))
+        shift_start(t, c, rcx, rcy, rcz, zero - times(hc, idle))
+        shift_start(t, d, rdx, rdy, rdz, zero - times(hd, idle))
+    put(t.x, a, fused(ha, rax, ax))
+    put(t.y, a, fused(ha, ray, ay))
+    put(t.z, a, fused(ha, raz, az))
+    put(t.x, b, lessened(hb, rbx, bx))
+    put(t.y, b, lessened(hb, rby, by))
+    put(t.z, b, lessened(hb, rbz, bz))
+    put(t.x, c, lessened(hc, rcx, cx))
+    put(t.y, c, lessened(hc, rcy, cy))
+    put(t.z, c, lessened(hc, rcz, cz))
+    put(t.x, d, lessened(hd, rdx, dx))
+    put(t.y, d, lessened(hd, rdy, dy))
+    put(t.z, d, lessened(hd, rdz, dz))
+
+
+@wp.func
+def combine(a: Any, b: Any, c: Any, ex: Any, ey: Any, ez: Any, fx: Any, fy: Any, fz: Any, gx: Any, gy: Any, gz: Any):
+    """The three edges' sum with the weights a, b and c."""
+    x = fused(c, gx, fused(b, fx, times(a, ex)))
+    y = fused(c, gy, fused(b, fy, times(a, ey)))
+    z = fused(c, gz, fused(b, fz, times(a, ez)))
+    return x, y, z
+
+
+@wp.func
+def note_crumpled(notes: wp.array(dtype=float), crumpled: float):
+    """Note for the next substep that an element is inside out; all threads that write, write the same."""
+    if crumpled > 0.0:
+        notes[SEEN] = crumpled
+
+
+@wp.func
+def note_crumpled(notes: wp.array(dtype=float), crumpled: lane):
+    notes[SEEN] = wp.max(notes[SEEN], largest(crumpled))
+
+
+@wp.func
+def note_crumpled(notes: wp.array(dtype=lane), crumpled: lane):
+    notes[SEEN] = most(notes[SEEN], crumpled)
+
+
+@wp.func
+def shift_start(t: Any, i: Any, x: Any, y: Any, z: Any, s: Any):
+    """Move where particle i was at the substep's start by s (x, y, z)."""
+    put(t.px, i, at(t.px, i) + times(s, x))
+    put(t.py, i, at(t.py, i) + times(s, y))
+    put(t.pz, i, at(t.pz, i) + times(s, z))

@@ -1,0 +1,121 @@
+"""The launch plans of soft bodies: whichever runs one, the same phases in the same order give the same bits."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.grip import GripSpec
+from nuno.mesh.tetrahedra import box_tetrahedra
+from nuno.scene.colliders import Colliders
+from nuno.scene.soft import SoftTopology
+from nuno.solver.soft_solver import SoftSolver
+from nuno.solver.soft_substeps import soft_substeps
+from nuno.solver.state import LAYERS, MOTION, PULLS, SHAPES, VELOCITIES
+
+BODY = SoftTopology.of(*box_tetrahedra((0.12, 0.1, 0.08), (4, 3, 3)))  # no colour is a multiple of a vector's length
+
+
+def grip(positions, vertices, compliance=0.0):
+    """Vertices that go round."""
+    held = np.tile(vertices, (len(positions), 1))
+    start = positions[np.arange(len(positions))[:, None], held]
+    path = start[:, :, None] + [[0, 0, 0], [0.03, 0.02, 0.05], [0.05, 0.05, -0.02]]
+    return GripSpec(held, None, None, np.array([0.0, 0.1, 0.2]), path, "minimum_jerk", compliance)
+
+
+def solver(plan, worlds=1, different=False):
+    """A block over a ball and a table, held at a corner and by a spring, pushed, moduli by element, and crumpled."""
+    random = np.random.default_rng(1)
+    x = BODY.rest + random.normal(scale=0.01, size=BODY.rest.shape) + [0.0, 0.0, 0.07]
+    positions = np.repeat(x[None], worlds, axis=0)
+    if different:
+        positions[1:] += random.normal(scale=0.005, size=positions[1:].shape)
+    young = np.linspace(2e4, 2e5, BODY.element_count)
+    material = nuno.Soft(density=500.0, youngs_modulus=young, poisson_ratio=0.4, damping=0.003)
+    made = SoftSolver(BODY, material, positions, np.zeros_like(positions), substeps=16, plan=plan)
+    shapes = [nuno.box((1, 1, 0.02), position=(0, 0, -0.01)), nuno.sphere(0.03, position=(0.05, 0, 0.02))]
+    made.set_colliders(Colliders.from_bodies(shapes, worlds, "cpu"))
+    made.set_grips([grip(positions, [0]), grip(positions, [40], 1e-3)])
+    made.set_forces(np.full(positions.shape, 1e-3))
+    return made
+
+
+def outcome(made, seconds=0.25):
+    """Positions and velocities of the first world."""
+    made.run(0.0, seconds)
+    return made.local_positions()[0], made.velocities()[0]
+
+
+def test_scalar_vector_and_lanes_give_the_same_bits():
+    """Promise: one source, three layouts, no bit of difference, alone or beside others; some is inside out."""
+    made = solver("fused")
+    first = made.positions()[0][BODY.tets]
+    assert (np.linalg.det(np.swapaxes(first[:, 1:] - first[:, :1], 1, 2)) < 0).any()
+    expected = outcome(made)
+    np.testing.assert_array_equal(outcome(solver("vector")), expected)
+    for worlds in (3, 18):
+        np.testing.assert_array_equal(outcome(solver("auto", worlds, different=True)), expected)
+
+
+@pytest.mark.parametrize("plan", ["fused", "vector"])
+def test_steps_by_parts_are_the_run(plan):
+    """Promise: who steps the parts of each substep of a frame from outside gets the bits of the run."""
+    whole, parts = solver(plan), solver(plan)
+    whole.run(0.0, 1 / 60)
+    parts.open(0.0, 1 / 60 / 16, 16)
+    for substep in range(16):
+        for part in (MOTION, PULLS | LAYERS, SHAPES, VELOCITIES):
+            parts.step_parts(substep, part)
+    np.testing.assert_array_equal(parts.local_positions(), whole.local_positions())
+    np.testing.assert_array_equal(parts.velocities(), whole.velocities())
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_a_saved_state_goes_on_alike(worlds):
+    """Promise: save, go on, load, go on: the same bits."""
+    made = solver("auto", worlds, different=True)
+    made.run(0.0, 0.1)
+    saved = made.save_state()
+    made.run(0.1, 0.1)
+    expected = made.save_state()
+    made.load_state(saved)
+    made.run(0.1, 0.1)
+    for name, value in made.save_state().items():
+        np.testing.assert_array_equal(value, expected[name], err_msg=name)
+
+
+def test_stiffer_lighter_and_finer_bodies_take_more_substeps():
+    """The rule of ``soft_substeps``: as many as a wave's speed over a cell's height, within bounds."""
+    frame = 1 / 60
+    coarse, fine = (SoftTopology.of(*box_tetrahedra((0.2, 0.2, 0.2), (n, n, n))) for n in (5, 10))
+    assert soft_substeps(fine, frame, 10.0) == pytest.approx(2 * soft_substeps(coarse, frame, 10.0), abs=1)
+    assert soft_substeps(fine, frame, 20.0) == pytest.approx(2 * soft_substeps(fine, frame, 10.0), abs=1)
+    assert (soft_substeps(coarse, frame, 0.01), soft_substeps(fine, frame, 1e4)) == (10, 240)
+
+
+def test_a_topology_says_what_is_wrong():
+    """Promise: named errors for what is no body."""
+    x, tets = box_tetrahedra((1.0, 1.0, 1.0), (1, 1, 1))
+    for vertices, elements, fraction, said in (
+        (x, tets[:0], None, "tetrahedra"),
+        (x, tets + 1, None, "vertices"),
+        (np.concatenate([x, x[:1]]), tets, None, "belong to no"),
+        (x * [1, 1, 0], tets, None, "flat"),
+        (x, tets, np.zeros(len(tets)), "fraction"),
+    ):
+        with pytest.raises(nuno.MeshError, match=said):
+            SoftTopology.of(vertices, elements, fraction)
+
+
+def test_fractions_scale_mass_and_stiffness():
+    """Invariant: a body half filled weighs half, and moves like the whole one."""
+    half = SoftTopology.of(BODY.rest, BODY.tets, np.full(BODY.element_count, 0.5))
+    made = []
+    for body in (BODY, half):
+        x = body.rest[None] * [1.1, 1.0, 0.9]
+        each = SoftSolver(body, nuno.Soft(damping=0.002), x, np.zeros_like(x), gravity=(0, 0, 0))
+        each.run(0.0, 0.1)
+        made.append(each)
+    assert made[1].mass.sum() == pytest.approx(0.5 * made[0].mass.sum())
+    # powers of two: every product is the same but for its exponent
+    np.testing.assert_array_equal(made[0].local_positions(), made[1].local_positions())
