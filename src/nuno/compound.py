@@ -25,8 +25,8 @@ class Compound(Shape):
 
     Attributes:
         parts: (shape, position (3,) [m], quaternion (w, x, y, z)) of each, in the compound's own frame. A plain shape
-            or a pair may stand for those at the origin, unturned. A part that is not convex counts as its hull when the body
-            is dynamic.
+            or a pair may stand for those at the origin, unturned. A part that is not convex counts as its hull when
+            the body is dynamic.
     """
 
     parts: tuple[Part, ...]

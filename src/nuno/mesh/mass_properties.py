@@ -89,8 +89,8 @@ def of_volume(points: np.ndarray, faces: np.ndarray) -> MassProperties:
 def of_shell(points: np.ndarray, faces: np.ndarray, thickness: float) -> MassProperties:
     """Return those of a thin surface: vertices (n, 3) [m], faces (m, 3), ``thickness`` [m].
 
-    Exact for triangles without thickness (second moments of a triangle from its corners and their mean), to which a plate's own
-    thickness adds that of a rod across it, so that a flat one is no degenerate body.
+    Exact for triangles without thickness (second moments of a triangle from its corners and their mean), to which a
+    plate's own thickness adds that of a rod across it, so that a flat one is no degenerate body.
     """
     if thickness <= 0.0:
         raise MeshError(f"an open mesh needs a thickness to have a mass, got {thickness}")

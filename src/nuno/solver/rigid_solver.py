@@ -1,0 +1,527 @@
+"""All rigid bodies of a world, or of a batch of worlds: their arrays on the device, and how they advance."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike
+
+from nuno.contact.manifold import POINTS
+from nuno.contact.rigid_manifolds import COUNTS, LEFT, NOTES, OVERFLOW, Contacts
+from nuno.contact.rigid_pairs import Rules
+from nuno.quaternion import rotate
+from nuno.scene.rigid_shape import RigidPart
+from nuno.solver.rigid_body import RigidState
+from nuno.solver.rigid_frame import RigidSettings, run_rigid
+from nuno.solver.rigid_parts import PartTable
+
+log = logging.getLogger(__name__)
+
+SUBSTEPS = 10
+"""Substeps a frame: at 60 frames a second what rests moves under 1 um, and a sphere's roll is exact to 0.1 %."""
+PASSES = 4
+"""Passes over the velocities: with 2, a stack of ten boxes that stand askew sways by millimetres and goes on swaying;
+with 4
+it comes to rest."""
+ROW = 24
+"""Partners a part has room for at first; a box in a heap has up to 12 within reach."""
+BLOCK_THREADS = 256
+"""Threads of a CUDA block, which runs one world."""
+
+DYNAMIC, MOVED = 1, 2
+PHASES = {"all": 0, "predict": 1, "contacts": 2, "finish": 3}
+
+BODY = dict(
+    position=wp.vec3, rotation=wp.quat, position_before=wp.vec3, rotation_before=wp.quat, position_free=wp.vec3,
+    rotation_free=wp.quat, velocity=wp.vec3, spin=wp.vec3, force=wp.vec3, torque=wp.vec3, inverse_mass=float,
+    inertia=wp.mat33, inverse_inertia=wp.mat33, weight=float, give=wp.mat33,
+)  # fmt: skip
+"""Arrays of `RigidState` with a row for each body of each world."""
+SAVED = ("position", "rotation", "velocity", "spin", "force", "torque")
+ENTRY = dict(
+    partner=int, patch=int, count=int, frame=int, friction=float, bounce=float, normal=wp.vec3, clear=float, margin=float,
+    built_place=wp.vec3, built_turn=wp.quat,
+)  # fmt: skip
+"""Arrays of `Contacts` with a row for each pair, which last."""
+POINT = dict(local_a=wp.vec3, local_b=wp.vec3, force=wp.vec3)
+PASSING = dict(
+    normal_now=(wp.vec3, 1), tangent_now=(wp.vec3, 1), order=(int, 1), waiting=(int, 1), bounds=(int, 1), height=(float, 1),
+    arm_a=(wp.vec3, POINTS), arm_b=(wp.vec3, POINTS), mass=(wp.vec3, POINTS), start=(wp.vec4, POINTS), aim=(float,
+    POINTS),
+)  # fmt: skip
+"""Arrays of `Contacts` that every substep fills."""
+
+
+class RigidSolver:
+    """Rigid bodies that fall, touch, stick, slide, roll and bounce.
+
+    A body has a slot. Static and kinematic bodies have one too, with no mass: they are what others meet. Arrays grow by
+    doubling; a body that comes or goes costs its own rows.
+
+    Args:
+        world_count: Worlds in the batch.
+        device: "cpu" or "cuda:0" ...
+        gravity: (3,) [m/s2].
+        frame_rate: Frames a second.
+        substeps: Substeps a frame; None takes `SUBSTEPS`.
+        origin: (3,) or (worlds, 3) [m], float64: what positions on the device are relative to, for a float's digits are
+            scarce: at 1 m from it a coordinate's step is 0.1 um, at 10 m 1 um.
+
+    Limitations: contact has no compliance; a mesh that moves counts as its convex hull; a hull's face with more than 12
+    corners touches with 12 of them; friction is that of points, so that nothing brakes a spin on one point or a roll.
+    """
+
+    def __init__(
+        self,
+        world_count: int = 1,
+        *,
+        device: str = "cpu",
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        frame_rate: float = 60.0,
+        substeps: int | None = None,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        self.world_count, self.device, self.frame_rate = int(world_count), str(device), float(frame_rate)
+        self.gravity = np.asarray(gravity, dtype=float)
+        self.substeps = int(substeps) if substeps else SUBSTEPS
+        self.passes = PASSES
+        self.origin = np.array(np.broadcast_to(np.asarray(origin, dtype=float), (self.world_count, 3)))
+        self._cuda = self.device.startswith("cuda")
+        self.table = PartTable(self.device, self.world_count)
+        self.state, self.manifolds, self.rules = RigidState(), Contacts(), Rules()
+        self.settings = RigidSettings()
+        self.part_rows: dict[int, list[int]] = {}
+        self._mass: dict[int, np.ndarray] = {}
+        self._loaded: dict[int, Mapping[str, np.ndarray]] = {}
+        self._roles = np.zeros(0, dtype=np.int32)
+        self.state.capacity, self.state.worlds = 0, self.world_count
+        self.manifolds.parts, self.manifolds.row = 0, ROW
+        self._grow_bodies(8)
+        self._grow_rows(self.table.parts.capacity, ROW)
+        self.set_exceptions({})
+        self._dt = 0.0
+
+    # Bodies
+
+    def add(
+        self,
+        parts: Sequence[RigidPart],
+        *,
+        position: ArrayLike,
+        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        mass: ArrayLike | None = None,
+        inertia: ArrayLike | None = None,
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+        friction: ArrayLike = 0.5,
+        restitution: ArrayLike = 0.0,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        group: int = 1,
+        collides_with: int = -1,
+        slot: int | None = None,
+    ) -> int:
+        """Add a body and return its slot.
+
+        Args:
+            parts: What `nuno.scene.rigid_shape.rigid_shape` returns.
+            position: (3,) or (worlds, 3) [m], of the centre of mass; of a body without mass, of its shape.
+            quaternion: (4,) or (worlds, 4), (w, x, y, z), of the shape's frame.
+            mass: One or (worlds,) [kg]; None is a body that contacts do not move.
+            inertia: (3, 3) or (worlds, 3, 3) [kg m2], about the centre of mass, in the shape's axes.
+            centre: (3,) [m], the centre of mass in the shape's frame.
+            friction: Coulomb's coefficient, one or (worlds,).
+            restitution: One or (worlds,); of a pair the larger counts.
+            velocity: (3,) or (worlds, 3) [m/s], of the centre of mass.
+            angular_velocity: (3,) or (worlds, 3) [rad/s], world frame.
+            group: Bits that others' ``collides_with`` is held against.
+            collides_with: Bits of the groups that it touches.
+            slot: A free slot to take; None takes the first.
+        """
+        if slot is None:
+            slot = next((k for k in range(self.state.capacity) if k not in self.part_rows), self.state.capacity)
+        while slot >= self.state.capacity:
+            self._grow_bodies(2 * self.state.capacity)
+        middle = np.asarray(centre, dtype=float)
+        rows = self.table.add(slot, parts, middle)
+        self.part_rows[slot] = rows
+        if self.table.parts.capacity > self.manifolds.parts:
+            self._grow_rows(self.table.parts.capacity, self.manifolds.row)
+        self._forget_rows(rows)
+        self._roles[slot] = DYNAMIC
+        self._put_slot("group", slot, _bits(group))
+        self._put_slot("collides_with", slot, _bits(collides_with))
+        self._put_slot("radius", slot, max(_reach(part, middle) for part in parts))
+        self.set_mass(slot, mass, inertia)
+        for name in ("force", "torque"):
+            self._write(name, slot, np.zeros(3))
+        self.set_pose(slot, position, quaternion)
+        self.set_velocity(slot, velocity, angular_velocity)
+        self.set_surface(slot, friction, restitution)
+        return slot
+
+    def remove(self, slot: int) -> None:
+        """Take a body away; its slot may be given to another."""
+        rows = self.part_rows.pop(slot)
+        self.table.remove(rows)
+        self._forget_rows(rows)
+        self._mass.pop(slot, None)
+        self._loaded.pop(slot, None)
+        self._roles[slot] = 0
+        self._write("inverse_mass", slot, 0.0)
+        self._put_slot("radius", slot, -1.0)
+        self._list_anew()
+
+    def set_mass(self, slot: int, mass: ArrayLike | None, inertia: ArrayLike | None = None) -> None:
+        """Set mass and inertia, see `add`; None makes it a body that contacts do not move."""
+        if mass is None:
+            self._write("inverse_mass", slot, 0.0)
+            self._write("inertia", slot, np.eye(3))
+            self._write("inverse_inertia", slot, np.zeros((3, 3)))
+            self._mass[slot] = np.full(self.world_count, np.inf)
+        else:
+            masses = np.broadcast_to(np.asarray(mass, dtype=float), (self.world_count,))
+            tensor = np.broadcast_to(np.asarray(inertia, dtype=float), (self.world_count, 3, 3))
+            self._write("inverse_mass", slot, 1.0 / masses)
+            self._write("inertia", slot, tensor)
+            self._write("inverse_inertia", slot, np.linalg.inv(tensor))
+            self._mass[slot] = masses.copy()
+        self._list_anew()
+
+    def set_surface(self, slot: int, friction: ArrayLike, restitution: ArrayLike) -> None:
+        """Set friction and restitution, one or (worlds,) each."""
+        for name, value in (("friction", friction), ("bounce", restitution)):
+            self._write_to(getattr(self.rules, name), slot, value)
+        self._list_anew()
+
+    def set_groups(self, slot: int, group: int, collides_with: int) -> None:
+        """Set the masks of `add`."""
+        self._put_slot("group", slot, _bits(group))
+        self._put_slot("collides_with", slot, _bits(collides_with))
+        self._list_anew()
+
+    def set_exceptions(self, pairs: Mapping[tuple[int, int], Any]) -> None:
+        """Set what holds for pairs of slots: a friction coefficient, one or (worlds,), or None: they do not touch."""
+        keyed = sorted(((min(a, b) << 32) | max(a, b), mu) for (a, b), mu in pairs.items())
+        self.rules.exceptions = len(keyed)
+        self.rules.pair = wp.array(np.array([key for key, _ in keyed] or [0], np.int64), device=self.device)
+        values = [np.broadcast_to(-1.0 if mu is None else mu, (self.world_count,)) for _, mu in keyed]
+        table = np.stack(values, axis=1) if keyed else np.zeros((self.world_count, 1))
+        self.rules.pair_friction = wp.array(table.astype(np.float32).ravel(), dtype=float, device=self.device)
+        self._list_anew()
+
+    # State
+
+    def pose(self, slot: int) -> tuple[np.ndarray, np.ndarray]:
+        """Position (worlds, 3) float64 [m] and quaternion (worlds, 4), (w, x, y, z), of a slot."""
+        turn = self._read("rotation", slot).astype(float)
+        return self._read("position", slot) + self.origin, np.roll(turn, 1, axis=-1)
+
+    def velocity(self, slot: int) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity [m/s] of the centre of mass and angular velocity [rad/s], (worlds, 3) each, world frame."""
+        return self._read("velocity", slot).astype(float), self._read("spin", slot).astype(float)
+
+    def set_pose(self, slot: int, position: ArrayLike, quaternion: ArrayLike) -> None:
+        """Put a body where it shall be; what it touched is found anew."""
+        turn = np.asarray(quaternion, dtype=float)
+        turn = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
+        self._write("position", slot, np.asarray(position, dtype=float) - self.origin)
+        self._write("rotation", slot, np.roll(turn, -1, axis=-1))
+
+    def set_velocity(self, slot: int, velocity: ArrayLike, angular_velocity: ArrayLike) -> None:
+        """Set velocities, see `velocity`. A body without mass moves at them in every run that it is a member of."""
+        self._write("velocity", slot, velocity)
+        self._write("spin", slot, angular_velocity)
+        if slot in self._mass and np.isinf(self._mass[slot]).all():
+            moving = np.any(np.asarray(velocity)) or np.any(np.asarray(angular_velocity))
+            self._roles[slot] = MOVED if moving else 0
+
+    def set_forces(self, slot: int, force: ArrayLike, torque: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Set the force [N] at the centre of mass and the torque [N m] that act from now on, (3,) or (worlds, 3)."""
+        self._write("force", slot, force)
+        self._write("torque", slot, torque)
+
+    def set_vertices(self, slot: int, vertices: ArrayLike) -> None:
+        """Move the vertices of a static mesh, (n, 3) or (worlds, n, 3) [m] as at `add`."""
+        self.table.set_vertices(self.part_rows[slot][0], np.asarray(vertices, dtype=float))
+        self._forget_rows(self.part_rows[slot])
+
+    def finite(self, slot: int | None = None) -> np.ndarray:
+        """(worlds,) bool: whether a body, or every body, has a finite state."""
+        slots = list(self.part_rows) if slot is None else [slot]
+        result = np.ones(self.world_count, dtype=bool)
+        for name in SAVED[:4]:
+            for each in slots:
+                result &= np.isfinite(self._read(name, each)).all(axis=-1)
+        return result
+
+    # Time
+
+    def run(
+        self, time: float, duration: float, members: Sequence[int] | None = None, substeps: int | None = None
+    ) -> None:
+        """Advance by ``duration`` [s]: whole frames and a shorter last one.
+
+        Args:
+            time: The time [s] at which it starts; nothing depends on it.
+            duration: How long [s].
+            members: The slots to advance; all others stand where they are, and are untouched.
+            substeps: A frame; None takes the solver's.
+        """
+        each = int(substeps or self.substeps)
+        frame = 1.0 / self.frame_rate
+        frames = math.floor(duration / frame + 1e-6)
+        rest = duration - frames * frame
+        self._choose(members)
+        if frames:
+            self._launch("all", frame / each, frames * each)
+        if rest > 1e-6 * frame:
+            count = max(1, math.ceil(each * rest / frame))
+            self._launch("all", rest / count, count)
+
+    def open(self, time: float, dt: float, members: Sequence[int] | None = None) -> None:
+        """Begin substeps of ``dt`` [s] whose phases are called one by one: predict, contacts, finish."""
+        self._choose(members)
+        self._dt = float(dt)
+
+    def predict(self) -> None:
+        """Look for contacts, and move the members as their forces and those of the last substep say."""
+        self._launch("predict", self._dt, 1)
+
+    def contacts(self) -> None:
+        """One pass over the positions of what touches."""
+        self._launch("contacts", self._dt, 1)
+
+    def finish(self) -> None:
+        """Velocities, with friction and bounces."""
+        self._launch("finish", self._dt, 1)
+
+    def _choose(self, members: Sequence[int] | None) -> None:
+        roles = self._roles if members is None else np.zeros_like(self._roles)
+        if members is not None:
+            roles[list(members)] = self._roles[list(members)]
+        self.state.active.assign(roles)
+
+    def _launch(self, phase: str, dt: float, substeps: int) -> None:
+        self._load_contacts()
+        run = self.settings
+        run.dt, run.gravity, run.passes = dt, wp.vec3(*self.gravity), self.passes
+        run.down = float(np.linalg.norm(self.gravity))
+        threads = BLOCK_THREADS if self._cuda else 1
+        counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
+        counts[:, LEFT] = substeps
+        while True:
+            counts[:, OVERFLOW] = 0
+            self.manifolds.counts.assign(counts.ravel())
+            inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, 0, PHASES[phase], threads]
+            wp.launch(
+                run_rigid, dim=self.world_count * threads, inputs=inputs, device=self.device, block_dim=BLOCK_THREADS
+            )  # fmt: skip
+            counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
+            if not counts[:, OVERFLOW].any():
+                return
+            left = counts[:, LEFT].copy()
+            self._lengthen_rows()
+            counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
+            counts[:, LEFT] = left
+
+    def _lengthen_rows(self) -> None:
+        log.info("a part has more than %d others near by: making room for twice as many", self.manifolds.row)
+        self._grow_rows(self.manifolds.parts, 2 * self.manifolds.row)
+
+    # Contacts
+
+    def contacts_of(self, slot: int, world: int = 0) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        """Return what touches a body: (slot of the other, points (n, 3) [m], normals (n, 3), forces (n, 3) [N]).
+
+        Normals look at the body, forces act on it; both are those of the last substep.
+        """
+        c = self.manifolds
+        counts, partners = self._entries("count")[world], self._entries("partner")[world]
+        forces, local = self._entries("force")[world], self._entries("local_b")[world]
+        shape = (self.world_count, c.parts, c.row)
+        normals, tangents = (getattr(c, name).reshape(shape).numpy()[world] for name in ("normal_now", "tangent_now"))
+        slots = self.table.parts.slot.numpy()
+        found: dict[int, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = {}
+        for p, k in zip(*np.nonzero(counts > 0), strict=True):
+            owner, other = int(slots[p]), int(slots[partners[p, k]])
+            if slot not in (owner, other):
+                continue
+            place, turn = self.pose(other)
+            n, t = normals[p, k].astype(float), tangents[p, k].astype(float)
+            sign = 1.0 if slot == owner else -1.0
+            for m in range(counts[p, k]):
+                f = forces[p, k, m]
+                if f[0] > 0.0:
+                    force = sign * (f[0] * n + f[1] * t + f[2] * np.cross(n, t))
+                    point = place[world] + rotate(turn[world], local[p, k, m].astype(float))
+                    found.setdefault(other if slot == owner else owner, []).append((point, sign * n, force))
+        result = []
+        for other, each in found.items():
+            points, directions, pushes = (np.array(part) for part in zip(*each, strict=True))
+            result.append((other, points, directions, pushes))
+        return result
+
+    def contact_count(self) -> np.ndarray:
+        """(worlds,) int: points at which bodies press on each other."""
+        pressing = (self._entries("force")[..., 0] > 0.0) & self._in_use()
+        return pressing.sum(axis=(1, 2, 3))
+
+    def deepest(self) -> float:
+        """The deepest overlap of any contact when the last substep began [m]."""
+        start = self.manifolds.start.reshape(self._entry_shape("force")).numpy()[..., 0]
+        return float(np.max(-start, where=self._in_use(), initial=0.0))
+
+    def _in_use(self) -> np.ndarray:
+        return np.arange(POINTS) < self._entries("count")[..., None]
+
+    # Saving
+
+    def save_state(self, slot: int) -> dict[str, np.ndarray]:
+        """Return all that a body's next step depends on, (worlds, ...) each: motion, forces, and its contacts."""
+        self._load_contacts()
+        saved = {name: self._read(name, slot).copy() for name in SAVED}
+        rows = self.part_rows[slot]
+        owner = np.full(self.manifolds.parts + 1, -1)
+        which = np.full(self.manifolds.parts + 1, -1)
+        for other, theirs in self.part_rows.items():
+            owner[theirs], which[theirs] = other, np.arange(len(theirs))
+        for name in (*ENTRY, *POINT):
+            saved[f"contact_{name}"] = self._entries(name)[:, rows].copy()
+        partner = saved.pop("contact_partner")
+        saved["partner_slot"], saved["partner_part"] = owner[partner], which[partner]
+        return saved
+
+    def load_state(self, slot: int, state: Mapping[str, np.ndarray]) -> None:
+        """Take back what `save_state` gave, also of one world for all.
+
+        Contacts are taken back before the next step, with those bodies that have the slots that they had; bodies may
+        so be added and loaded one after the other.
+        """
+        for name in SAVED:
+            self._write(name, slot, state[name])
+        self._loaded[slot] = state
+        self._list_anew()
+
+    def _load_contacts(self) -> None:
+        """Write the contacts of loaded states, now that the bodies that they are with may have come too."""
+        loaded, self._loaded = self._loaded, {}
+        for slot, state in loaded.items():
+            rows = self.part_rows[slot]
+            width = state["contact_count"].shape[2]
+            while width > self.manifolds.row:
+                self._lengthen_rows()
+            partner = np.full(state["partner_slot"].shape, -1, dtype=np.int32)
+            for other, theirs in self.part_rows.items():
+                for k, row in enumerate(theirs):
+                    partner[(state["partner_slot"] == other) & (state["partner_part"] == k)] = row
+            for name in (*ENTRY, *POINT):
+                values = partner if name == "partner" else state[f"contact_{name}"]
+                shaped = getattr(self.manifolds, name).reshape(self._entry_shape(name))
+                for k, row in enumerate(rows):
+                    block = np.broadcast_to(values[:, k], (self.world_count, *values.shape[2:]))
+                    shaped[:, row, :width].assign(np.ascontiguousarray(block))
+            count = np.where(partner < 0, 0, state["contact_count"])
+            shaped = self.manifolds.count.reshape(self._entry_shape("count"))
+            for k, row in enumerate(rows):
+                block = np.broadcast_to(count[:, k], (self.world_count, width))
+                shaped[:, row, :width].assign(np.ascontiguousarray(block, dtype=np.int32))
+                if width < self.manifolds.row:
+                    partners = self.manifolds.partner.reshape(self._entry_shape("partner"))
+                    partners[:, row, width:].fill_(-1)
+                    shaped[:, row, width:].fill_(0)
+
+    # Arrays
+
+    def _entry_shape(self, name: str) -> tuple[int, ...]:
+        shape = (self.world_count, self.manifolds.parts, self.manifolds.row)
+        return (*shape, POINTS) if name in POINT else shape
+
+    def _entries(self, name: str) -> np.ndarray:
+        return getattr(self.manifolds, name).reshape(self._entry_shape(name)).numpy()
+
+    def _read(self, name: str, slot: int) -> np.ndarray:
+        array = getattr(self.state, name).reshape((self.world_count, self.state.capacity))
+        return array[:, slot].numpy()
+
+    def _write(self, name: str, slot: int, value: ArrayLike) -> None:
+        self._write_to(getattr(self.state, name), slot, value)
+
+    def _write_to(self, array: wp.array, slot: int, value: ArrayLike) -> None:
+        shape = (self.world_count, *getattr(array.dtype, "_shape_", ()))
+        values = np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float32), shape))
+        array.reshape((self.world_count, self.state.capacity))[:, slot].assign(values)
+
+    def _put_slot(self, name: str, slot: int, value: Any) -> None:
+        getattr(self.rules, name)[slot : slot + 1].assign(np.array([value]))
+
+    def _forget_rows(self, rows: Sequence[int]) -> None:
+        """Drop the pairs in a part's own row, and those of others with it."""
+        partner = self.manifolds.partner
+        table = partner.numpy().reshape(self._entry_shape("partner")).copy()
+        count = self.manifolds.count.numpy().reshape(table.shape).copy()
+        gone = np.isin(table, list(rows))
+        gone[:, list(rows)] = True
+        table[gone], count[gone] = -1, 0
+        partner.assign(table.ravel())
+        self.manifolds.count.assign(count.ravel())
+        self._list_anew()
+
+    def _list_anew(self) -> None:
+        self.manifolds.notes.fill_(-1.0)
+
+    def _grow_bodies(self, capacity: int) -> None:
+        old, worlds = self.state.capacity, self.world_count
+        state, rules, manifolds = self.state, self.rules, self.manifolds
+        kinds: list[tuple[Any, str, Any]] = [(state, name, kind) for name, kind in BODY.items()]
+        kinds += [(rules, "friction", float), (rules, "bounce", float)]
+        kinds += [(manifolds, "listed_position", wp.vec3), (manifolds, "listed_rotation", wp.quat)]
+        kinds += [(manifolds, "winner", wp.uint64)]
+        for owner, name, kind in kinds:
+            wider = wp.zeros((worlds, capacity), dtype=kind, device=self.device)
+            if old:
+                wp.copy(wider[:, :old], getattr(owner, name).reshape((worlds, old)))
+            setattr(owner, name, wider.flatten())
+        for name, kind in (("radius", float), ("group", int), ("collides_with", int)):
+            wider = wp.zeros(capacity, dtype=kind, device=self.device)
+            if name == "radius":
+                wider.fill_(-1.0)
+            if old:
+                wp.copy(wider, getattr(rules, name), count=old)
+            setattr(rules, name, wider)
+        self._roles = np.pad(self._roles, (0, capacity - old))
+        state.active = wp.array(self._roles, dtype=int, device=self.device)
+        state.capacity = capacity
+
+    def _grow_rows(self, parts: int, row: int) -> None:
+        c, worlds = self.manifolds, self.world_count
+        old_parts, old_row = c.parts, c.row
+        for name, kind in (*ENTRY.items(), *POINT.items()):
+            shape: tuple[int, ...] = (worlds, parts, row, POINTS) if name in POINT else (worlds, parts, row)
+            wider = wp.zeros(shape, dtype=kind, device=self.device)
+            if name == "partner":
+                wider.fill_(-1)
+            if old_parts:
+                old = getattr(c, name).reshape((worlds, old_parts, old_row, *shape[3:]))
+                wp.copy(wider[:, :old_parts, :old_row], old)
+            setattr(c, name, wider.flatten())
+        for name, (kind, each) in PASSING.items():
+            setattr(c, name, wp.zeros(worlds * parts * row * each, dtype=kind, device=self.device))
+        c.counts = wp.zeros(worlds * COUNTS, dtype=int, device=self.device)
+        c.notes = wp.full(worlds * NOTES, -1.0, dtype=float, device=self.device)
+        c.parts, c.row = parts, row
+
+
+def _bits(mask: int) -> int:
+    """A mask as the kernels hold it, 32 bits."""
+    return int(np.array(mask & 0xFFFFFFFF, dtype=np.uint32).astype(np.int32))
+
+
+def _reach(part: RigidPart, centre: np.ndarray) -> float:
+    """Radius [m] around the centre of mass that holds a part."""
+    place = (np.zeros(3) if part.position is None else part.position) - centre
+    return float(np.linalg.norm(place) + np.linalg.norm(np.maximum(np.abs(part.low), np.abs(part.high))))
