@@ -136,13 +136,13 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 1 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 2 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=2)
+    variant("newer.npz", format=3)
     variant("strange.npz", world={"type": "Path", "fields": {}})
     variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
     variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))
@@ -237,3 +237,29 @@ def test_wrong_batches_are_refused():
         futures.find("table").locate(np.zeros((3, 3)))
     with pytest.raises(InvalidInputError):
         world.adopt(world, 0)
+
+
+def test_a_compound_in_a_file(tmp_path):
+    """A shape made of others comes back with its parts."""
+    world = nuno.World(device="cpu")
+    cup = nuno.mesh(nuno.box((1, 1, 1)).surface()).shape
+    parts = [(nuno.Box((1, 2, 3)), (0, 0, 1)), (nuno.Sphere(0.5), (1, 0, 0), (0, 1, 0, 0)), cup]
+    world.add(nuno.compound(parts, position=(0, 0, 1)))
+    world.save(tmp_path / "room.npz")
+    other = nuno.World(device="cpu")
+    other.restore(tmp_path / "room.npz")
+    np.testing.assert_array_equal(other.bodies[0].vertices, world.bodies[0].vertices)
+    assert other.bodies[0].shape.parts[:2] == world.bodies[0].shape.parts[:2]
+
+
+def test_a_file_finds_a_mesh_that_was_looked_at(tmp_path):
+    """A mesh whose inside was asked for is the same shape still: its body keeps its identity."""
+    source = nuno.box((1, 1, 1)).surface()
+    world = nuno.World(device="cpu")
+    world.add(nuno.mesh(source, name="block"))
+    world.save(tmp_path / "room.npz")
+    other = nuno.World(device="cpu")
+    block = other.add(nuno.mesh(source, name="block"))
+    assert block.is_solid
+    other.restore(tmp_path / "room.npz")
+    assert other.bodies == (block,)

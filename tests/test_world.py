@@ -285,7 +285,7 @@ BAD = {
     "a stranger": (lambda w, t: w.attach(nuno.sheet((1, 1), cells=(1, 1))), BodyStateError),
     "a number for a body": (lambda w, t: w.attach(3), InvalidInputError),
     "attach twice": (lambda w, t: w.attach(t), BodyStateError),
-    "attach a box": (lambda w, t: w.attach("table"), InvalidInputError),
+    "a box of cloth": (lambda w, t: w.attach("table", Cloth()), InvalidInputError),
     "attach no material": (lambda w, t: w.attach("rag", "denim"), InvalidInputError),
     "a material that does not fit": (
         lambda w, t: w.attach("rag", Cloth(shear_stiffness=[1, 2, 3])),
@@ -302,7 +302,7 @@ BAD = {
         InvalidInputError,
     ),
     "a target of nan": (lambda w, t: w.grip(t, 0, to=(0, np.nan, 0)), InvalidInputError),
-    "a target that is dynamic": (lambda w, t: w.grip(t, 0, to=t), BodyStateError),
+    "a target that is itself": (lambda w, t: w.grip(t, 0, to=t), InvalidInputError),
     "a path for two worlds": (
         lambda w, t: w.grip(t, 0, to=Path([0.0], np.zeros((2, 1, 3)))),
         InvalidInputError,

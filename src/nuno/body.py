@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import uuid
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno import quaternion as quat
 from nuno.coordinates import Coordinates, Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.materials import Cloth
+from nuno.materials import Cloth, Material
+from nuno.path import Path
 from nuno.shape import Shape, Sheet
+from nuno.soft_shape import SoftShape
 from nuno.surface import SurfacePoints, closest_points, sheet_points
 from nuno.validation import finite_array
 
@@ -69,6 +71,7 @@ class Body(Coordinates):
         self._name = name or shape.kind
         self._world: Simulation | None = None
         self._dynamics: Dynamics | None = None
+        self._path: Path | None = None  # that the static body follows, whose pose is always that of the world's time
         # Vertices (worlds, n, 3) of a static body that dynamics have deformed, and the pose they belong to.
         self._deformed: tuple[np.ndarray, Pose] | None = None
         self._friction = _checked_friction(friction)
@@ -91,7 +94,7 @@ class Body(Coordinates):
         return self._shape
 
     @property
-    def material(self) -> Cloth | None:
+    def material(self) -> Material | None:
         """The material of its dynamics, None while it is static."""
         return None if self._dynamics is None else self._dynamics.material
 
@@ -108,7 +111,8 @@ class Body(Coordinates):
     @property
     def thickness(self) -> float:
         """Contact thickness [m] of a cloth, its last material's (in a batch the largest); 0 for solids."""
-        return self._thickness if self._dynamics is None else float(np.max(self._dynamics.material.thickness))
+        material = self.material
+        return float(np.max(material.thickness)) if isinstance(material, Cloth) else self._thickness
 
     @property
     def is_solid(self) -> bool:
@@ -162,13 +166,44 @@ class Body(Coordinates):
         with self._guard():
             return self._vertices(), self._shape.mesh()[1]
 
+    def skin(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the surface that is drawn: vertices (k, 3), in a batch (worlds, k, 3) [m], and faces (m, 3) int32.
+
+        Of a soft body in a lattice, this is the surface that is embedded in it; of any other body, its ``vertices`` and
+        ``faces``.
+        """
+        vertices = self.vertices
+        if not isinstance(self._shape, SoftShape):
+            return vertices, self.faces
+        made = self._shape.tetrahedra()
+        return made.skin_vertices(vertices), made.faces.copy()
+
+    def to_trimesh(self, world: int | None = None) -> Any:
+        """Return the surface as it is now, a ``trimesh.Trimesh`` in the world frame with vertex colours.
+
+        Args:
+            world: Which world of a batch; None for a single world.
+
+        Raises:
+            InvalidInputError: a batch without ``world``, or out of range.
+        """
+        from nuno.export import to_trimesh
+
+        return to_trimesh(self, world)
+
+    def export(self, path: str | os.PathLike[str], world: int | None = None) -> None:
+        """Write the surface as it is now to a .obj, .ply or .glb file; see ``nuno.export_body``."""
+        from nuno.export import export_body
+
+        export_body(path, self, world)
+
     @property
     def velocities(self) -> np.ndarray:
         """(n, 3), in a batch (worlds, n, 3), float64 [m/s]: a copy; zero while the body is static."""
         with self._guard():
             if self._dynamics is None:
                 return np.zeros_like(self.vertices)
-            velocities = self._dynamics.solver.velocities().astype(np.float64)
+            velocities = self._dynamics.velocities(self)
         return velocities if len(velocities) > 1 else velocities[0]
 
     def at(self, u: ArrayLike, v: ArrayLike) -> SurfacePoints:
@@ -219,9 +254,10 @@ class Body(Coordinates):
 
     def _vertices(self) -> np.ndarray:
         """Return (n, 3) or (worlds, n, 3), not to be written to."""
-        if self._dynamics is not None:
-            return self._dynamics.solver.positions().astype(np.float64)
-        pose = self._pose()
+        return self._rigid_vertices(self._pose()) if self._dynamics is None else self._dynamics.vertices(self)
+
+    def _rigid_vertices(self, pose: Pose) -> np.ndarray:
+        """Return (n, 3) or (worlds, n, 3) of the body as it is when static, at a pose."""
         if self._deformed is None:
             return apply(pose, self._shape.mesh()[0])
         vertices, base = self._deformed
@@ -229,11 +265,18 @@ class Body(Coordinates):
             return vertices
         return apply(compose(pose, invert(base)), vertices)
 
+    def local_vertices(self) -> np.ndarray:
+        """Return the vertices of the static body in its own frame, (n, 3) or (worlds, n, 3) [m], read-only."""
+        if self._deformed is None:
+            return self._shape.mesh()[0]
+        vertices, base = self._deformed
+        return apply(invert(base), vertices)
+
     def _pose(self) -> Pose:
         if self._dynamics is None:
             return super()._pose()
         with self._guard():
-            return _centre(self._vertices()), self._quaternion
+            return self._dynamics.pose(self)
 
     def _place(self, position: np.ndarray, quaternion: np.ndarray) -> None:
         with self._guard():
@@ -241,20 +284,18 @@ class Body(Coordinates):
                 self._world._check_worlds("position", position.shape[:-1])
                 self._world._check_worlds("quaternion", quaternion.shape[:-1])
             if self._dynamics is None:
+                self._path = None
                 super()._place(position, quaternion)
                 return
-            # A dynamic body is put elsewhere as a whole: its shape is kept and its velocity turns along.
-            old = self._pose()
-            motion = compose((position, quaternion), invert(old))
-            solver = self._dynamics.solver
-            turned = quat.rotate(motion[1][..., None, :], solver.velocities().astype(np.float64))
-            solver.set_state(apply(motion, self._vertices()), turned.astype(np.float32))
+            self._dynamics.place(self, position, quaternion)
             self._quaternion = quaternion
             self._moved()
 
     def _follow(self, parent: Coordinates) -> None:
         if self._dynamics is not None:
             raise BodyStateError(f"{self._name!r} is dynamic and cannot follow a frame; grip it instead")
+        if self._path is not None:
+            raise BodyStateError(f"{self._name!r} follows a path; end that with world.move(body, None) first")
         with self._guard():
             super()._follow(parent)
 
@@ -263,8 +304,14 @@ class Body(Coordinates):
             self._world._body_changed(self)
         super()._moved()
 
-    def _freeze(self, vertices: np.ndarray) -> None:
-        """Keep the vertices (worlds, n, 3) as the shape of the static body, at its present orientation."""
+    def _freeze(self) -> None:
+        """Become static, in the present place and shape."""
+        assert self._dynamics is not None
+        pose, vertices = self._dynamics.pose(self), None if self._dynamics.is_rigid else self._vertices()
+        self._dynamics = None
+        self._position, self._quaternion = pose
+        if vertices is None:
+            return
         self._position = _centre(vertices)
         self._deformed = (vertices, (self._position, self._quaternion))
 

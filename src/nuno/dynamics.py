@@ -1,18 +1,24 @@
-"""Dynamics: what a body has while it is attached, around the solver that moves it."""
+"""Dynamics: what a body has while it is attached, around the solver that moves it.
+
+`ParticleDynamics` moves cloth and soft bodies, `nuno.rigid_dynamics.RigidDynamics` rigid ones.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nuno import quaternion as quat
+from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip
-from nuno.materials import Cloth
-from nuno.shape import ClothMesh, Shape, Sheet
+from nuno.materials import Cloth, Material, Rigid, Soft
+from nuno.shape import ClothMesh, Plane, Shape, Sheet
+from nuno.soft_shape import SoftShape
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -29,7 +35,7 @@ class Push:
     """A force on a body's vertices.
 
     Attributes:
-        force: (worlds, n, 3) float32 [N].
+        force: (worlds, n, 3) float32 [N]; of a rigid body (worlds, 6): force, and torque [N m], at the centre of mass.
         end: The world's time [s] at which it ends, or None.
     """
 
@@ -38,10 +44,79 @@ class Push:
 
 
 class Dynamics:
-    """One attached body's solver, material, grips and pushes.
+    """What an attached body has, whatever its kind.
+
+    Attributes:
+        material: Its material.
+        friction: The body's coefficient, a number or (worlds,).
+        world_count: Worlds in the batch.
+        grips: What holds it.
+        pushes: What pushes it.
+        substeps: Substeps of a frame.
+    """
+
+    is_rigid: ClassVar[bool] = False
+
+    def __init__(self, material: Material, friction: Any, world: Simulation) -> None:
+        self.material, self.friction, self.world_count = material, friction, world.world_count
+        self.grips: list[Grip] = []
+        self.pushes: list[Push] = []
+        self.grips_changed = False
+        self.collider_version = -1
+
+    substeps: int
+
+    def vertices(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m]."""
+        raise NotImplementedError
+
+    def velocities(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m/s] of the vertices."""
+        raise NotImplementedError
+
+    def pose(self, body: Body) -> Pose:
+        """Return where the body is."""
+        raise NotImplementedError
+
+    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Put the body elsewhere as a whole; velocities turn along."""
+        raise NotImplementedError
+
+    def state(self) -> State:
+        """Return copies of all that the next step depends on."""
+        raise NotImplementedError
+
+    def load_state(self, state: State) -> None:
+        """Set the state that `state` gave."""
+        raise NotImplementedError
+
+    def finite(self) -> np.ndarray:
+        """Return (worlds,) bool, whether all numbers of the state are finite."""
+        raise NotImplementedError
+
+    def release(self) -> None:
+        """Give back what the world holds for the body."""
+
+    def add_push(self, push: Push) -> None:
+        """Add a push; one without an end takes the place of the last such push."""
+        kept = [other for other in self.pushes if push.end is not None or other.end is not None]
+        self.pushes = [*kept, push] if push.force.any() else kept
+
+    def pushing(self, time: float) -> tuple[Push, ...]:
+        """Return the pushes that act from ``time`` [s] on."""
+        return tuple(push for push in self.pushes if push.end is None or push.end > time + SOON)
+
+    def fits(self, material: Material, world_count: int, friction: Any) -> bool:
+        """Return whether this can take a state of the given material, worlds and friction."""
+        same_friction = np.array_equal(friction, self.friction)
+        return same_friction and self.world_count == world_count and self.material.same_as(material)
+
+
+class ParticleDynamics(Dynamics):
+    """An attached cloth's or soft body's solver, material, grips and pushes.
 
     Args:
-        shape: A cloth's shape.
+        shape: Its shape.
         material: Its material.
         positions: (worlds, n, 3) [m].
         velocities: (worlds, n, 3) [m/s].
@@ -55,97 +130,173 @@ class Dynamics:
     def __init__(
         self,
         shape: Shape,
-        material: Cloth,
+        material: Material,
         positions: np.ndarray,
         velocities: np.ndarray,
         friction: Any,
         world: Simulation,
     ) -> None:
         check_material(shape, material, world.world_count)
-        solver_class, topology_class, _ = backend()
-        self.material, self.friction, self.world_count = material, friction, world.world_count
-        self.grips: list[Grip] = []
-        self.pushes: list[Push] = []
-        self.solver = solver_class(
-            _topology(shape, topology_class), material,
-            positions.astype(np.float32), velocities.astype(np.float32),
+        super().__init__(material, friction, world)
+        self.solver = _solver_class(material)(
+            topology_of(shape), material, positions.astype(np.float32), velocities.astype(np.float32),
             device=world.device, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
             friction=friction,
         )  # fmt: skip
         self.solver.set_state(positions, velocities)  # once more, in float64: it may keep an origin of its own
-        self.grips_changed = False
-        self.collider_version = -1
         self._pushing: tuple[Push, ...] = ()
+
+    @property
+    def substeps(self) -> int:  # type: ignore[override]
+        """Substeps of a frame, the solver's own."""
+        return int(self.solver.substeps)
+
+    def vertices(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m]."""
+        return self.solver.positions().astype(np.float64)
+
+    def velocities(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m/s]."""
+        return self.solver.velocities().astype(np.float64)
+
+    def pose(self, body: Body) -> Pose:
+        """Return the mean of the vertices, and the orientation that the body was last given."""
+        centre = self.vertices(body).mean(axis=-2)
+        return centre[0] if len(centre) == 1 else centre, body._quaternion
+
+    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Put the body elsewhere as a whole, in its shape; velocities turn along."""
+        motion = compose((position, quaternion), invert(self.pose(body)))
+        turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
+        self.solver.set_state(apply(motion, self.vertices(body)), turned.astype(np.float32))
 
     def set_self_contact(self, touching: bool) -> None:
         """Let the body touch itself or not, from the next step on."""
-        if touching != self.solver.self_contact:
+        if isinstance(self.material, Cloth) and touching != self.solver.self_contact:
             self.solver.self_contact = touching
             self.solver.load_state(self.solver.save_state())  # which forgets the list of pairs: it is out of date
 
-    def run(self, time: float, duration: float, frame: float) -> None:
-        """Advance from ``time`` by ``duration`` [s], with the grips and pushes of that span."""
-        if self.grips_changed or any(grip.target is not None for grip in self.grips):
-            self.solver.set_grips([grip._spec_for(time, frame) for grip in self.grips])
+    def prepare(self, time: float, frame: float) -> None:
+        """Bring the grips and pushes of a span from ``time`` on; a leading body's last move takes a ``frame`` [s]."""
+        grips = [grip for grip in self.grips if not grip.is_tie]
+        if self.grips_changed or any(grip.target is not None for grip in grips):
+            self.solver.set_grips([grip._spec_for(time, frame) for grip in grips])
             self.grips_changed = False
-        pushing = tuple(push for push in self.pushes if push.end is None or push.end > time + SOON)
+        pushing = self.pushing(time)
         if pushing != self._pushing:
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
             self._pushing = pushing
+
+    def run(self, time: float, duration: float, frame: float) -> None:
+        """Advance from ``time`` by ``duration`` [s], with the grips and pushes of that span."""
+        self.prepare(time, frame)
         self.solver.run(time, duration)
-
-    def add_push(self, push: Push) -> None:
-        """Add a push; one without an end takes the place of the last such push."""
-        kept = [other for other in self.pushes if push.end is not None or other.end is not None]
-        self.pushes = [*kept, push] if push.force.any() else kept
-
-    def fits(self, material: Cloth, world_count: int, friction: Any) -> bool:
-        """Return whether this solver can take a state of the given material, worlds and friction."""
-        same_friction = np.array_equal(friction, self.friction)
-        return same_friction and self.world_count == world_count and self.material.same_as(material)
 
     def state(self) -> State:
         """Return copies of all that the next step depends on."""
         return self.solver.save_state()
+
+    def load_state(self, state: State) -> None:
+        """Set the state that `state` gave."""
+        self.solver.load_state(state)
+
+    def finite(self) -> np.ndarray:
+        """Return (worlds,) bool, whether all positions and velocities are finite."""
+        return self.solver.finite()
+
+
+def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> Dynamics:
+    """Return dynamics for a body, in a state that dynamics of its kind gave.
+
+    Raises:
+        InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
+    """
+    if isinstance(material, Rigid):
+        from nuno.rigid_dynamics import RigidDynamics
+
+        return RigidDynamics(body, material, friction, world, state)
+    positions = state["local"].astype(np.float64) + state["origin"][:, None]
+    made = ParticleDynamics(body.shape, material, positions, state["velocities"], friction, world)
+    made.load_state(state)
+    return made
+
+
+def start_dynamics(body: Body, material: Any, world: Simulation) -> Dynamics:
+    """Return dynamics for a static body in the shape that it has now, at rest.
+
+    Raises:
+        InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
+    """
+    if isinstance(material, Rigid):
+        from nuno.rigid_dynamics import RigidDynamics
+
+        return RigidDynamics(body, material, material.friction, world)
+    vertices = body._vertices()
+    positions = np.broadcast_to(vertices, (world.world_count, *vertices.shape[-2:]))
+    return ParticleDynamics(body.shape, material, positions, np.zeros_like(positions), material.friction, world)
+
+
+def default_material(body: Body) -> Material:
+    """Return the material that a body gets when none is named: its kind's, with the body's friction."""
+    if body.shape.is_cloth:
+        return Cloth(friction=body.friction)
+    if body.shape.is_soft:
+        return Soft(friction=body.friction)
+    return Rigid(friction=body.friction)
 
 
 def check_material(shape: Shape, material: Any, world_count: int) -> None:
     """Check that a shape can have a material.
 
     Raises:
-        InvalidInputError: the shape has no dynamics, it is no material, or it fits neither shape nor batch.
+        InvalidInputError: the shape has no such dynamics, it is no material, or it fits neither shape nor batch.
     """
-    if not shape.is_cloth:
-        raise InvalidInputError(
-            f"no material makes a {shape.kind} dynamic in this version; shapes that can be attached: sheet, cloth_mesh"
-        )
-    if not isinstance(material, Cloth):
-        raise InvalidInputError(f"a {shape.kind} needs a Cloth material, got {type(material).__name__}")
-    material.resolved(world_count, element_count(shape))
+    valid = "Cloth or Rigid" if shape.is_cloth else "Soft or Rigid" if shape.is_soft else "Rigid"
+    if isinstance(shape, Plane):
+        raise InvalidInputError("a plane is endless and cannot be dynamic; take a box")
+    kinds = (Rigid, Cloth) if shape.is_cloth else (Rigid, Soft) if shape.is_soft else (Rigid,)
+    if not isinstance(material, kinds):
+        raise InvalidInputError(f"a {shape.kind} needs a {valid} material, got {type(material).__name__}")
+    material.resolved(world_count, 1 if isinstance(material, Rigid) else element_count(shape))
 
 
-def make_push(shape: Shape, force: ArrayLike, duration: float | None, world: Simulation) -> Push:
+def make_push(body: Body, force: ArrayLike, torque: Any, duration: float | None, world: Simulation) -> Push:
     """Return a push from now on; see ``World.push``.
 
     Raises:
-        InvalidInputError: a force that is not finite or of another shape, or a duration that is not positive.
+        InvalidInputError: a force or torque that is not finite or of another shape, a torque on a body that is not
+            rigid, or a duration that is not positive.
     """
-    share, worlds = vertex_areas(shape), world.world_count
+    worlds = world.world_count
+    end = None if duration is None else world.time + number("duration", duration, above=0.0)
+    if body._dynamics is not None and body._dynamics.is_rigid:
+        pair = [
+            np.broadcast_to(finite_array(name, value, (3,), (worlds, 3)), (worlds, 3))
+            for name, value in (("force", force), ("torque", np.zeros(3) if torque is None else torque))
+        ]
+        return Push(np.concatenate(pair, axis=1).astype(np.float32), end)
+    if torque is not None:
+        raise InvalidInputError(f"a torque turns rigid bodies only; {body.name!r} deforms: push its vertices")
+    share = vertex_shares(body.shape)
     n = len(share)
     given = finite_array("force", force, (3,), (n, 3), (worlds, 3), (worlds, n, 3))
     if given.shape in ((3,), (worlds, 3)) and given.shape != (n, 3):
         given = given[..., None, :] * (share / share.sum())[:, None]
-    end = None if duration is None else world.time + number("duration", duration, above=0.0)
     return Push(np.array(np.broadcast_to(given, (worlds, n, 3)), dtype=np.float32), end)
 
 
 def element_count(shape: Shape) -> int:
-    """Return how many elements a material may tell apart: a sheet's cells, a cloth mesh's faces."""
-    return shape.cells[0] * shape.cells[1] if isinstance(shape, Sheet) else len(shape.mesh()[1])
+    """Return how many elements a material may tell apart: cells, faces of a cloth mesh, or tetrahedra."""
+    if isinstance(shape, Sheet):
+        return shape.cells[0] * shape.cells[1]
+    return len(shape.tetrahedra().tets) if isinstance(shape, SoftShape) else len(shape.mesh()[1])
 
 
-def vertex_areas(shape: Shape) -> np.ndarray:
-    """Return (n,) float [m2], a third of the area at rest of the faces around each vertex."""
+def vertex_shares(shape: Shape) -> np.ndarray:
+    """Return (n,) float, the area at rest around each vertex of a cloth [m2], or the volume of a soft body's [m3]."""
+    if shape.is_soft:
+        topology = topology_of(shape)
+        return np.asarray(topology.masses(np.ones((1, 1))))[0]
     vertices, faces = shape.mesh()
     if isinstance(shape, ClothMesh) and shape.rest is not None:
         vertices = np.pad(shape.rest, ((0, 0), (0, 3 - shape.rest.shape[1])))
@@ -155,7 +306,7 @@ def vertex_areas(shape: Shape) -> np.ndarray:
 
 
 def backend() -> tuple[Any, Any, Any]:
-    """Return the classes of the solver, of its topology and of its colliders; imported on first use."""
+    """Return the classes of the cloth solver, of its topology and of static shapes' tables; imported on first use."""
     from nuno.scene.cloth import ClothTopology
     from nuno.scene.colliders import Colliders
     from nuno.solver.cloth_solver import ClothSolver
@@ -168,8 +319,29 @@ def make_colliders(bodies: list[Body], pair_friction: dict[str, Any], world: Sim
     return backend()[2].from_bodies(bodies, world.world_count, world.device, pair_friction=pair_friction)
 
 
+def _solver_class(material: Material) -> Any:
+    if isinstance(material, Soft):
+        from nuno.solver.soft_solver import SoftSolver
+
+        return SoftSolver
+    return backend()[0]
+
+
+def topology_of(shape: Shape) -> Any:
+    """Return the elements of a cloth's or soft body's shape, made once."""
+    return _soft_topology(shape) if isinstance(shape, SoftShape) else _cloth_topology(shape, backend()[1])
+
+
 @lru_cache(maxsize=64)
-def _topology(shape: Shape, topology_class: Any) -> Any:
+def _soft_topology(shape: SoftShape) -> Any:
+    from nuno.scene.soft import SoftTopology
+
+    made = shape.tetrahedra()
+    return SoftTopology.of(made.vertices, made.tets, made.fraction)
+
+
+@lru_cache(maxsize=64)
+def _cloth_topology(shape: Shape, topology_class: Any) -> Any:
     if isinstance(shape, Sheet):
         return topology_class.sheet(shape.cells, shape.size)
     assert isinstance(shape, ClothMesh)

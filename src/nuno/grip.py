@@ -10,9 +10,10 @@ import numpy as np
 
 from nuno import quaternion as quat
 from nuno.coordinates import apply, invert
-from nuno.errors import InvalidInputError
+from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import SurfacePoints
+from nuno.tie import HoldSpec, TieSpec, make_hold, make_tie
 from nuno.validation import finite_array, index_array
 
 if TYPE_CHECKING:
@@ -44,21 +45,26 @@ class GripSpec:
 
 
 class Grip:
-    """A hold on a body's points, made by ``World.grip``.
+    """A hold on a body's points or on a rigid body, made by ``World.grip``, or a weld of two bodies.
 
     Attributes:
         key: The same for the copies of the grip in imagined worlds and in files.
         body: The body that is held.
-        target: The body that leads it, or None.
+        target: The body that leads it or that it is tied to, or None.
     """
 
     def __init__(
-        self, body: Body, spec: GripSpec, target: Body | None = None, offsets: np.ndarray | None = None
+        self,
+        body: Body,
+        spec: GripSpec | TieSpec | HoldSpec,
+        target: Body | None = None,
+        offsets: Any = None,
     ) -> None:
         self.key = uuid.uuid4().hex
         self.body, self.target = body, target
-        self._spec = spec
-        self._offsets = offsets  # (worlds, k, 3) [m], in the target's frame
+        self._spec: Any = spec
+        # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
+        self._offsets = offsets
         self._world: Simulation | None = None
 
     def __repr__(self) -> str:
@@ -72,7 +78,30 @@ class Grip:
     @property
     def compliance(self) -> float:
         """[m/N]; 0 is stiff."""
-        return self._spec.compliance
+        return float(self._spec.compliance)
+
+    @property
+    def is_tie(self) -> bool:
+        """Whether it joins bodies that move, or holds a rigid body: it is then solved with their contacts."""
+        return not isinstance(self._spec, GripSpec)
+
+    @property
+    def wrench(self) -> tuple[np.ndarray, np.ndarray]:
+        """The force [N] and the torque [N m] that the grip bears: what the body does to whatever holds it.
+
+        (3,) each, in a batch (worlds, 3); the torque is about the mean of the held points, or the origin of the held
+        rigid body. A held towel at rest gives its weight, downwards. Of a weld, what ``body`` does to the other. The
+        mean over the last frame; zero before the first.
+
+        Raises:
+            BodyStateError: the grip was released.
+        """
+        world = self._world
+        if world is None:
+            raise BodyStateError(f"the grip on {self.body.name!r} was released and bears nothing")
+        with world.lock:
+            force, torque = world._wrench(self)
+        return (force[0], torque[0]) if world.world_count == 1 else (force, torque)
 
     def release(self) -> None:
         """Let go. Nothing happens where the grip was released before, or the body detached or removed."""
@@ -86,8 +115,22 @@ class Grip:
         """Return the keys for a run from ``time`` on; a leading body's last move takes one ``frame`` [s]."""
         if self.target is None or self._offsets is None:
             return self._spec
-        now = np.broadcast_to(apply(self.target._pose(), self._offsets), self._offsets.shape)
+        schedule = None if self._world is None else self._world._schedule
         last = self._spec.positions[:, :, -1]
+        if schedule is not None and self.target.key in schedule.poses:
+            way = apply(schedule.poses[self.target.key], self._offsets[:, None])
+            way = np.broadcast_to(way, (len(self._offsets), len(schedule.times), *self._offsets.shape[1:]))
+            way = np.moveaxis(way, 1, 2).copy()
+            way[:, :, 0] = last
+            # two frames of where it led before, which tell how what it holds accelerates
+            kept = (self._spec.times < time - 0.1 * frame) & (self._spec.times > time - 2.1 * frame)
+            keys = {
+                "times": np.append(self._spec.times[kept], schedule.times),
+                "positions": np.concatenate([self._spec.positions[:, :, kept], way], axis=2),
+            }
+            self._spec = GripSpec(**{**self._spec.__dict__, **keys})
+            return self._spec
+        now = np.broadcast_to(apply(self.target._pose(), self._offsets), self._offsets.shape)
         keys = {"times": np.array([time]), "positions": now[:, :, None].copy()}
         if not np.array_equal(last, now):
             keys = {"times": np.array([time, time + frame]), "positions": np.stack([last, now], axis=2)}
@@ -96,14 +139,28 @@ class Grip:
         return self._spec
 
 
-def make_grip(body: Body, where: Any, to: Any, compliance: float, target: Body | None, world: Simulation) -> Grip:
+def make_grip(
+    body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation
+) -> Grip:
     """Return a grip on ``body``, not yet active; see ``World.grip``.
 
     Raises:
         InvalidInputError: points or a target that cannot be used.
     """
     worlds = world.world_count
-    vertices, corners, weights = _points(body, where, worlds)
+    assert body._dynamics is not None
+    if body._dynamics.is_rigid:
+        if where is not None:
+            raise InvalidInputError(f"{body.name!r} is rigid and is gripped as a whole: where must be None")
+        hold, local_pose = make_hold(body, to, target, free, compliance, world)
+        return Grip(body, hold, target, local_pose)
+    if free is not None:
+        raise InvalidInputError("free is for rigid bodies only")
+    if where is None:
+        raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
+    if target is not None and target._dynamics is not None:
+        return Grip(body, make_tie(body, where, target, compliance, world), target)
+    vertices, corners, weights = points_of(body, where, worlds)
     positions = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
     rows = np.arange(worlds)[:, None]
     if vertices is not None:
@@ -133,7 +190,8 @@ def make_grip(body: Body, where: Any, to: Any, compliance: float, target: Body |
     return Grip(body, spec, target, local)
 
 
-def _points(body: Body, where: Any, worlds: int) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+def points_of(body: Body, where: Any, worlds: int) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Return vertices (worlds, k), or corners and barycentric coordinates (worlds, k, 3) each, of points of a body."""
     vertex_count, faces = body.vertices.shape[-2], body.faces
     if not isinstance(where, SurfacePoints):
         indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)

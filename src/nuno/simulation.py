@@ -18,13 +18,17 @@ from nuno.background import FrameLock
 from nuno.body import Body
 from nuno.contact_rules import ContactRules
 from nuno.device import checked_device, found_device
-from nuno.dynamics import SOON, Dynamics, make_colliders
+from nuno.dynamics import SOON, Dynamics, ParticleDynamics, make_colliders, make_dynamics
 from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
 from nuno.grip import Grip
+from nuno.motion import Schedule, arrive, is_led, make_schedule
+from nuno.stepping import Stepping
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.background import Background
+    from nuno.materials import Material
+    from nuno.rigid_dynamics import RigidScene
 
 CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
 
@@ -51,7 +55,11 @@ class Simulation:
         self._rules = ContactRules()
         self._colliders: dict[Any, Any] = {}
         self._collider_version = 0
+        self._led: list[Body] | None = None  # bodies that follow a path or a body that does; None: to be found anew
+        self._schedule: Schedule | None = None
         self._background: Background | None = None
+        self._rigid: RigidScene | None = None
+        self._stepping = Stepping(self)
 
     def __repr__(self) -> str:
         batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
@@ -119,11 +127,12 @@ class Simulation:
 
     def _detach(self, body: Body) -> None:
         assert body._dynamics is not None
-        vertices = body._vertices()
-        for grip in list(body._dynamics.grips):
+        tied = [grip for other in self._attached() for grip in other.grips if grip.is_tie and grip.target is body]
+        for grip in [*body._dynamics.grips, *tied]:
             self._drop_grip(grip)
-        body._thickness, body._dynamics = body.thickness, None
-        body._freeze(vertices)
+        dynamics, body._thickness = body._dynamics, body.thickness
+        body._freeze()
+        dynamics.release()
         self._colliders_changed()
 
     def _hold(self, grip: Grip) -> None:
@@ -143,24 +152,31 @@ class Simulation:
     def _colliders_changed(self) -> None:
         self._collider_version += 1
         self._colliders.clear()
+        self._led = None
 
     def _body_changed(self, body: Body) -> None:
         """Be told that a body was moved, or its friction or groups changed."""
         dynamics = body._dynamics
         if dynamics is not None and not np.array_equal(dynamics.friction, body.friction):
-            # A solver takes its friction when it is made.
-            positions, velocities = dynamics.solver.positions(), dynamics.solver.velocities()
-            renewed = Dynamics(body.shape, dynamics.material, positions, velocities, body.friction, self)
-            renewed.solver.load_state(dynamics.state())
-            renewed.grips, renewed.pushes, renewed.grips_changed = dynamics.grips, dynamics.pushes, True
-            body._dynamics = renewed
+            self._renew(body, dynamics.material)  # a solver takes its friction when it is made
         self._colliders_changed()
+
+    def _renew(self, body: Body, material: Material) -> None:
+        """Give a dynamic body a solver for another material or friction, in the state that it is in."""
+        dynamics = body._dynamics
+        assert dynamics is not None
+        state = dynamics.state()
+        renewed = make_dynamics(body, material, state, body.friction, self)
+        dynamics.release()
+        renewed.grips, renewed.pushes, renewed.grips_changed = dynamics.grips, dynamics.pushes, True
+        body._dynamics = renewed
+        renewed.load_state(state)
 
     def _bring_colliders(self) -> None:
         static: list[Body] | None = None
         for body in self._bodies.values():
             dynamics = body._dynamics
-            if dynamics is None or dynamics.collider_version == self._collider_version:
+            if not isinstance(dynamics, ParticleDynamics) or dynamics.collider_version == self._collider_version:
                 continue
             if static is None:
                 static = [b for b in self._bodies.values() if b._dynamics is None]
@@ -174,32 +190,68 @@ class Simulation:
             dynamics.solver.set_colliders(self._colliders[key])
             dynamics.collider_version = self._collider_version
 
+    def _bring_rigid(self) -> None:
+        if self._rigid is not None:
+            self._rigid.bring(self)
+
+    def _rigid_scene(self, origin: np.ndarray) -> RigidScene:
+        """Return what moves the rigid bodies, made anew where the world has become another."""
+        from nuno.rigid_dynamics import RigidScene
+
+        settings = (self.world_count, self.device, self.gravity, self.frame_rate, self.substeps)
+        if self._rigid is None or self._rigid.settings != settings:
+            self._rigid = RigidScene(self, origin)
+        return self._rigid
+
+    def _wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+        """Return force [N] and torque [N m], (worlds, 3) each, that an active grip bears."""
+        return self._stepping.wrench(grip)
+
+    def _led_bodies(self) -> list[Body]:
+        if self._led is None:
+            self._led = [b for b in self._bodies.values() if b._dynamics is None and is_led(b)]
+        return self._led
+
+    def _schedule_led(self, start: float, duration: float) -> None:
+        """Tell colliders and grips where the led bodies are in the run from ``start`` on."""
+        self._schedule = None
+        if led := self._led_bodies():
+            self._schedule = make_schedule(led, start, duration, 1.0 / self.frame_rate)
+            for colliders in self._colliders.values():
+                colliders.follow(self._schedule)
+
     def _advance(self, duration: float, end: float | None = None) -> None:
         """Advance everything, or leave the world as it was and raise."""
         start = self._time
         finish = start + duration if end is None else end
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
-        saved = [(dynamics, dynamics.state()) for dynamics in moving.values()]
+        saved = [(d, d.state()) for d in moving.values() if isinstance(d, ParticleDynamics)]
+        rigid = None if self._rigid is None else self._rigid.save()
         self._bring_colliders()
         try:
             ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
             stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
             now = start
             for body, dynamics in moving.items():
-                dynamics.set_self_contact(self._rules.touches_itself(body))
+                if isinstance(dynamics, ParticleDynamics):
+                    dynamics.set_self_contact(self._rules.touches_itself(body))
             for stop in stops:
-                for dynamics in moving.values():
-                    dynamics.run(now, stop - now, 1.0 / self.frame_rate)
+                if moving:
+                    self._schedule_led(now, stop - now)
+                self._stepping.run(now, stop)
                 now = stop
             for body, dynamics in moving.items():
-                if not np.all(dynamics.solver.finite()):
+                if not np.all(dynamics.finite()):
                     raise SimulationDiverged(body.name, start)
         except BaseException:
-            for dynamics, state in saved:
-                dynamics.solver.load_state(state)
+            for own, state in saved:
+                own.load_state(state)
+            if self._rigid is not None and rigid is not None:
+                self._rigid.load(rigid)
             raise
         for body, dynamics in moving.items():
             dynamics.pushes = [p for p in dynamics.pushes if p.end is None or p.end > finish + SOON]
             if body._children:
                 self._colliders_changed()  # what follows the body has moved along
+        arrive(self._led_bodies(), finish)
         self._time = finish

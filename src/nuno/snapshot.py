@@ -13,10 +13,12 @@ import numpy as np
 
 from nuno.body import Body
 from nuno.coordinates import compose, invert
-from nuno.dynamics import Dynamics, Push, State
+from nuno.dynamics import Dynamics, Push, State, make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip, GripSpec
-from nuno.materials import Cloth
+from nuno.materials import Material
+from nuno.motion import of_world
+from nuno.path import Path
 from nuno.shape import Shape
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 class DynamicsRecord:
     """The dynamics of one body; the arrays of the solver's state are (worlds, ...) each."""
 
-    material: Cloth
+    material: Material
     friction: Any
     state: State
     pushes: tuple[Push, ...]
@@ -52,6 +54,7 @@ class BodyRecord:
     deformed_position: np.ndarray | None
     deformed_quaternion: np.ndarray | None
     dynamics: DynamicsRecord | None
+    path: Path | None = None  # that the body follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,7 @@ class Snapshot:
         def repeated(array: Any) -> Any:
             return None if array is None else np.repeat(array, world_count, axis=0)
 
-        return self._mapped(repeated, lambda value, _: value, lambda material: material, world_count)
+        return self._mapped(repeated, lambda value, _: value, lambda material: material, lambda path: path, world_count)
 
     def pick(self, world: int) -> Snapshot:
         """Return one world of a batch."""
@@ -100,10 +103,13 @@ class Snapshot:
         def chosen(value: Any, axes: int) -> Any:
             return value[world] if value is not None and np.ndim(value) > axes else value
 
-        return self._mapped(one, chosen, lambda material: material.of_world(world, self.world_count), 1)
+        def of_one(path: Path | None) -> Path | None:
+            return None if path is None else of_world(path, world)
 
-    def _mapped(self, batched: Any, single: Any, material: Any, world_count: int) -> Snapshot:
-        """Map arrays that have a world axis, values that may (beside ``axes`` others), and materials."""
+        return self._mapped(one, chosen, lambda material: material.of_world(world, self.world_count), of_one, 1)
+
+    def _mapped(self, batched: Any, single: Any, material: Any, path: Any, world_count: int) -> Snapshot:
+        """Map arrays that have a world axis, values that may (beside ``axes`` others), materials and paths."""
         bodies = []
         for body in self.bodies:
             dynamics = body.dynamics
@@ -117,7 +123,7 @@ class Snapshot:
                 body, friction=_plain(single(body.friction, 0)), thickness=_plain(single(body.thickness, 0)),
                 position=single(body.position, 1), quaternion=single(body.quaternion, 1),
                 deformed=batched(body.deformed), deformed_position=single(body.deformed_position, 1),
-                deformed_quaternion=single(body.deformed_quaternion, 1), dynamics=dynamics,
+                deformed_quaternion=single(body.deformed_quaternion, 1), dynamics=dynamics, path=path(body.path),
             ))  # fmt: skip
         grips = [
             replace(grip, offsets=batched(grip.offsets), spec=replace(
@@ -157,13 +163,13 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     world.world_count = snapshot.world_count
     try:
         made = {
-            record.key: _dynamics_for(record.dynamics, bodies[record.key], world, same_settings)
+            record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings)
             for record in snapshot.bodies if record.dynamics is not None
         }  # fmt: skip
     except BaseException:
         world.gravity, world.frame_rate, world.substeps, world.world_count = before
         raise
-    _take_apart(world)
+    _take_apart(world, list(made.values()))
     world._time = snapshot.time
     for record in snapshot.bodies:
         _fill(bodies[record.key], record)
@@ -174,10 +180,13 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
             body._parent = bodies[record.parent]
             body._parent._children.append(body)
         if record.dynamics is not None:
-            dynamics = made[record.key]
-            dynamics.solver.load_state(record.dynamics.state)
-            dynamics.pushes = list(record.dynamics.pushes)
-            body._dynamics = dynamics
+            body._dynamics = made[record.key]
+            body._dynamics.pushes = list(record.dynamics.pushes)
+    world._colliders_changed()
+    world._bring_rigid()
+    for record in snapshot.bodies:
+        if record.dynamics is not None:
+            made[record.key].load_state(record.dynamics.state)
     for grip in snapshot.grips:
         _restore_grip(grip, bodies, world)
     world._rules.friction = {frozenset((a, b)): mu for a, b, mu in snapshot.pair_friction}
@@ -199,7 +208,7 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
         key=body.key, name=body.name, shape=body.shape, color=body.color, friction=body.friction,
         thickness=body.thickness, group=body.group, collides_with=body.collides_with, position=pose[0],
         quaternion=pose[1], parent=None if parent is None else parent.key, deformed=deformed,
-        deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics,
+        deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics, path=body._path,
     )  # fmt: skip
 
 
@@ -238,15 +247,18 @@ def same_shape(a: Shape, b: Shape) -> bool:
     )
 
 
-def _dynamics_for(record: DynamicsRecord, body: Body, world: Simulation, same_settings: bool) -> Dynamics:
+def _dynamics_for(
+    record: BodyRecord, own: DynamicsRecord, body: Body, world: Simulation, same_settings: bool
+) -> Dynamics:
     current = body._dynamics
-    if current is not None and same_settings and current.fits(record.material, world.world_count, record.friction):
+    if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
         return current
-    positions = record.state["local"].astype(np.float64) + record.state["origin"][:, None]
-    return Dynamics(body.shape, record.material, positions, record.state["velocities"], record.friction, world)
+    as_recorded = Body(record.shape)
+    _fill(as_recorded, record)
+    return make_dynamics(as_recorded, own.material, own.state, own.friction, world)
 
 
-def _take_apart(world: Simulation) -> None:
+def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:
     for body in list(world._bodies.values()):
         if body._dynamics is not None:
             for grip in body._dynamics.grips:
@@ -257,8 +269,9 @@ def _take_apart(world: Simulation) -> None:
             parent = body._parent
             parent._children = [child for child in parent._children if child is not body]
             body._parent = None
-        body._dynamics = None
-        body._world = None
+        if body._dynamics is not None and body._dynamics not in kept:
+            body._dynamics.release()
+        body._dynamics = body._path = body._world = None
     world._bodies.clear()
 
 
@@ -273,6 +286,7 @@ def _fill(body: Body, record: BodyRecord) -> None:
     body._name, body._shape, body.color = record.name, record.shape, record.color
     body._friction, body._thickness = record.friction, record.thickness
     body._group, body._collides_with = record.group, record.collides_with
+    body._path = record.path
     body._deformed = None
     if record.deformed is not None:
         assert record.deformed_position is not None and record.deformed_quaternion is not None

@@ -12,27 +12,32 @@ import json
 import os
 import zipfile
 from dataclasses import fields, is_dataclass, replace
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
 from nuno import shape as shapes
+from nuno import soft_shape
+from nuno.compound import Compound
 from nuno.dynamics import Push
 from nuno.errors import FileFormatError, NunoError
 from nuno.grip import GripSpec
 from nuno.materials import Cloth, Rigid, Soft
+from nuno.path import Path
 from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+from nuno.whole_file import replacing
 
-FORMAT = 1
+FORMAT = 2
+READABLE = (1, 2)  # 1 has no paths of bodies
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
 SHAPES = (
     shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule, shapes.Plane, shapes.Sheet,
-    shapes.TriangleMesh, shapes.ClothMesh,
+    shapes.TriangleMesh, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
+    soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
 )  # fmt: skip
 TYPES: dict[str, Any] = {
     kind.__name__: kind
-    for kind in (*SHAPES, Cloth, Soft, Rigid, GripSpec, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
+    for kind in (*SHAPES, Cloth, Soft, Rigid, GripSpec, Path, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
 }
 
 
@@ -45,14 +50,8 @@ def write_snapshot(snapshot: Snapshot, path: str | os.PathLike[str]) -> None:
         "meshes": {body.key: mesh_hash(body.shape) for body in snapshot.bodies},
         "world": _encoded(snapshot, arrays),
     }
-    goal = FilePath(path)
-    partial = goal.with_name(f".{goal.name}.{os.getpid()}.partial")
-    try:
-        with open(partial, "wb") as stream:
-            np.savez(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
-        os.replace(partial, goal)
-    finally:
-        partial.unlink(missing_ok=True)
+    with replacing(path) as partial, open(partial, "wb") as stream:
+        np.savez(stream, header=np.array(json.dumps(header)), **arrays)  # type: ignore[arg-type]
 
 
 def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
@@ -77,9 +76,9 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         zipfile.BadZipFile,
     ) as error:
         raise FileFormatError(f"cannot read {os.fspath(path)!r} as a saved world: {error}") from error
-    if version != FORMAT:
+    if version not in READABLE:
         raise FileFormatError(
-            f"{os.fspath(path)!r} has the format {version!r}; this version of nuno reads format {FORMAT}"
+            f"{os.fspath(path)!r} has the format {version!r}; this version of nuno reads formats 1 to {FORMAT}"
         )
     try:
         snapshot = _decoded(header["world"], arrays)
@@ -97,8 +96,13 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
 
 
 def mesh_hash(shape: shapes.Shape) -> str:
-    """Return the SHA-256 of a shape's vertices and faces."""
-    vertices, faces = (shape.vertices, shape.faces) if isinstance(shape, shapes.TriangleMesh) else shape.mesh()
+    """Return the SHA-256 of a shape's vertices and faces, or tetrahedra, as they were given."""
+    if isinstance(shape, shapes.TriangleMesh | soft_shape.SoftMesh):
+        vertices, faces = shape.vertices, shape.faces
+    elif isinstance(shape, soft_shape.SoftTetrahedra):
+        vertices, faces = shape.vertices, shape.tets
+    else:
+        vertices, faces = shape.mesh()
     digest = hashlib.sha256(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
     digest.update(np.ascontiguousarray(faces, dtype="<i4").tobytes())
     return digest.hexdigest()

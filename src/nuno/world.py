@@ -13,16 +13,20 @@ from numpy.typing import ArrayLike
 
 from nuno.background import Background
 from nuno.body import Body
-from nuno.dynamics import Dynamics, check_material, make_push
+from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.grip import Grip, make_grip
-from nuno.materials import Cloth
+from nuno.materials import Material
+from nuno.motion import arrive, path_for
+from nuno.path import Path
 from nuno.simulation import CHUNK, SOON, Simulation
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
+from nuno.tie import check_weld
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.camera.camera import Camera
+    from nuno.contact_points import ContactPoints
 
 
 class World(Simulation):
@@ -99,7 +103,7 @@ class World(Simulation):
                 for grip in [g for g in other.grips if g.target is gone]:
                     self._drop_grip(grip)
             del self._bodies[gone.key]
-            gone._world = None
+            gone._world = gone._path = None
             self._colliders_changed()
         return gone
 
@@ -114,15 +118,17 @@ class World(Simulation):
 
     # Dynamics
 
-    def attach(self, body: Body | str, material: Cloth | None = None) -> Body:
+    def attach(self, body: Body | str, material: Material | None = None) -> Body:
         """Give a body dynamics, from the shape that it has now, at rest; no other body changes.
 
         The body takes the material's friction and thickness over, and keeps them when it is detached. Without
-        a material a cloth gets ``Cloth`` with the body's friction.
+        a material a cloth gets ``Cloth``, a soft body ``Soft`` and any other ``Rigid``, with the body's friction.
+        ``Rigid`` may be given to all but planes: a cloth or soft body then keeps the shape that it has now.
 
         Raises:
             BodyStateError: it has dynamics already, or follows another frame.
-            InvalidInputError: the shape has no dynamics, or the material does not fit.
+            InvalidInputError: the shape has no such dynamics, or the material does not fit.
+            MeshError: a rigid body without volume.
         """
         with self._call():
             own = self._own(body)
@@ -130,13 +136,14 @@ class World(Simulation):
                 raise BodyStateError(f"{own.name!r} is dynamic already; detach it first to change its material")
             if own._parent is not None:
                 raise BodyStateError(f"{own.name!r} follows another frame; dissoc it first")
-            chosen = Cloth(friction=own.friction) if material is None else material
+            if own._path is not None:
+                raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
+            chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
-            vertices = own._vertices()
-            positions = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
-            dynamics = Dynamics(own.shape, chosen, positions, np.zeros_like(positions), chosen.friction, self)
-            own._friction = chosen.friction
-            own._deformed, own._dynamics = None, dynamics
+            dynamics = start_dynamics(own, chosen, self)
+            own._friction, own._dynamics = chosen.friction, dynamics
+            if not dynamics.is_rigid:
+                own._deformed = None
             self._colliders_changed()
         return own
 
@@ -153,20 +160,67 @@ class World(Simulation):
             self._detach(own)
         return own
 
-    def grip(self, body: Body | str, where: Any, *, to: Any, compliance: float = 0.0) -> Grip:
-        """Hold points of a dynamic body from now on.
+    def move(self, body: Body | str, to: Path | None) -> None:
+        """Let a static body follow a path from now on; what touches it feels its surface move.
+
+        The body is where the path is at once, which is a jump where that is elsewhere, keeps its own orientation
+        where the path has none, and rests at the last key. Bodies that follow it (``assoc``) move along. Another
+        path takes the place of this one; ``locate`` and its like end it.
+
+        Args:
+            body: The body.
+            to: The path; None ends it, and the body stays where it is.
+
+        Raises:
+            BodyStateError: the body is dynamic, or follows another frame.
+            InvalidInputError: ``to`` is no path, or one for another number of worlds.
+        """
+        with self._call():
+            own = self._own(body)
+            before = (own._path is None, own._position.ndim, own._quaternion.ndim)
+            own._path = None if to is None else path_for(own, to, self.world_count)
+            arrive([own], self._time)
+            if before != (own._path is None, own._position.ndim, own._quaternion.ndim):
+                self._colliders_changed()
+
+    def set_material(self, body: Body | str, material: Material) -> None:
+        """Change the material of a dynamic body as it moves: its shape, velocity, grips and pushes stay.
+
+        Raises:
+            BodyStateError: the body is static, or of another kind (detach it, and attach it with the new one).
+            InvalidInputError: the material does not fit the shape or the batch.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it with the material")
+            if type(material) is not type(own._dynamics.material):
+                kinds = f"{type(own._dynamics.material).__name__}, not {type(material).__name__}"
+                raise BodyStateError(f"{own.name!r} moves as {kinds}; detach it to attach it as another kind")
+            chosen: Any = material
+            check_material(own.shape, chosen, self.world_count)
+            own._friction = chosen.friction
+            self._renew(own, chosen)
+            self._colliders_changed()
+
+    def grip(
+        self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None
+    ) -> Grip:
+        """Hold points of a dynamic body, or a rigid one as a whole, from now on.
 
         Args:
             body: The body.
             where: Vertex indices, (k,) for the same ones in every world or (worlds, k), -1 for none; or
-                ``SurfacePoints``, from ``body.at`` or ``body.closest``.
+                ``SurfacePoints``, from ``body.at`` or ``body.closest``. None for a rigid body.
             to: Where the mean of the points goes: a ``Path``, or a fixed point (3,) or (worlds, 3) [m]. The
                 points keep their present offsets from it, which turn with the path's quaternions. Or a
-                ``Body``: then they keep their present places in its frame.
-            compliance: [m/N]; 0 is stiff.
+                ``Body``: then they keep their present places in its frame, or, where it is a cloth or soft body, at its
+                nearest points. If that body is dynamic it bears the force.
+            compliance: [m/N]; 0 is stiff. Of a rigid body's turns as much [1/(N m)].
+            free: (3,), a direction of the world along which a rigid body may slide; None holds it entirely.
 
         Raises:
-            BodyStateError: the body is static, or the leading body dynamic.
+            BodyStateError: the body is static.
             InvalidInputError: a vertex out of range, or a target that cannot be used.
         """
         with self._call():
@@ -174,19 +228,43 @@ class World(Simulation):
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
             target = self._own(to) if isinstance(to, Body) else None
-            if target is not None and target._dynamics is not None:
-                raise BodyStateError(f"{target.name!r} is dynamic and cannot lead a grip")
-            grip = make_grip(own, where, to, number("compliance", compliance, low=0.0), target, self)
+            if target is own:
+                raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
+            if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
+                if not target._dynamics.is_rigid:
+                    raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
+            grip = make_grip(own, where, to, number("compliance", compliance, low=0.0), target, free, self)
             self._hold(grip)
         return grip
 
-    def push(self, body: Body | str, force: ArrayLike, duration: float | None = None) -> None:
+    def weld(self, a: Body | str, b: Body | str, where: Any = None, *, compliance: float = 0.0) -> Grip:
+        """Join two dynamic bodies where they are now, until the grip that is returned is released.
+
+        Args:
+            a: A cloth or soft body, of which ``where`` says the points as in ``grip``; or a rigid body.
+            b: Another body. Points of ``a`` stay on its nearest points, or at their places in its frame if it is rigid.
+            where: None where both are rigid.
+            compliance: [m/N]; 0 is stiff.
+
+        Raises:
+            BodyStateError: one of them is static.
+            InvalidInputError: points that ``a`` does not have, or a rigid ``a`` and a ``b`` that deforms.
+        """
+        with self._call():
+            check_weld(self._own(a), self._own(b))
+            return self.grip(a, where, to=self._own(b), compliance=compliance)
+
+    def push(
+        self, body: Body | str, force: ArrayLike, torque: ArrayLike | None = None, duration: float | None = None
+    ) -> None:
         """Apply a force to a dynamic body.
 
         Args:
             body: The body.
-            force: (3,) or (worlds, 3), spread over the vertices by their share of the area; or of every
-                vertex, (n, 3) or (worlds, n, 3) [N]. Where worlds = n, two axes mean vertices.
+            force: (3,) or (worlds, 3), spread over the vertices by their share of the mass at even density; or of every
+                vertex, (n, 3) or (worlds, n, 3) [N]. Where worlds = n, two axes mean vertices. On a rigid body it acts
+                at the centre of mass.
+            torque: (3,) or (worlds, 3) [N m], on rigid bodies only.
             duration: How long [s], on top of other pushes; None is until the next such push, which takes its
                 place (a force of zero ends it).
 
@@ -197,7 +275,7 @@ class World(Simulation):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
-            own._dynamics.add_push(make_push(own.shape, force, duration, self))
+            own._dynamics.add_push(make_push(own, force, torque, duration, self))
 
     def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
         """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back."""
@@ -223,6 +301,23 @@ class World(Simulation):
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
 
+    def contacts(self, body: Body | str) -> ContactPoints:
+        """Return where a dynamic body touches others: points, normals and forces.
+
+        Those with static bodies are what the next substep would make of them, for cloth and soft bodies; all others
+        are those of the last substep.
+
+        Raises:
+            BodyStateError: the body is static.
+        """
+        from nuno.contact_points import contact_points
+
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
+            return contact_points(self, own)
+
     def state(self, body: Body | str) -> dict[str, Any]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
 
@@ -235,9 +330,13 @@ class World(Simulation):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
-            solver = own._dynamics.solver
-            velocities: Any = wp.array(solver.velocities(), dtype=wp.vec3, device=self.device)
-            return {"positions": solver.positions_on_device(), "velocities": velocities}
+            dynamics = own._dynamics
+            velocities: Any = wp.array(dynamics.velocities(own), dtype=wp.vec3, device=self.device)
+            if isinstance(dynamics, ParticleDynamics):
+                positions: Any = dynamics.solver.positions_on_device()
+            else:
+                positions = wp.array(dynamics.vertices(own), dtype=wp.vec3, device=self.device)
+            return {"positions": positions, "velocities": velocities}
 
     # Time
 

@@ -130,12 +130,15 @@ def _render(
     device, worlds = world.device, int(world.world_count)
     wide = read is raster.ids_of
 
+    def skin(body: Any) -> tuple[np.ndarray, np.ndarray]:
+        return body.skin() if getattr(body.shape, "is_soft", False) else (body.vertices, body.faces)
+
     def draw(keys: wp.array, body: Any, vertices: np.ndarray, label: int) -> None:
         thickness = cloth_thickness if getattr(body.shape, "is_cloth", False) else 0.0
         if body.shape.kind == "plane":  # endless, so not drawn as triangles
             raster.draw_depth(keys, _plane_depth(camera, region, vertices[0], body.faces), label)
             return
-        faces = np.asarray(body.faces)
+        faces = np.asarray(skin(body)[1])
         if seen.distorted and not body.is_dynamic:
             vertices, faces = _split(camera, vertices[0], faces)
             vertices = vertices[None]
@@ -148,7 +151,7 @@ def _render(
     for k, body in enumerate(world.bodies):
         if k in hidden:
             continue
-        vertices = np.asarray(body.vertices)
+        vertices = np.asarray(skin(body)[0])
         if vertices.ndim == 2:
             vertices = vertices[None]
         if (vertices[-1] == vertices[0]).all() and (vertices[1:] == vertices[0]).all():

@@ -7,13 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike
 
 from nuno.bodies import box, plane, sheet
 from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.camera.view import Region, view
+from nuno.camera.view import Region, View, view
+from nuno.dynamics import ParticleDynamics
+from nuno.estimate.appearance import Pattern, compare_pattern
 from nuno.estimate.hypotheses import Discretisation, cell_counts
 from nuno.estimate.similarity import Silhouette, score_masks
 from nuno.materials import Cloth
@@ -22,8 +26,6 @@ from nuno.surface import SurfacePoints
 from nuno.world import World
 
 if TYPE_CHECKING:
-    import warp as wp
-
     from nuno.body import Body
 
 LIFT_SECONDS = 1.5
@@ -63,7 +65,7 @@ class Futures:
 
 def solver_of(body: Body) -> Any:
     """The solver of a body that has dynamics."""
-    assert body._dynamics is not None
+    assert isinstance(body._dynamics, ParticleDynamics)
     return body._dynamics.solver
 
 
@@ -180,9 +182,18 @@ def rest_speed(body: Body) -> float:
 
 
 def score_futures(
-    futures: Futures, camera: Camera, real: Silhouette, table: Table, *, keep_masks: bool = False
-) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-    """Draw every future's cloth as the camera would see it, and compare it with the real silhouette.
+    futures: Futures, camera: Camera, real: Silhouette, table: Table, *, pattern: Pattern | None = None,
+    keep_masks: bool = False,
+) -> tuple[dict[str, np.ndarray], np.ndarray | None]:  # fmt: skip
+    """Draw every future's cloth as the camera would see it, and compare it with the real silhouette and pattern.
+
+    Args:
+        futures: The imagined picks.
+        camera: The camera at the silhouette's resolution.
+        real: The real silhouette.
+        table: The table.
+        pattern: The cloth's pattern; None where there are no images: then "pattern" is 0 for all.
+        keep_masks: Whether masks are returned too.
 
     Returns:
         The scores by name, (hypotheses, candidates) each, and where wanted the masks
@@ -190,6 +201,7 @@ def score_futures(
     """
     keys, region = draw_futures(futures, camera, table)
     scores = score_masks(keys, real, region=region)
+    scores["pattern"] = np.zeros(keys.shape[0]) if pattern is None else score_pattern(futures, pattern, table)
     shape = (len(futures.discretisation.spread), futures.candidates)
     result = {name: value.reshape(*shape, *value.shape[1:]) for name, value in scores.items()}
     masks = None
@@ -201,6 +213,23 @@ def score_futures(
     return result, masks
 
 
+def score_pattern(futures: Futures, pattern: Pattern, table: Table) -> np.ndarray:
+    """How well the cloth's pattern, carried along by every future, explains the image after.
+
+    Returns:
+        (hypotheses * candidates,) float, see `nuno.estimate.appearance`; 0 where a future is not finite.
+    """
+    positions = solver_of(futures.body).positions_on_device()
+    faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
+    keys = raster.key_images(positions.shape[0], pattern.region, positions.device, ids=True)
+    looking = view(pattern.camera, pattern.region)
+    _begin_with_table(keys, futures, table, looking, raster.LAST_LABEL)
+    raster.draw(keys, positions, faces, looking, None)
+    lay = np.asarray(futures.origin.find(futures.body.name).vertices)
+    scores = compare_pattern(keys, positions, faces, pattern.rectangle.fractions(lay), pattern)
+    return np.where(futures.finite.ravel(), scores, 0.0)
+
+
 def draw_futures(futures: Futures, camera: Camera, table: Table) -> tuple[wp.array, Region]:
     """Key images of the cloth behind the table's edge, and the part of the image that they hold."""
     positions = solver_of(futures.body).positions_on_device()
@@ -208,18 +237,23 @@ def draw_futures(futures: Futures, camera: Camera, table: Table) -> tuple[wp.arr
     region = Region.around(camera, corners[np.isfinite(corners).all(axis=1)], margin=4.0)
     looking = view(camera, region)
     keys = raster.key_images(positions.shape[0], region, positions.device)
-    layer = raster.key_images(1, region, positions.device)
-    raster.clear(layer)
-    import warp as wp
-
-    for body in futures.origin.bodies:
-        if body.name == "table" and table.half_extents is not None:
-            table_points: wp.array = wp.array(
-                np.asarray(body.vertices, np.float32)[None], dtype=wp.vec3, device=positions.device
-            )
-            table_faces: wp.array = wp.array(np.asarray(body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
-            raster.draw(layer, table_points, table_faces, looking, 1)
-    raster.clear(keys, layer)
-    faces: wp.array = wp.array(np.asarray(futures.body.faces, np.int32), dtype=wp.vec3i, device=positions.device)
+    _begin_with_table(keys, futures, table, looking, 1)
+    faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
     raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
     return keys, region
+
+
+def _begin_with_table(keys: wp.array, futures: Futures, table: Table, looking: View, label: int) -> None:
+    """Reset key images to the table, where its extents are known."""
+    device: Any = keys.device
+    layer = raster.key_images(1, Region(0, 0, looking.width, looking.height), device, ids=keys.dtype == wp.int64)
+    if table.half_extents is not None:
+        body = futures.origin.find("table")
+        points = _on_device(np.asarray(body.vertices)[None], wp.vec3, device)
+        raster.draw(layer, points, _on_device(body.faces, wp.vec3i, device), looking, label)
+    raster.clear(keys, layer)
+
+
+def _on_device(values: ArrayLike, dtype: Any, device: Any) -> wp.array:
+    kind = np.int32 if dtype is wp.vec3i else np.float32
+    return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)

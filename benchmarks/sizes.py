@@ -1,0 +1,131 @@
+"""What a step costs, and how much memory a world takes, against the number of particles, worlds and static shapes.
+
+    python benchmarks/sizes.py [--device cuda:0] [--plot docs/images/sizes.png] [--json sizes.json]
+
+A cloth falls on a table and over a bar, with self-contact; a soft cube lands on the table. Times are medians of
+frames of 1/60 s, kernels already compiled.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+import nuno
+
+FRAMES = 24
+PARTICLES = {"cpu": (8, 16, 32, 64), "cuda": (16, 32, 64, 128, 256)}
+WORLDS = {"cpu": (1, 4, 16, 64), "cuda": (1, 16, 128, 1024, 8192)}
+SHAPES = (1, 10, 100, 1000)
+
+
+def room(device: str) -> nuno.World:
+    world = nuno.World(device=device)
+    world.add(nuno.box((1.2, 0.8, 0.02), name="table", position=(0.0, 0.0, -0.01)))
+    return world
+
+
+def cloth(world: nuno.World, cells: int) -> nuno.Body:
+    world.add(nuno.capsule(0.02, 0.6, name="bar", position=(0.1, 0.0, 0.03)).rotate(np.pi / 2, "x"))
+    body = world.add(nuno.sheet((0.5, 0.5), cells=(cells, cells), position=(0.0, 0.0, 0.1)))
+    world.attach(body)
+    return body
+
+
+def cube(world: nuno.World, cells: int) -> nuno.Body:
+    body = world.add(nuno.soft_box((0.2, 0.2, 0.2), cells=(cells,) * 3, position=(0.0, 0.0, 0.13)))
+    world.attach(body, nuno.Soft(density=1000.0, youngs_modulus=5e4))
+    return body
+
+
+def frame_seconds(world: nuno.World) -> float:
+    """Median wall seconds of a frame."""
+    world.run(4 / 60)
+    spans = []
+    for _ in range(FRAMES):
+        start = time.perf_counter()
+        world.step()
+        next(b for b in world.bodies if b.is_dynamic)._dynamics.finite()  # type: ignore[union-attr]  # wait for the device
+        spans.append(time.perf_counter() - start)
+    return float(np.median(spans))
+
+
+def measured(kind: str, device: str) -> list[dict[str, Any]]:
+    short = device.split(":")[0]
+    rows: list[dict[str, Any]] = []
+    if kind == "cloth particles":
+        for cells in PARTICLES[short]:
+            world = room(device)
+            body = cloth(world, cells)
+            solver = body._dynamics.solver  # type: ignore[union-attr]
+            row = {"size": (cells + 1) ** 2, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps}
+            rows.append(row | {"bytes": solver.memory_bytes / row["size"]})
+    elif kind == "soft particles":
+        for cells in (4, 6, 10, 16):
+            world = room(device)
+            body = cube(world, cells)
+            solver = body._dynamics.solver  # type: ignore[union-attr]
+            row = {"size": (cells + 1) ** 3, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps}
+            rows.append(row | {"bytes": solver.memory_bytes / (5 * cells**3)})
+    elif kind == "worlds":
+        for count in WORLDS[short]:
+            world = room(device)
+            body = cloth(world, 30)
+            futures = world.imagine(count)
+            ms = 1e3 * frame_seconds(futures)
+            solver = futures.find(body.name)._dynamics.solver  # type: ignore[union-attr]
+            rows.append({"size": count, "ms": ms, "substeps": solver.substeps, "bytes": solver.memory_bytes / count})
+    else:
+        for count in SHAPES:
+            world = room(device)
+            rng = np.random.default_rng(1)
+            for _ in range(count):
+                place = rng.uniform((1.0, -5.0, 0.0), (9.0, 5.0, 2.0))
+                world.add(nuno.box(rng.uniform(0.1, 0.4, 3), position=place))
+            solver = cloth(world, 30)._dynamics.solver  # type: ignore[union-attr]
+            rows.append({"size": count, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps, "bytes": 0.0})
+    return rows
+
+
+def plot(results: dict[str, list[dict[str, Any]]], path: str, device: str) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(results), figsize=(4 * len(results), 3.4), layout="constrained")
+    for axis, (kind, rows) in zip(axes, results.items(), strict=True):
+        axis.loglog([r["size"] for r in rows], [r["ms"] for r in rows], "o-", color="tab:blue")
+        axis.axhline(1e3 / 60, color="gray", linewidth=0.8)
+        axis.set(xlabel=kind, ylabel="ms a frame (grey: real time)", title=f"{kind}, {device}")
+        axis.grid(True, which="both", linewidth=0.3)
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--plot")
+    parser.add_argument("--json")
+    options = parser.parse_args()
+    kinds = ("cloth particles", "soft particles", "worlds", "static shapes")
+    results = {}
+    print(f"| against | size | substeps | ms a frame | bytes a particle, tetrahedron, world | ({options.device})")
+    print("|---|---|---|---|---|")
+    for kind in kinds:
+        results[kind] = measured(kind, options.device)
+        for row in results[kind]:
+            print(f"| {kind} | {row['size']} | {row['substeps']} | {row['ms']:.2f} | {row['bytes']:.0f} |", flush=True)
+    if options.plot:
+        plot(results, options.plot, options.device)
+    if options.json:
+        with open(options.json, "w") as stream:
+            json.dump({"device": options.device, "results": results}, stream, indent=1)
+
+
+if __name__ == "__main__":
+    main()

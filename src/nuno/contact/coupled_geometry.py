@@ -1,0 +1,140 @@
+"""Where the candidates of coupled bodies touch: weights, normal and distance of each row for one substep.
+
+All is taken where the substep began, when nothing crossed: that tells the side. A row whose parts are too close
+already asks for what they have and a little more, so that they part slowly.
+"""
+
+import warp as wp
+
+from nuno.contact.coupled_lists import Elements, body_radius
+from nuno.contact.coupled_rows import (
+    EDGE_EDGE,
+    LEAVE_SPEED,
+    VERTEX_RIGID,
+    VERTEX_TRIANGLE,
+    Particles,
+    Rows,
+)
+from nuno.contact.nearness import closest_on_edges
+from nuno.contact.shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    SPHERE,
+    distance_box,
+    distance_cylinder,
+    distance_round,
+)
+from nuno.solver.rigid_body import RigidState, point_before
+
+
+@wp.func
+def over_triangle(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3):
+    """Height of a point over a triangle's plane, the plane's normal, and the point's barycentric coordinates there."""
+    e = b - a
+    f = c - a
+    r = x - a
+    n = wp.cross(e, f)
+    nn = wp.dot(n, n) + 1.0e-20
+    v = wp.dot(wp.cross(r, f), n) / nn
+    w = wp.dot(wp.cross(e, r), n) / nn
+    length = wp.sqrt(nn)
+    return wp.dot(r, n) / length, n / length, wp.vec3(1.0 - v - w, v, w)
+
+
+@wp.func
+def part_distance(elements: Elements, part: int, x: wp.vec3):
+    """Signed distance from a rigid body's part, and its normal, of a point in the body's frame."""
+    local = wp.quat_rotate_inv(elements.part_turn[part], x - elements.part_place[part])
+    size = elements.part_size[part]
+    kind = elements.part_kind[part]
+    gap = float(1.0e6)
+    nx = float(0.0)
+    ny = float(0.0)
+    nz = float(1.0)
+    if kind == BOX:
+        gap, nx, ny, nz = distance_box(local[0], local[1], local[2], size[0], size[1], size[2])
+    elif kind == CYLINDER:
+        gap, nx, ny, nz = distance_cylinder(local[0], local[1], local[2], size[0], size[1])
+    elif kind == SPHERE or kind == CAPSULE:
+        gap, nx, ny, nz = distance_round(local[0], local[1], local[2], size[0], size[1])
+    else:
+        mesh = elements.part_mesh[part]
+        query = wp.mesh_query_point_sign_normal(mesh, local, 2.0 * elements.part_radius[part])
+        if query.result:
+            offset = local - wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+            normal = wp.mesh_eval_face_normal(mesh, query.face)
+            gap = wp.length(offset) * query.sign
+            if wp.abs(gap) > 1.0e-7:
+                normal = offset / gap
+            nx = normal[0]
+            ny = normal[1]
+            nz = normal[2]
+    return gap, wp.quat_rotate(elements.part_turn[part], wp.vec3(nx, ny, nz))
+
+
+@wp.kernel(enable_backward=False, module="nuno.contact.coupled_geometry")
+def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, dt: float, reach: float):
+    """Weights, normal and distance of every row; ``reach`` [m] bounds what comes into contact in the substep."""
+    world, k = wp.tid()
+    if k >= wp.min(rows.count[world], rows.room):
+        return
+    r = world * rows.room + k
+    first = world * particles.count
+    q = rows.corners[r]
+    bodies = rows.bodies[r]
+    apart = body_radius(elements, world, bodies[0]) + body_radius(elements, world, bodies[1])
+    kind = rows.kind[r]
+    gap = float(1.0e6)
+    n = wp.vec3(0.0, 0.0, 1.0)
+    weights = wp.vec4(1.0, 0.0, 0.0, 0.0)
+    inside = float(1.0)
+    if kind == VERTEX_TRIANGLE:
+        x = particles.p[first + q[0]]
+        height, n0, b = over_triangle(
+            x, particles.p[first + q[1]], particles.p[first + q[2]], particles.p[first + q[3]]
+        )
+        side = wp.where(height < 0.0, -1.0, 1.0)
+        gap = height * side
+        n = n0 * side
+        weights = wp.vec4(1.0, -b[0], -b[1], -b[2])
+        inside = wp.min(b[0], wp.min(b[1], b[2])) + 1.0e-3
+    elif kind == EDGE_EDGE:
+        a = particles.p[first + q[0]]
+        c = particles.p[first + q[2]]
+        e = particles.p[first + q[1]] - a
+        f = particles.p[first + q[3]] - c
+        d = a - c
+        s, t = closest_on_edges(d[0], d[1], d[2], e[0], e[1], e[2], f[0], f[1], f[2])
+        d = d + e * s - f * t
+        gap = wp.length(d)
+        inside = gap - 1.0e-9
+        n = d / wp.max(gap, 1.0e-9)
+        weights = wp.vec4(1.0 - s, s, t - 1.0, -t)
+    elif kind == VERTEX_RIGID:
+        i = world * rigid.capacity + rows.slot[r]
+        turn = rigid.rotation_before[i]
+        x = wp.quat_rotate_inv(turn, particles.p[first + q[0]] - rigid.position_before[i])
+        signed, normal = part_distance(elements, rows.part[r], x)
+        gap = signed
+        n = wp.quat_rotate(turn, normal)
+        rows.point[r] = x - normal * gap
+    else:
+        x = point_before(rigid, world * rigid.capacity + rows.slot[r], rows.point[r])
+        height, n0, b = over_triangle(
+            x, particles.p[first + q[0]], particles.p[first + q[1]], particles.p[first + q[2]]
+        )
+        side = wp.where(height < 0.0, 1.0, -1.0)
+        gap = wp.abs(height)
+        n = n0 * side
+        weights = wp.vec4(b[0], b[1], b[2], 0.0)
+        inside = wp.min(b[0], wp.min(b[1], b[2])) + 1.0e-3
+    if inside <= 0.0 or gap > apart + reach:
+        return
+    rows.active[world * rows.room + wp.atomic_add(rows.active_count, world, 1)] = r
+    rows.normal[r] = n
+    rows.weights[r] = weights
+    rows.distance[r] = wp.min(apart, gap + LEAVE_SPEED * dt)
+    rows.friction[r] = elements.friction[(world * elements.bodies + bodies[0]) * elements.bodies + bodies[1]]
+    rows.push[r] = 0.0
+    rows.drag[r] = wp.vec3(0.0, 0.0, 0.0)

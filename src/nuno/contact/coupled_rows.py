@@ -1,0 +1,231 @@
+"""Contacts between bodies that move: rows of up to four particles, or of particles and a rigid body.
+
+A row says that a weighted sum of particles, less a point of a rigid body where there is one, keeps a distance along
+a normal. Its multipliers add up over the passes of a substep, so that the friction of all passes together stays in
+Coulomb's cone of the push of all passes together: what sticks does not creep, however many passes the push takes.
+
+Where many threads work, each row sees its particles' and bodies' masses split evenly among the rows they are in
+(Tonge, Benevolenski and Voroshilov, "Mass splitting for jitter-free parallel rigid body simulation", 2012), and
+the moves are summed in fixed point: the sums, and so the bits, are the same in any order.
+"""
+
+import warp as wp
+
+from nuno.contact.self_contact import UNIT
+from nuno.solver.rigid_body import (
+    RigidState,
+    apply_rigid_correction,
+    inverse_mass_at,
+    point_before,
+    point_of,
+    turned,
+)
+
+LEAVE_SPEED = wp.constant(0.5)
+"""[m/s] What is found too close parts no faster than this."""
+TURN_UNIT = wp.constant(1.0e-9)
+"""[rad] Step of the fixed-point sums of turns."""
+
+
+@wp.struct
+class Particles:
+    """The particles of all coupled bodies, ``count`` a world, one world after the other.
+
+    Kept are where they were when the substep began, and how far they have come since: what sticks has not come an
+    ulp, however far from the origin it is.
+    """
+
+    count: int
+    p: wp.array(dtype=wp.vec3)
+    u: wp.array(dtype=wp.vec3)
+    w: wp.array(dtype=float)
+    # what many threads sum: rows that a particle or a rigid body is in, and moves in fixed point
+    sharers: wp.array(dtype=int)
+    moved: wp.array(dtype=int)
+    body_sharers: wp.array(dtype=int)
+    body_moved: wp.array(dtype=int)
+
+
+@wp.struct
+class Rows:
+    """Contacts, room for ``room`` a world, ``count`` of them used."""
+
+    room: int
+    count: wp.array(dtype=int)
+    corners: wp.array(dtype=wp.vec4i)  # -1: none; in a vertex-triangle row the vertex is first
+    kind: wp.array(dtype=int)
+    slot: wp.array(dtype=int)  # of the rigid body, -1: none
+    part: wp.array(dtype=int)  # of the rigid body
+    bodies: wp.array(dtype=wp.vec2i)
+    point: wp.array(dtype=wp.vec3)  # in the rigid body's frame
+    weights: wp.array(dtype=wp.vec4)
+    normal: wp.array(dtype=wp.vec3)
+    distance: wp.array(dtype=float)
+    friction: wp.array(dtype=float)
+    push: wp.array(dtype=float)
+    drag: wp.array(dtype=wp.vec3)
+    # those that may touch in this substep
+    active: wp.array(dtype=int)
+    active_count: wp.array(dtype=int)
+
+
+VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID = 0, 1, 2, 3
+
+
+@wp.func
+def blend(x: wp.array(dtype=wp.vec3), first: int, corners: wp.vec4i, weights: wp.vec4):
+    """The weighted sum of a row's particles."""
+    total = wp.vec3(0.0, 0.0, 0.0)
+    for k in range(4):
+        if corners[k] >= 0:
+            total += x[first + corners[k]] * weights[k]
+    return total
+
+
+@wp.func
+def share(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, sign: int):
+    """Count a row among those that its particles and its body are in."""
+    corners = rows.corners[r]
+    for k in range(4):
+        if corners[k] >= 0:
+            wp.atomic_add(particles.sharers, first + corners[k], sign)
+    if rows.slot[r] >= 0:
+        wp.atomic_add(particles.body_sharers, start + rows.slot[r], sign)
+
+
+@wp.func
+def row_gap(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int):
+    """Where a row's particles are, from the rigid body's point if there is one."""
+    at = blend(particles.p, first, rows.corners[r], rows.weights[r])
+    at = at + blend(particles.u, first, rows.corners[r], rows.weights[r])
+    if rows.slot[r] >= 0:
+        at = at - point_of(rigid, start + rows.slot[r], rows.point[r])
+    return at
+
+
+@wp.func
+def row_slip(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int):
+    """How far a row's particles moved in the substep, over what the rigid body's point did."""
+    slip = blend(particles.u, first, rows.corners[r], rows.weights[r])
+    if rows.slot[r] >= 0:
+        i = start + rows.slot[r]
+        slip = slip - (point_of(rigid, i, rows.point[r]) - point_before(rigid, i, rows.point[r]))
+    return slip
+
+
+@wp.func
+def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
+               threads: int):  # fmt: skip
+    """How far a row gives way along n for a unit of its multiplier."""
+    corners = rows.corners[r]
+    weights = rows.weights[r]
+    total = float(1.0e-9)
+    for k in range(4):
+        if corners[k] >= 0:
+            i = first + corners[k]
+            w = particles.w[i]
+            if threads > 1:
+                w = w * float(particles.sharers[i])
+            total += weights[k] * weights[k] * w
+    if rows.slot[r] >= 0:
+        i = start + rows.slot[r]
+        w = inverse_mass_at(rigid, i, wp.quat_rotate(rigid.rotation[i], rows.point[r]), n)
+        if threads > 1:
+            w = w * float(particles.body_sharers[i])
+        total += w
+    return total
+
+
+@wp.func
+def fix(moved: wp.array(dtype=int), k: int, d: wp.vec3, unit: float):
+    """Add a vector to a fixed-point sum."""
+    wp.atomic_add(moved, 3 * k, int(wp.rint(d[0] / unit)))
+    wp.atomic_add(moved, 3 * k + 1, int(wp.rint(d[1] / unit)))
+    wp.atomic_add(moved, 3 * k + 2, int(wp.rint(d[2] / unit)))
+
+
+@wp.func
+def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, impulse: wp.vec3,
+              threads: int):  # fmt: skip
+    """Move what is in a row by the multiplier ``impulse`` [kg m]; the rigid body by as much the other way."""
+    corners = rows.corners[r]
+    weights = rows.weights[r]
+    for k in range(4):
+        if corners[k] >= 0:
+            i = first + corners[k]
+            d = impulse * (weights[k] * particles.w[i])
+            if threads > 1:
+                fix(particles.moved, i, d, UNIT)
+            else:
+                particles.u[i] = particles.u[i] + d
+    if rows.slot[r] >= 0:
+        i = start + rows.slot[r]
+        arm = wp.quat_rotate(rigid.rotation[i], rows.point[r])
+        if threads > 1:
+            fix(particles.body_moved, 2 * i, -impulse * rigid.weight[i], UNIT)
+            fix(particles.body_moved, 2 * i + 1, rigid.give[i] * wp.cross(arm, -impulse), TURN_UNIT)
+        else:
+            apply_rigid_correction(rigid, i, arm, -impulse)
+
+
+@wp.func
+def push_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, threads: int):
+    """One projection of a row along its normal; returns how far it was from where it asks to be [m]."""
+    n = rows.normal[r]
+    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r]
+    push = rows.push[r]
+    wrong = wp.max(-gap, 0.0)
+    if gap < 0.0 or push > 0.0:
+        more = wp.max(push - gap / row_weight(particles, rigid, first, start, rows, r, n, threads), 0.0)
+        rows.push[r] = more
+        apply_row(particles, rigid, first, start, rows, r, n * (more - push), threads)
+        if push > 0.0:
+            wrong = wp.abs(gap)
+    return wrong
+
+
+@wp.func
+def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, threads: int):
+    """Take back a row's slip, with up to mu times what its push has come to; returns what was left to take [m]."""
+    most = rows.friction[r] * rows.push[r]
+    old = rows.drag[r]
+    slip = row_slip(particles, rigid, first, start, rows, r)
+    n = rows.normal[r]
+    slip = slip - n * wp.dot(slip, n)
+    length = wp.length(slip)
+    if most <= 0.0 and wp.length_sq(old) == 0.0:
+        return float(0.0)
+    drag = old
+    if length > 1.0e-12:
+        drag = old - slip / row_weight(particles, rigid, first, start, rows, r, slip / length, threads)
+    size = wp.length(drag)
+    left = length
+    if size > most:
+        drag = drag * (most / size)
+        left = 0.0
+    rows.drag[r] = drag
+    apply_row(particles, rigid, first, start, rows, r, drag - old, threads)
+    return left
+
+
+@wp.func
+def summed(moved: wp.array(dtype=int), k: int, unit: float):
+    """A fixed-point sum as a vector; it starts anew."""
+    total = wp.vec3(float(moved[3 * k]), float(moved[3 * k + 1]), float(moved[3 * k + 2])) * unit
+    for c in range(3):
+        moved[3 * k + c] = 0
+    return total
+
+
+@wp.func
+def take_sums(particles: Particles, rigid: RigidState, first: int, start: int, thread: int, threads: int):
+    """Apply the summed moves of many threads."""
+    for k in range(thread, particles.count, threads):
+        i = first + k
+        if particles.sharers[i] > 0:
+            particles.u[i] = particles.u[i] + summed(particles.moved, i, UNIT)
+    for k in range(thread, rigid.capacity, threads):
+        i = start + k
+        if particles.body_sharers[i] > 0:
+            rigid.position[i] = rigid.position[i] + summed(particles.body_moved, 2 * i, UNIT)
+            rigid.rotation[i] = turned(rigid.rotation[i], summed(particles.body_moved, 2 * i + 1, TURN_UNIT))

@@ -1,0 +1,80 @@
+"""What touches a body: points, normals and forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.dynamics import ParticleDynamics
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+    from nuno.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """The contacts of one body with others; what it has with itself is not among them.
+
+    Attributes:
+        points: (k, 3) float [m], where, in the world.
+        normals: (k, 3) float, towards the body.
+        forces: (k, 3) float [N], on the body, friction included.
+        others: The name of the other body at each.
+        worlds: (k,) int, the world of a batch that each is in.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    forces: np.ndarray
+    others: tuple[str, ...]
+    worlds: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @classmethod
+    def joined(cls, found: list[tuple[Any, ...]]) -> ContactPoints:
+        """Return those of rows (point, normal, force, name, world)."""
+        if not found:
+            none = np.zeros((0, 3))
+            return cls(none, none, none, (), np.zeros(0, dtype=int))
+        points, normals, forces = (np.array([row[c] for row in found]) for c in range(3))
+        return cls(points, normals, forces, tuple(row[3] for row in found), np.array([row[4] for row in found]))
+
+
+def contact_points(world: Simulation, body: Body) -> ContactPoints:
+    """Return a dynamic body's contacts; see ``World.contacts``."""
+    dynamics: Any = body._dynamics
+    found: list[tuple[Any, ...]] = []
+    if isinstance(dynamics, ParticleDynamics):
+        found += _on_shapes(world, body, dynamics)
+    else:
+        names = {slot: other.name for other, slot in zip(world._bodies.values(), _slots(world), strict=True)}
+        for k in range(world.world_count):
+            for slot, points, normals, forces in dynamics.solver.contacts_of(dynamics.slot, k):
+                found += [(*row, names.get(slot, ""), k) for row in zip(points, normals, forces, strict=True)]
+    for coupled in world._stepping.last:
+        found += coupled.contacts(body)
+    return ContactPoints.joined(found)
+
+
+def _slots(world: Simulation) -> list[int]:
+    assert world._rigid is not None
+    return world._rigid.slots_of(world)
+
+
+def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+    """What static shapes would do to the body's particles in the next substep."""
+    world._bring_colliders()
+    static = [other for other in world._bodies.values() if other._dynamics is None]
+    touched, _ = world._rules.colliders_of(body, static)
+    found: list[tuple[Any, ...]] = []
+    dynamics.prepare(world.time, 1.0 / world.frame_rate)
+    points = dynamics.vertices(body)
+    for shape, normals, forces in dynamics.solver.shape_forces(world.time):
+        for k, i in zip(*np.nonzero(np.linalg.norm(normals, axis=-1) > 0.0), strict=True):
+            found.append((points[k, i], normals[k, i], forces[k, i], touched[shape].name, k))
+    return found

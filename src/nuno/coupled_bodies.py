@@ -1,0 +1,269 @@
+"""Bodies that touch or are tied, as the solver of their contacts takes them, and what it tells of their forces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno import quaternion as quat
+from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
+from nuno.contact.coupled_ties import Holds, Ties
+from nuno.contact.shapes import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
+from nuno.coordinates import compose
+from nuno.dynamics import ParticleDynamics
+from nuno.grip import Grip
+from nuno.rigid_dynamics import RigidDynamics
+from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, make_elements
+from nuno.solver.coupling import Coupling
+from nuno.solver.state import THICKNESS
+from nuno.tie import HoldSpec, TieSpec
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+    from nuno.simulation import Simulation
+
+KINDS = {BALL: SPHERE, BLOCK: BOX, ROD: CAPSULE, DRUM: CYLINDER, HULL: SOLID_MESH}
+RIM_POINTS = 16
+"""Corners that stand for the rim of a cylinder."""
+
+
+class CoupledBodies:
+    """A group of bodies, stepped together.
+
+    Args:
+        world: Whose they are.
+        group: The bodies, in the world's order.
+        ties: The grips that join them or hold rigid ones.
+    """
+
+    def __init__(self, world: Simulation, group: list[Body], ties: tuple[Grip, ...]) -> None:
+        self._world, self._ties = world, ties
+        self.particles = [body for body in group if isinstance(body._dynamics, ParticleDynamics)]
+        self.rigid = [body for body in group if isinstance(body._dynamics, RigidDynamics)]
+        self.bodies = [*self.particles, *self.rigid]
+        self._dynamics: list[Any] = [body._dynamics for body in self.bodies]
+        solvers = [body._dynamics.solver for body in self.particles]  # type: ignore[union-attr]
+        scene = world._rigid
+        self._first: dict[Body, int] = {}
+        total = 0
+        for body, solver in zip(self.particles, solvers, strict=True):
+            self._first[body] = total
+            total += solver.particle_count
+        self._meshes: list[Any] = []
+        surfaces = [
+            SurfaceOfParticles(solver.particle_count, np.asarray(body.faces), 0.5 * solver._scalars[:, THICKNESS])
+            for body, solver in zip(self.particles, solvers, strict=True)
+        ]
+        elements = make_elements(
+            surfaces, [self._surface(body) for body in self.rigid], *self._rules(), str(world.device)
+        )
+        self._point_ties = [grip for grip in ties if isinstance(grip._spec, TieSpec)]
+        self._frame_holds = [grip for grip in ties if isinstance(grip._spec, HoldSpec)]
+        slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
+        rigid = scene.solver if scene is not None and slots else None
+        self._capacity = 0 if rigid is None else int(rigid.state.capacity)
+        self._slots = slots
+        self.coupling = Coupling(solvers, rigid, slots, elements, self._make_ties(), self._make_holds())
+
+    def is_current(self) -> bool:
+        """Whether the solvers still are those that the tables speak of."""
+        same = all(body._dynamics is own for body, own in zip(self.bodies, self._dynamics, strict=True))
+        rigid = self._world._rigid
+        return same and (not self.rigid or (rigid is not None and rigid.solver.state.capacity == self._capacity))
+
+    def run_frame(self, time: float, duration: float, substeps: int) -> None:
+        """Advance by ``duration`` [s], at most a frame."""
+        self._lead_holds(time, duration)
+        if self.rigid and self._world._rigid is not None:
+            self.coupling.led = self._world._rigid.lead(self._world, time, duration)
+        self.coupling.run_frame(time, duration, substeps)
+
+    def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray] | None:
+        """Force [N] and torque [N m] (worlds, 3) of a tie or hold over the last frame; None if it is not of these."""
+        if grip in self._point_ties:
+            forces = self.coupling.tie_forces()  # (worlds, ties, 3), on the body's points
+            before = sum(self._tie_counts[: self._point_ties.index(grip)])
+            own = -forces[:, before : before + self._tie_counts[self._point_ties.index(grip)]]
+            points = self._tie_points(grip)
+            arms = points - points.mean(axis=1, keepdims=True)
+            return own.sum(axis=1), np.cross(arms, own).sum(axis=1)
+        if grip in self._frame_holds:
+            force, torque = self.coupling.hold_wrenches()
+            k = self._frame_holds.index(grip)
+            held: Any = grip.body._dynamics
+            # from the centre of mass to the origin of the body's frame
+            arm = quat.rotate(held.solver.pose(held.slot)[1], np.broadcast_to(held.centre, force[:, k].shape))
+            return -force[:, k], -torque[:, k] - np.cross(arm, force[:, k])
+        return None
+
+    def contacts(self, body: Body) -> list[tuple[Any, ...]]:
+        """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep."""
+        if body not in self.bodies:
+            return []
+        own, found = self.bodies.index(body), []
+        for world, pair, point, normal, force in self.coupling.contacts():
+            if own in pair:
+                sign = 1.0 if pair[0] == own else -1.0
+                other = self.bodies[pair[1] if pair[0] == own else pair[0]]
+                found.append((point, sign * normal, sign * force, other.name, world))
+        return found
+
+    # -- tables
+
+    def _rules(self) -> tuple[np.ndarray, np.ndarray]:
+        rules, count, worlds = self._world._rules, len(self.bodies), self._world.world_count
+        touch = np.zeros((count, count), dtype=bool)
+        friction = np.zeros((worlds, count, count))
+        for a, one in enumerate(self.bodies):
+            for b, other in enumerate(self.bodies):
+                if a != b and not (one in self.rigid and other in self.rigid):
+                    touch[a, b] = rules.touch(one, other)
+                mu = rules.friction.get(frozenset((one.key, other.key)))
+                mean = np.sqrt(np.asarray(one.friction) * np.asarray(other.friction))
+                friction[:, a, b] = mean if mu is None else mu
+        return touch, friction
+
+    def _surface(self, body: Body) -> SurfaceOfRigid:
+        own: Any = body._dynamics
+        parts, points = [], []
+        for part in own.parts:
+            place = (np.zeros(3) if part.position is None else part.position) - own.centre
+            turn = quat.IDENTITY if part.quaternion is None else part.quaternion
+            kind, mesh, corners = KINDS[part.kind], None, np.zeros((0, 3))
+            radius = float(np.linalg.norm(np.maximum(np.abs(part.low), np.abs(part.high))))
+            if kind == BOX:
+                signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
+                corners = signs * part.half
+            elif kind == CYLINDER:
+                angle = np.arange(RIM_POINTS) * (2 * np.pi / RIM_POINTS)
+                rim = np.stack([np.cos(angle) * part.half[0], np.sin(angle) * part.half[0]], axis=-1)
+                corners = np.concatenate([np.insert(rim, 2, z, axis=1) for z in (-part.half[1], part.half[1])])
+            elif kind == SOLID_MESH:
+                corners = part.corners
+                mesh = self._hull_mesh(part)
+            parts.append(RigidPart(kind, part.half, place, turn, radius, mesh))
+            points.append(place + quat.rotate(turn, corners))
+        return SurfaceOfRigid(own.slot, tuple(parts), np.concatenate(points))
+
+    def _hull_mesh(self, part: Any) -> Any:
+        faces = np.concatenate([np.stack([np.full(len(r) - 2, r[0]), r[1:-1], r[2:]], axis=1) for r in part.loops])
+        device = str(self._world.device)
+        mesh = wp.Mesh(
+            points=wp.array(part.corners.astype(np.float32), dtype=wp.vec3, device=device),
+            indices=wp.array(faces.astype(np.int32).ravel(), dtype=int, device=device),
+        )
+        self._meshes.append(mesh)
+        return mesh
+
+    def _make_ties(self) -> Ties:
+        worlds, device = self._world.world_count, str(self._world.device)
+        corners, weights, slots, points, compliance = [], [], [], [], []
+        self._tie_counts: list[int] = []
+        for grip in self._point_ties:
+            spec: TieSpec = grip._spec
+            k = spec.corners.shape[1]
+            self._tie_counts.append(k)
+            first = self._first[grip.body]
+            four = np.full((worlds, k, 4), -1, dtype=np.int32)
+            share = np.zeros((worlds, k, 4))
+            own = spec.corners >= 0
+            if spec.places is not None:
+                four[..., :3] = np.where(own, spec.corners + first, -1)
+                share[..., :3] = np.where(own, spec.weights, 0.0)
+                other: Any = grip.target._dynamics  # type: ignore[union-attr]
+                slots.append(np.full((worlds, k), other.slot))
+                points.append(spec.places - other.centre)
+            else:
+                assert spec.other_corners is not None and spec.other_weights is not None
+                four[..., :1] = np.where(own, spec.corners + first, -1)[..., :1]
+                share[..., 0] = 1.0
+                four[..., 1:] = spec.other_corners + self._first[grip.target]  # type: ignore[index]
+                share[..., 1:] = -spec.other_weights
+                slots.append(np.full((worlds, k), -1))
+                points.append(np.zeros((worlds, k, 3)))
+            corners.append(four)
+            weights.append(share)
+            compliance.append(np.full(k, spec.compliance))
+        ties = Ties()
+        ties.count = sum(self._tie_counts)
+
+        def put(values: list[np.ndarray], dtype: Any, columns: int = 0) -> wp.array:
+            kind = np.int32 if dtype in (int, wp.vec4i) else np.float32
+            empty = np.zeros((1, columns) if columns else 1)
+            joined = np.concatenate(values, axis=min(1, values[0].ndim - 1)) if values else empty
+            joined = joined.reshape(-1, columns) if columns else joined.ravel()
+            return wp.array(np.ascontiguousarray(joined, dtype=kind), dtype=dtype, device=device)
+
+        ties.corners, ties.weights = put(corners, wp.vec4i, 4), put(weights, wp.vec4, 4)
+        ties.slot, ties.point, ties.compliance = put(slots, int), put(points, wp.vec3, 3), put(compliance, float)
+        for name in ("pull", "total"):
+            setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=wp.vec3, device=device))
+        return ties
+
+    def _tie_points(self, grip: Grip) -> np.ndarray:
+        """(worlds, k, 3), where the points of the body are now."""
+        spec: TieSpec = grip._spec
+        worlds = self._world.world_count
+        own = np.broadcast_to(grip.body._vertices(), (worlds, *grip.body._vertices().shape[-2:]))
+        rows = np.arange(worlds)[:, None, None]
+        weights = np.where(spec.corners >= 0, spec.weights, 0.0)
+        return np.einsum("wkc,wkcx->wkx", weights, own[rows, np.maximum(spec.corners, 0)])
+
+    def _make_holds(self) -> Holds:
+        worlds, device, count = self._world.world_count, str(self._world.device), len(self._frame_holds)
+        holds = Holds()
+        holds.count = count
+        slots = [grip.body._dynamics.slot for grip in self._frame_holds]  # type: ignore[union-attr]
+        leaders = [
+            -1
+            if grip.target is None or not isinstance(grip.target._dynamics, RigidDynamics)
+            else grip.target._dynamics.slot
+            for grip in self._frame_holds
+        ]
+        holds.slot = wp.array(np.array(slots or [0], np.int32), dtype=int, device=device)
+        holds.leader = wp.array(np.array(leaders or [-1], np.int32), dtype=int, device=device)
+        soft = [grip.compliance for grip in self._frame_holds] or [0.0]
+        holds.compliance = wp.array(np.array(soft, np.float32), dtype=float, device=device)
+        axes = [np.zeros(3) if grip._spec.free is None else grip._spec.free for grip in self._frame_holds]
+        axes = axes or [np.zeros(3)]
+        holds.free = wp.array(np.tile(np.array(axes, np.float32), (worlds, 1)), dtype=wp.vec3, device=device)
+        room = max(1, worlds * count)
+        holds.place = wp.zeros(2 * room, dtype=wp.vec3, device=device)
+        holds.turn = wp.zeros(2 * room, dtype=wp.quat, device=device)
+        for name in ("pull", "twist", "total", "total_twist"):
+            setattr(holds, name, wp.zeros(room, dtype=wp.vec3, device=device))
+        return holds
+
+    def _lead_holds(self, time: float, duration: float) -> None:
+        """Where the held bodies' centres of mass are to be when the frame begins and ends."""
+        if not self._frame_holds:
+            return
+        worlds, holds = self._world.world_count, self.coupling.holds
+        place = np.zeros((worlds, len(self._frame_holds), 2, 3))
+        turn = np.zeros((worlds, len(self._frame_holds), 2, 4))
+        for k, grip in enumerate(self._frame_holds):
+            spec: HoldSpec = grip._spec
+            own: Any = grip.body._dynamics
+            if grip._offsets is not None and grip.target is not None:
+                # a static leader: from where it led last to where it is now
+                goal = [np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(grip.target._pose(), grip._offsets)]
+                last = getattr(grip, "_last_pose", goal)
+                grip._last_pose = goal  # type: ignore[attr-defined]
+                poses: list[Any] = [last, goal]
+            else:
+                poses = [spec.at(time), spec.at(time + duration)]
+            leads = int(holds.leader.numpy()[k]) >= 0
+            for end, (p, q) in enumerate(poses):
+                centre = quat.rotate(q, np.broadcast_to(own.centre, p.shape))
+                place[:, k, end] = p + centre
+                if leads:
+                    place[:, k, end] -= grip.target._dynamics.centre  # type: ignore[union-attr]
+                else:
+                    place[:, k, end] -= self.coupling.origin
+                turn[:, k, end] = q
+        device = str(self._world.device)
+        holds.place.assign(wp.array(place.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=device))
+        turns = np.roll(turn.reshape(-1, 4), -1, axis=-1).astype(np.float32)
+        holds.turn.assign(wp.array(turns, dtype=wp.quat, device=device))

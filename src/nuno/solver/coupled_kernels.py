@@ -1,0 +1,120 @@
+"""Kernels around the contacts of coupled bodies: particles in and out of their solvers' layout, and the passes."""
+
+import warp as wp
+
+from nuno.contact.coupled_rows import Particles, Rows, drag_row, push_row, share, take_sums
+from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
+from nuno.solver.lanes import barrier
+from nuno.solver.rigid_body import RigidState
+
+LAST_PASSES = wp.constant(4)
+"""Passes over friction alone at the end: what the last pushes moved sideways, by normals that differ a little, would
+otherwise creep."""
+ENOUGH = wp.constant(1.0e-8)
+"""[m] Passes end, where one thread works, once nothing is farther than this from where it should be."""
+
+
+@wp.struct
+class Layout:
+    """A solver's particles: x, y, z and the rest as plain floats, ``lanes`` worlds beside each other."""
+
+    particles: int
+    lanes: int
+    first: int  # of the body's particles among those of the coupled bodies
+    x: wp.array(dtype=float)
+    y: wp.array(dtype=float)
+    z: wp.array(dtype=float)
+    px: wp.array(dtype=float)
+    py: wp.array(dtype=float)
+    pz: wp.array(dtype=float)
+    w: wp.array(dtype=float)
+    offset: wp.array(dtype=wp.vec3)  # (worlds), from the coupled bodies' origin to the solver's
+
+
+@wp.func
+def place_of(layout: Layout, world: int, i: int):
+    """Where particle i of a world is in the solver's arrays."""
+    return ((world / layout.lanes) * layout.particles + i) * layout.lanes + world % layout.lanes
+
+
+@wp.kernel(enable_backward=False)
+def collect(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)):
+    """Copy a body's particles; ``start`` keeps how far they had come, to tell what the contacts moved."""
+    world, i = wp.tid()
+    k = place_of(layout, world, i)
+    j = world * particles.count + layout.first + i
+    p = wp.vec3(layout.px[k], layout.py[k], layout.pz[k])
+    u = wp.vec3(layout.x[k], layout.y[k], layout.z[k]) - p
+    particles.p[j] = p + layout.offset[world]
+    particles.u[j] = u
+    start[j] = u
+    particles.w[j] = layout.w[k]
+
+
+@wp.kernel(enable_backward=False)
+def scatter(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)):
+    """Move a body's particles by what the contacts moved them; what they left alone keeps its bits."""
+    world, i = wp.tid()
+    k = place_of(layout, world, i)
+    j = world * particles.count + layout.first + i
+    d = particles.u[j] - start[j]
+    layout.x[k] = layout.x[k] + d[0]
+    layout.y[k] = layout.y[k] + d[1]
+    layout.z[k] = layout.z[k] + d[2]
+
+
+@wp.kernel(enable_backward=False)
+def solve(
+    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, dt: float, fraction: float,
+    passes: int, threads: int,
+):  # fmt: skip
+    """All contacts and ties of a world, up to ``passes`` times: one after the other, or by many threads at once."""
+    tid = wp.tid()
+    world = tid / threads
+    thread = tid % threads
+    first = world * particles.count
+    start = world * rigid.capacity
+    base = world * rows.room
+    count = rows.active_count[world]
+    if threads > 1:
+        for k in range(thread, count, threads):
+            share(particles, rigid, first, start, rows, rows.active[base + k], 1)
+        barrier(threads)
+    if thread == 0:
+        for k in range(ties.count):
+            ties.pull[world * ties.count + k] = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(holds.count):
+            holds.pull[world * holds.count + k] = wp.vec3(0.0, 0.0, 0.0)
+            holds.twist[world * holds.count + k] = wp.vec3(0.0, 0.0, 0.0)
+    done = int(0)
+    for k_pass in range(passes + LAST_PASSES):
+        if done == 0:
+            wrong = float(0.0)
+            for k in range(thread, count, threads):
+                r = rows.active[base + k]
+                if k_pass < passes:
+                    wrong = wp.max(wrong, push_row(particles, rigid, first, start, rows, r, threads))
+                wrong = wp.max(wrong, drag_row(particles, rigid, first, start, rows, r, threads))
+            barrier(threads)
+            if threads > 1:
+                take_sums(particles, rigid, first, start, thread, threads)
+                barrier(threads)
+            if thread == 0:
+                for k in range(ties.count):
+                    wrong = wp.max(wrong, project_tie(particles, rigid, ties, world, k, dt))
+                for k in range(holds.count):
+                    wrong = wp.max(wrong, project_hold(rigid, holds, world, k, dt, fraction))
+            barrier(threads)
+            if threads == 1 and wrong < ENOUGH:
+                done = 1
+    if thread == 0:
+        for k in range(ties.count):
+            r = world * ties.count + k
+            ties.total[r] = ties.total[r] + ties.pull[r]
+        for k in range(holds.count):
+            r = world * holds.count + k
+            holds.total[r] = holds.total[r] + holds.pull[r]
+            holds.total_twist[r] = holds.total_twist[r] + holds.twist[r]
+    if threads > 1:
+        for k in range(thread, count, threads):
+            share(particles, rigid, first, start, rows, rows.active[base + k], -1)

@@ -1,0 +1,246 @@
+"""Bodies that touch each other, stepped together: their own phases, and between them the contacts that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from nuno.contact.coupled_geometry import measure_rows
+from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
+from nuno.contact.coupled_rows import Particles, Rows
+from nuno.contact.coupled_ties import Holds, Ties
+from nuno.solver.coupled_kernels import Layout, collect, scatter, solve
+from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.rigid_body import RigidState
+from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PULLS, SHAPES, SPEED, VELOCITIES
+
+BLOCK_THREADS = 256
+"""Threads of a CUDA block, which handles one world."""
+PASSES = 24
+"""Passes over the shared contacts in a substep, at most: a push of 5 N on a vertex of 50 mg, held between two fingers,
+then leaves 0.1 mm of overlap at 20 substeps a frame."""
+QUICKER = 1.5
+"""Times its present speed that a body may have within the frame, besides what gravity adds."""
+
+
+class Coupling:
+    """The contacts and ties of some bodies.
+
+    Args:
+        solvers: Those of cloths and soft bodies, in the order of the elements' bodies.
+        rigid: The rigid solver, or None.
+        slots: The rigid bodies that take part.
+        elements: Surfaces and what touches what.
+        ties: Points that stay together.
+        holds: Rigid bodies that are held in a frame.
+    """
+
+    def __init__(
+        self,
+        solvers: Sequence[ParticleSolver],
+        rigid: Any,
+        slots: Sequence[int],
+        elements: Elements,
+        ties: Ties,
+        holds: Holds,
+    ) -> None:
+        self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
+        self._elements, self._ties, self.holds = elements, ties, holds
+        self._scale = self._rate = 0.0
+        self._listed = 0
+        first = rigid if rigid is not None else solvers[0]
+        self.device, self.world_count = str(first.device), int(first.world_count)
+        self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
+        self._state = RigidState() if rigid is None else rigid.state
+        self.origin = solvers[0].origin if rigid is None else rigid.origin  # (worlds, 3) [m]
+        self._layouts: list[Layout] = []
+        total = 0
+        for solver in self._solvers:
+            self._layouts.append(self._layout(solver, total))
+            total += solver.particle_count
+        self._particles = self._room(total)
+        self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
+        sizes = [solver._cell_size for solver in self._solvers]
+        self._margin = 0.5 * min(sizes) if sizes else 0.01
+        self._apart = 2.0 * float(elements.radius.numpy().max(initial=0.0))
+        self._rows = self._row_room(4 * total + 512)
+        self._bvh: Any = None
+        self.led: list[int] = []
+
+    def _room(self, total: int) -> Particles:
+        worlds, capacity = self.world_count, max(1, int(self._state.capacity))
+        made = Particles()
+        made.count = total
+
+        def zeros(count: int, dtype: Any) -> wp.array:
+            return wp.zeros(max(1, count), dtype=dtype, device=self.device)
+
+        made.p, made.u, made.w = (zeros(worlds * total, kind) for kind in (wp.vec3, wp.vec3, float))
+        many = self._threads > 1
+        made.sharers, made.moved = zeros(many * worlds * total, int), zeros(many * 3 * worlds * total, int)
+        made.body_sharers, made.body_moved = (
+            zeros(many * worlds * capacity, int),
+            zeros(many * 6 * worlds * capacity, int),
+        )
+        return made
+
+    def _row_room(self, room: int) -> Rows:
+        rows, worlds = Rows(), self.world_count
+        rows.room = room
+        rows.count = wp.zeros(worlds, dtype=int, device=self.device)
+        rows.active_count = wp.zeros(worlds, dtype=int, device=self.device)
+        kinds = {
+            "corners": wp.vec4i, "kind": int, "slot": int, "part": int, "bodies": wp.vec2i, "point": wp.vec3,
+            "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "push": float,
+            "drag": wp.vec3, "active": int,
+        }  # fmt: skip
+        for name, dtype in kinds.items():
+            setattr(rows, name, wp.zeros(worlds * room, dtype=dtype, device=self.device))
+        return rows
+
+    def _layout(self, solver: ParticleSolver, first: int) -> Layout:
+        made = Layout()
+        made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, first
+        for name in PARTICLE_ARRAYS:
+            if not name.startswith("v"):
+                setattr(made, name, _floats(getattr(solver._state, name)))
+        offset = (solver.origin - self.origin).astype(np.float32)
+        made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
+        return made
+
+    # -- running
+
+    def run_frame(self, time: float, duration: float, substeps: int) -> None:
+        """Advance all bodies by ``duration`` [s] in ``substeps`` substeps."""
+        dt = duration / substeps
+        for k, solver in enumerate(self._solvers):
+            solver.open(time, dt, substeps)
+            # a grip or a new state may have replaced what the layout names
+            self._layouts[k] = self._layout(solver, int(self._layouts[k].first))
+        if self._rigid is not None:
+            self._rigid.open(time, dt, [*self._slots, *self.led])
+        for total in (self._ties.total, self.holds.total, self.holds.total_twist):
+            total.zero_()
+        self._rate = 1.0 / (dt * dt)
+        self._scale = self._rate / substeps
+        speed = QUICKER * self._speed() + 10.0 * duration + 0.1
+        reach = 2.0 * speed * dt
+        margin = max(min(self._margin, (1 + substeps / 3) * reach), 1.5 * reach)
+        every = max(1, int((margin - reach) / reach))
+        for k in range(substeps):
+            for solver in self._solvers:
+                solver.step_parts(k, MOTION | PULLS | LAYERS)
+            if self._rigid is not None:
+                self._rigid.predict()
+            self._touch(k, every, margin, reach, dt, (k + 1) / substeps)
+            if self._rigid is not None:
+                self._rigid.contacts()
+            for solver in self._solvers:
+                solver.step_parts(k, SHAPES | VELOCITIES)
+            if self._rigid is not None:
+                self._rigid.finish()
+
+    def _touch(self, k: int, every: int, margin: float, reach: float, dt: float, fraction: float) -> None:
+        worlds, particles, rows, elements = self.world_count, self._particles, self._rows, self._elements
+
+        def go(kernel: Any, dim: Any, *inputs: Any) -> None:
+            wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device, block_dim=BLOCK_THREADS)
+
+        for layout in self._layouts:
+            go(collect, (worlds, layout.particles), layout, particles, self._start)
+        if k % every == 0:
+            self._list(margin)
+            rows = self._rows
+        if self._listed:
+            rows.active_count.zero_()
+            go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt, reach)
+        if self._listed or self._ties.count or self.holds.count:
+            go(
+                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, dt, fraction,
+                PASSES, self._threads,
+            )  # fmt: skip
+            for layout in self._layouts:
+                go(scatter, (worlds, layout.particles), layout, particles, self._start)
+
+    def _list(self, margin: float) -> None:
+        """Find the candidates anew, in more room where they do not fit."""
+        worlds, elements = self.world_count, self._elements
+        bvh = wp.uint64(0)
+        if elements.triangles:
+            wp.launch(
+                bound_triangles, dim=(worlds, elements.triangles), inputs=[self._particles, elements],
+                device=self.device,
+            )  # fmt: skip
+            if self._bvh is None:
+                owner = np.repeat(np.arange(worlds, dtype=np.int32), elements.triangles)
+                groups: Any = wp.array(owner, dtype=int, device=self.device)
+                self._bvh = wp.Bvh(elements.low, elements.high, groups=groups)
+            else:
+                self._bvh.refit()
+            bvh = self._bvh.id
+        while True:
+            self._rows.count.zero_()
+            wp.launch(
+                list_rows, dim=worlds * self._threads, block_dim=BLOCK_THREADS, device=self.device,
+                inputs=[self._particles, self._state, elements, self._rows, bvh, self._apart + margin, self._threads],
+            )  # fmt: skip
+            self._listed = int(self._rows.count.numpy().max())
+            if self._listed <= self._rows.room:
+                return
+            self._rows = self._row_room(self._listed + self._listed // 2)
+
+    def _speed(self) -> float:
+        """The largest speed of any particle or rigid body [m/s]."""
+        top = max((float(s._get(s._state.notes, NOTES)[:, SPEED].max()) for s in self._solvers), default=0.0)
+        top = float(np.sqrt(top))
+        if self._rigid is None:
+            return top
+
+        def sizes(array: wp.array) -> np.ndarray:
+            return np.linalg.norm(array.numpy().reshape(self.world_count, -1, 3)[:, self._slots], axis=-1)
+
+        radius = self._rigid.rules.radius.numpy()[self._slots]
+        return max(top, float((sizes(self._state.velocity) + sizes(self._state.spin) * radius).max()))
+
+    # -- what the last frame took
+
+    def contacts(self) -> list[tuple[int, tuple[int, int], np.ndarray, np.ndarray, np.ndarray]]:
+        """What pushed in the last substep: world, the two bodies, point [m], normal and force [N] on the first."""
+        rows, particles, worlds = self._rows, self._particles, self.world_count
+        counts = rows.active_count.numpy() if self._listed else np.zeros(worlds, int)
+        names = ("push", "drag", "normal", "weights", "corners", "bodies")
+        push, drag, normal, weights, corners, bodies = (getattr(rows, name).numpy() for name in names)
+        place = particles.p.numpy() + particles.u.numpy()
+        found = []
+        for world in range(worlds):
+            base = world * rows.room
+            for r in rows.active.numpy()[base : base + counts[world]]:
+                if push[r] > 0.0:
+                    ours = (corners[r] >= 0) & (weights[r] > 0.0)
+                    share = weights[r][ours] / weights[r][ours].sum()
+                    point = share @ place[world * particles.count + corners[r][ours]]
+                    force = (push[r] * normal[r] + drag[r]).astype(float) * self._rate
+                    pair = (int(bodies[r][0]), int(bodies[r][1]))
+                    found.append((world, pair, point + self.origin[world], normal[r].astype(float), force))
+        return found
+
+    def tie_forces(self) -> np.ndarray:
+        """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
+        return self._per_world(self._ties.total, self._ties.count)
+
+    def hold_wrenches(self) -> tuple[np.ndarray, np.ndarray]:
+        """(worlds, holds, 3) each, the mean force [N] and torque [N m] on the held bodies' centres of mass."""
+        count = self.holds.count
+        return self._per_world(self.holds.total, count), self._per_world(self.holds.total_twist, count)
+
+    def _per_world(self, array: wp.array, count: int) -> np.ndarray:
+        return array.numpy().reshape(self.world_count, -1, 3)[:, :count].astype(float) * self._scale
+
+
+def _floats(array: wp.array) -> wp.array:
+    """An array of floats or of vectors of them as plain floats, without a copy."""
+    count = array.capacity // 4
+    return wp.array(ptr=array.ptr, dtype=float, shape=(count,), device=array.device, copy=False)

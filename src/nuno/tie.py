@@ -1,0 +1,159 @@
+"""What a grip is between bodies that both move, and how a rigid body is held: the numbers that a step needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno import quaternion as quat
+from nuno.coordinates import Pose, apply, compose, invert
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.path import Path
+from nuno.surface import closest_points
+from nuno.validation import finite_array
+
+if TYPE_CHECKING:
+    from nuno.body import Body
+    from nuno.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class TieSpec:
+    """Points of a cloth or soft body that stay on points of another body that moves.
+
+    Attributes:
+        corners: (worlds, k, 3) int32, the vertices of each point, -1 for no point in this world.
+        weights: (worlds, k, 3) float64, the vertices' weights.
+        other_corners: Likewise of the other body where that is a cloth or soft body, or None.
+        other_weights: Likewise.
+        places: (worlds, k, 3) float64 [m] in the other body's frame where that is rigid, or None.
+        compliance: [m/N], 0 is stiff.
+    """
+
+    corners: np.ndarray
+    weights: np.ndarray
+    other_corners: np.ndarray | None
+    other_weights: np.ndarray | None
+    places: np.ndarray | None
+    compliance: float
+
+
+@dataclass(frozen=True, eq=False)
+class HoldSpec:
+    """A rigid body whose frame is led by key poses, or by another body's frame.
+
+    Attributes:
+        times: (m,) float64 [s] of the world's clock.
+        positions: (worlds, m, 3) float64 [m], of the body's frame; in the leader's frame where it has one.
+        quaternions: (worlds, m, 4) float64, likewise.
+        interpolation: "linear" or "minimum_jerk".
+        free: (3,) float64, the direction along which the body slides freely, of length 1, or None.
+        compliance: [m/N], and [1/(N m)] for turns; 0 is stiff.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+    interpolation: str
+    free: np.ndarray | None
+    compliance: float
+
+    def at(self, time: float) -> Pose:
+        """Return positions (worlds, 3) and quaternions (worlds, 4) at a time [s]."""
+        path = Path(self.times, self.positions, self.quaternions, self.interpolation)  # type: ignore[arg-type]
+        return path.at(time), path.quaternion_at(time)
+
+
+def spread_spec(spec: Any, batched: Any) -> Any:
+    """Return a tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
+    names = ("corners", "weights", "other_corners", "other_weights", "places", "positions", "quaternions")
+    return replace(spec, **{name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)})
+
+
+def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:
+    """Return what ties points of ``body`` to the nearest points of ``other``, where both are now.
+
+    Raises:
+        InvalidInputError: points that the body does not have.
+    """
+    from nuno.grip import points_of
+
+    worlds = world.world_count
+    vertices, corners, weights = points_of(body, where, worlds)
+    if vertices is not None:
+        corners = np.stack([vertices, np.full_like(vertices, -1), np.full_like(vertices, -1)], axis=-1)
+        weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+    assert corners is not None and weights is not None
+    assert other._dynamics is not None
+    own = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
+    rows = np.arange(worlds)[:, None, None]
+    held = np.einsum("wkc,wkcx->wkx", np.where(corners >= 0, weights, 0.0), own[rows, np.maximum(corners, 0)])
+    if other._dynamics.is_rigid:
+        places = np.broadcast_to(apply(invert(other._pose()), held), held.shape)
+        return TieSpec(corners.astype(np.int32), np.array(weights), None, None, np.array(places), compliance)
+    # four particles in all: one of this body, three of the other
+    heaviest = np.argmax(weights, axis=-1)[..., None]
+    single = np.take_along_axis(corners, heaviest, axis=-1)
+    corners = np.concatenate([single, np.full_like(single, -1), np.full_like(single, -1)], axis=-1)
+    theirs, faces = np.broadcast_to(other.vertices, (worlds, *other.vertices.shape[-2:])), other.faces
+    found = [closest_points(own[w, np.maximum(single[w, :, 0], 0)], theirs[w], faces) for w in range(worlds)]
+    return TieSpec(
+        corners.astype(np.int32), np.broadcast_to([1.0, 0.0, 0.0], corners.shape).copy(),
+        np.stack([faces[f.faces] for f in found]).astype(np.int32), np.stack([f.barycentric for f in found]), None,
+        compliance,
+    )  # fmt: skip
+
+
+def make_hold(
+    body: Body, to: Any, target: Body | None, free: Any, compliance: float, world: Simulation
+) -> tuple[HoldSpec, Pose | None]:
+    """Return what holds a rigid body, and its pose in the frame of a static leader.
+
+    Raises:
+        InvalidInputError: a target that cannot be used.
+    """
+    worlds = world.world_count
+    place, turn = (np.broadcast_to(a, (worlds, a.shape[-1])) for a in body._pose())
+    axis = None
+    if free is not None:
+        axis = finite_array("free", free, (3,))
+        if np.linalg.norm(axis) < 1e-9:
+            raise InvalidInputError(f"free must be a direction (3,) of some length, got {free!r}")
+        axis = axis / np.linalg.norm(axis)
+    now = np.array([world.time])
+    if target is not None:
+        place, turn = (
+            np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(invert(target._pose()), (place, turn))
+        )
+        spec = HoldSpec(now, place[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance)
+        return spec, None if target._dynamics is not None else (place.copy(), turn.copy())
+    if isinstance(to, Path):
+        if to.world_count not in (None, worlds):
+            raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {worlds}")
+        m = len(to.times)
+        positions = np.broadcast_to(to.positions, (worlds, m, 3))
+        turns = np.broadcast_to(turn[:, None], (worlds, m, 4))
+        if to.quaternions is not None:
+            # the body keeps its present turn against the path's
+            start = np.broadcast_to(to.quaternion_at(world.time), (worlds, 4))
+            turns = quat.multiply(
+                np.broadcast_to(to.quaternions, (worlds, m, 4)), quat.multiply(quat.inverse(start), turn)[:, None]
+            )
+        return HoldSpec(to.times, positions.copy(), turns.copy(), str(to.interpolation), axis, compliance), None
+    goal = np.broadcast_to(finite_array("to, where it is no Path or Body,", to, (3,), (worlds, 3)), (worlds, 3))
+    return HoldSpec(now, goal[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance), None
+
+
+def check_weld(a: Body, b: Body) -> None:
+    """Check that two bodies can be welded.
+
+    Raises:
+        BodyStateError: one of them is static.
+    """
+    for body in (a, b):
+        if body._dynamics is None:
+            raise BodyStateError(
+                f"{body.name!r} is static; weld joins two dynamic bodies, grip holds one to a static body"
+            )
