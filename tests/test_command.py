@@ -61,7 +61,7 @@ def check_result(result, n, m):
     assert sorted(entry[:2] for entry in result["ranking"]) == [[i, j] for i in range(n) for j in range(m)]
     scores = [score for _, _, score in result["ranking"]]
     assert scores == sorted(scores, reverse=True) and result["ranking"][0][:2] == result["pick"]
-    assert result["score_name"] == "log_evidence"
+    assert result["score_name"] == "log_evidence_with_pattern"
     assert len(result["eq1"]) == n * m and all(0.0 <= value <= 1.0 for value in result["eq1"])
     assert 0.0 <= result["confidence"] <= 1.0 and result["warnings"] == []
     cloth = result["cloth"]

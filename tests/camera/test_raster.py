@@ -299,3 +299,15 @@ def test_bad_arguments_are_refused():
         raster.clear(keys, raster.key_images(1, Region(0, 0, 8, 8), "cpu"))
     with pytest.raises(InvalidInputError, match="world"):
         raster.key_images(0, Region.full(PLAIN), "cpu")
+
+
+def test_faces_by_their_own_index():
+    """With label None a key names the face in front: the nearer of two squares, by its two triangles."""
+    far, faces = _square(8, 8, 40, 40, 2.0)
+    near, _ = _square(24, 8, 40, 40, 1.0)
+    keys = _draw(PLAIN, np.concatenate([far, near]), np.concatenate([faces, faces + 4]), label=None, ids=True)
+    ids = raster.ids_of(keys).numpy()[0]
+    assert set(np.unique(ids[9:39, 9:23])) == {0, 1} and set(np.unique(ids[9:39, 25:39])) == {2, 3}
+    assert (ids[50:] == -1).all()
+    with pytest.raises(InvalidInputError, match="int32 keys take labels 0 to 1, got 3"):
+        _draw(PLAIN, np.concatenate([far, near]), np.concatenate([faces, faces + 4]), label=None)

@@ -202,5 +202,7 @@ def test_grid_points() -> None:
     for i, j in itertools.product(range(6), range(4)):
         assert np.allclose(grid[i, j], c00 + i / 5 * (ci - c00) + j / 3 * (cj - c00), atol=1e-12)
     assert np.allclose(grid[5, 3], opposite, atol=1e-9)
+    fractions = np.stack(np.meshgrid(np.arange(6) / 5, np.arange(4) / 3, indexing="ij"), axis=-1)
+    assert np.allclose(found.fractions(grid + np.array((0.0, 0.0, 0.3))), fractions, atol=1e-9)  # also above the plane
     with pytest.raises(InvalidInputError):
         found.grid_points(1, 6)

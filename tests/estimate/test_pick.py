@@ -139,6 +139,25 @@ def test_points_instead_of_a_grid(result, seen):
     assert all(isinstance(value, float) for value in found.best)
 
 
+def test_images_of_a_plain_cloth_change_nothing(small, seen):
+    """Its pattern says nothing: scores are those of masks alone, on request bit for bit.
+
+    A residual that is 0 comes out as the float32 rounding of sums of squares of about 3: some 1e-6 beside the floor of
+    0.003, halved and 25 times that in the evidence.
+    """
+    images = [
+        np.where(seen[0][mask][..., None], (150, 90, 60), (60, 70, 80)).astype(np.uint8)
+        for mask in ("before_mask", "after_mask")
+    ]
+    looks = nuno.estimate_pick(*images, **options(seen, candidates=(3, 2), rectangle=small.rectangle))
+    assert looks.score_name == "log_evidence_with_pattern" and small.score_name == "log_evidence"
+    np.testing.assert_allclose(looks.scores, small.scores, rtol=0, atol=12.5 * 1e-6 / 0.003)
+    given = options(seen, candidates=(3, 2), rectangle=small.rectangle, score="silhouette")
+    masks = nuno.estimate_pick(*images, **given)
+    assert masks.score_name == "log_evidence"
+    np.testing.assert_array_equal(masks.scores, small.scores)
+
+
 @pytest.mark.parametrize(("score", "name"), [("iou", "iou"), ("eq1", "eq1")])
 def test_other_scores(score, name, result, seen):
     """They rank by another measure; the paper's is what eq1 reports."""

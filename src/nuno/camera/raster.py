@@ -5,7 +5,7 @@ the minimum of keys. An integer minimum does not depend on order, so an image ha
 of worlds, threads or devices' schedulers. Two kinds of key images exist:
 
 - int32, one label bit: 0 where the wanted body is in front, 1 elsewhere (masks; half the memory);
-- int64, twenty label bits: the index of the body in front (ids).
+- int64, twenty label bits: the index of the body in front (ids), or of the face in front.
 
 Every launcher takes views, so a caller may draw slices of worlds from several threads (a launch on the CPU
 runs on the calling thread and releases the GIL): ``draw(keys[a:b], positions[a:b], ...)``. Call :func:`load`
@@ -36,6 +36,7 @@ wp.set_module_options({"enable_backward": False})
 
 DEPTH_STEP = 1.0e-5  # [m]; 1 m of float32 depth has steps of 0.1 um, cloth and table are about 1 mm apart
 ID_BITS = 20
+LAST_LABEL = (1 << ID_BITS) - 1  # of int64 keys
 MASK_BACKGROUND = 2**31 - 1
 ID_BACKGROUND = 2**63 - 1
 SUBPIXELS = 256
@@ -214,6 +215,9 @@ def _draw_triangles(
 ):
     """One thread draws one triangle of one world."""
     world, face = wp.tid()
+    name = label
+    if label < 0:
+        name = face
     corners = faces[face]
     a = v.rotation * (positions[world, corners[0]] - v.origin)
     b = v.rotation * (positions[world, corners[1]] - v.origin)
@@ -251,7 +255,7 @@ def _draw_triangles(
             else:
                 q = p - offset
             p = p + offset
-        _clip_and_fill(p, q, r, v, world, label, shift, keys)
+        _clip_and_fill(p, q, r, v, world, name, shift, keys)
 
 
 @wp.kernel
@@ -334,7 +338,7 @@ def clear(keys: wp.array, layer: wp.array | None = None) -> None:
 
 
 def draw(
-    keys: wp.array, positions: wp.array, faces: wp.array, seen: View, label: int, *, thickness: float = 0.0
+    keys: wp.array, positions: wp.array, faces: wp.array, seen: View, label: int | None, *, thickness: float = 0.0
 ) -> None:
     """Draw the triangles of every world into its key image.
 
@@ -344,7 +348,7 @@ def draw(
         faces: (m,) vec3i vertex indices, on the same device.
         seen: From :func:`nuno.camera.view.view`.
         label: int32 keys: 0 for the wanted body, 1 for whatever may hide it (at equal depth, 0 is seen).
-            int64 keys: an index from 0 to 2**20 - 1.
+            int64 keys: an index from 0 to 2**20 - 1, or None, by which every face gets its own index.
         thickness: [m], of a sheet: its triangles are drawn twice, moved by half of it to either side, and as
             prisms where they are seen nearly edge-on (they would vanish otherwise).
 
@@ -361,10 +365,11 @@ def draw(
         )
     if not 0.0 <= thickness < np.inf:
         raise InvalidInputError(f"thickness must be at least 0 [m], got {thickness}")
-    shift = _shift(keys, label)
+    shift = _shift(keys, faces.shape[0] - 1 if label is None else label)
+    given = -1 if label is None else label
     wp.launch(
         _draw_triangles, dim=(keys.shape[0], faces.shape[0]),
-        inputs=[positions, faces, seen, 0.5 * thickness, label, shift, keys], device=keys.device,
+        inputs=[positions, faces, seen, 0.5 * thickness, given, shift, keys], device=keys.device,
     )  # fmt: skip
 
 

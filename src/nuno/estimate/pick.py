@@ -21,6 +21,7 @@ from nuno.camera.segmentation import segment_after, segment_before
 from nuno.camera.table import Table
 from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, ImageError, InvalidInputError
+from nuno.estimate.appearance import find_pattern
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, score_futures
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.pick_result import PickResult
@@ -66,7 +67,8 @@ def estimate_pick(
 
     The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
     guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it
-    and compared with the real silhouette. What counts is how likely the silhouette is, averaged over all guesses.
+    and compared with the real silhouette. Where both images are given, the cloth's pattern is carried along and
+    compared too. What counts is how likely all this is, averaged over all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -89,7 +91,8 @@ def estimate_pick(
         rectangle: The cloth before, instead of measuring it.
         discretisations: Meshes, steps and guesses at the material, in the order in which they are run; the first
             one must look at all candidates.
-        score: What ranks: "evidence", "chamfer", "iou" or "eq1" (see `nuno.estimate.ranking`).
+        score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
+            `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
         progress: Progress bar; None shows one on a terminal.
 
@@ -138,7 +141,11 @@ def estimate_pick(
         )
     else:
         mask_after = check_mask(after_mask, camera, "after_mask")
-    small, real = _silhouette(mask_after, camera, hand_at, hand_radius)
+    hidden = _hidden(camera, hand_at, hand_radius)
+    small, real = _silhouette(mask_after, camera, hidden)
+    pattern = None
+    if score == "evidence" and image_before is not None and image_after is not None:
+        pattern = find_pattern(image_before, image_after, mask_after & ~hidden, rectangle, camera, hand_at)
     seconds["see"] = time.perf_counter() - clock
 
     seconds["imagine"] = seconds["compare"] = 0.0
@@ -156,8 +163,11 @@ def estimate_pick(
         )  # fmt: skip
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
-        values, drawn = score_futures(futures, small, real, table, keep_masks=not comparisons)
-        comparison = Comparison(chosen, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite)
+        values, drawn = score_futures(futures, small, real, table, pattern=pattern, keep_masks=not comparisons)
+        comparison = Comparison(
+            chosen, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
+            None if pattern is None else values["pattern"],
+        )  # fmt: skip
         if drawn is not None:
             masks = drawn[comparison.error(score).argmin(axis=0), np.arange(len(uv))]
         comparisons.append(comparison)
@@ -233,15 +243,19 @@ def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int
     return uv, uv, (2, 2)
 
 
-def _silhouette(mask: np.ndarray, camera: Camera, hand: np.ndarray, radius: float) -> tuple[Camera, Silhouette]:
+def _hidden(camera: Camera, hand: np.ndarray, radius: float) -> np.ndarray:
+    """(h, w) bool, the pixels that the hand may hide."""
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    centre = camera.project(hand)
+    reach = radius * max(camera.fx, camera.fy) / camera.depth_of(hand) + HAND_MARGIN
+    return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
+
+
+def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray) -> tuple[Camera, Silhouette]:
     """The real silhouette at the resolution of comparison, without the hand's pixels."""
     import cv2
 
     small = camera.scaled(IMAGE_SCALE)
-    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    centre = camera.project(hand)
-    reach = radius * max(camera.fx, camera.fy) / camera.depth_of(hand) + HAND_MARGIN
-    hidden = (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
 
     def shrink(image: np.ndarray) -> np.ndarray:
         return cv2.resize(image.astype(np.float32), (small.width, small.height), interpolation=cv2.INTER_AREA)

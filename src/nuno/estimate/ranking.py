@@ -1,10 +1,12 @@
 """From many comparisons of silhouettes to one ranking of the candidates.
 
 A candidate is imagined under several guesses at the material on several meshes. Which of them is right is not known,
-so the default ranking asks for the evidence of a candidate: the likelihood of the silhouette averaged over all guesses,
-with -log likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) up to a constant. The first term is the tail of a
-heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The two weights and the
-mean were chosen on generated cases (docs/performance.md).
+so the default ranking asks for the evidence of a candidate: the likelihood of the images averaged over all guesses,
+with -log likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a constant. The first term is the tail
+of a heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
+independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
+only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
+(docs/performance.md).
 """
 
 from __future__ import annotations
@@ -14,9 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RANKINGS = ("evidence", "chamfer", "iou", "eq1")
+RANKINGS = ("evidence", "silhouette", "chamfer", "iou", "eq1")
 CONTOUR_WEIGHT = 5.0
 OVERLAP_WEIGHT = 10.0
+PATTERN_WEIGHT = 25.0
+_EVIDENCE = ("evidence", "silhouette")
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +33,7 @@ class Comparison:
         iou: Intersection over union.
         eq1: The paper's eq. (1).
         finite: Whether the future's state is a number.
+        pattern: How badly the cloth's pattern fits, see `nuno.estimate.appearance`; None where only masks are known.
     """
 
     candidates: np.ndarray
@@ -36,11 +41,14 @@ class Comparison:
     iou: np.ndarray
     eq1: np.ndarray
     finite: np.ndarray
+    pattern: np.ndarray | None = None
 
     def error(self, score: str) -> np.ndarray:
         """(guesses, c) float, lower is better; infinite where the future is not finite."""
-        if score == "evidence":
+        if score in _EVIDENCE:
             error = CONTOUR_WEIGHT * np.log1p(self.chamfer) + OVERLAP_WEIGHT * (1.0 - self.iou)
+            if score == "evidence" and self.pattern is not None:
+                error = error + PATTERN_WEIGHT * self.pattern
         else:
             error = self.chamfer if score == "chamfer" else 1.0 - getattr(self, score)
         return np.where(self.finite, error, np.inf)
@@ -51,7 +59,8 @@ class Ranked:
     """Scores of the candidates.
 
     Attributes:
-        name: What the scores are: "log_evidence", "negative_chamfer_px", "iou" or "eq1".
+        name: What the scores are: "log_evidence" (of silhouettes), "log_evidence_with_pattern", "negative_chamfer_px",
+            "iou" or "eq1".
         scores: (k,) float, higher is better; -inf where no future stayed finite.
         eq1: (k,) float, the paper's similarity: the best guess of each mesh, averaged over meshes.
     """
@@ -82,20 +91,21 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
     total, guesses = np.zeros(count), 0
     errors = np.zeros(count)
     # scaled by the best of all, for exp would underflow far from it
-    offset = min(
-        (e[np.isfinite(e)].min(initial=np.inf) for e in (c.error("evidence") for c in comparisons)), default=0.0
-    )
+    kind = score if score in _EVIDENCE else "evidence"
+    offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(kind) for c in comparisons)), default=0.0)
     offset = offset if np.isfinite(offset) else 0.0
     for comparison in comparisons:
         at = comparison.candidates
         looked[at] += 1
         similar[at] += np.where(comparison.finite, comparison.eq1, 0.0).max(axis=0)
         guesses += len(comparison.chamfer)
-        total[at] += np.exp(offset - comparison.error("evidence")).sum(axis=0)
+        total[at] += np.exp(offset - comparison.error(kind)).sum(axis=0)
         errors[at] += comparison.error(score).min(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if score == "evidence":
-            return Ranked("log_evidence", np.log(total / guesses) - offset, similar / looked)
+        if score in _EVIDENCE:
+            looks = score == "evidence" and any(c.pattern is not None for c in comparisons)
+            name = "log_evidence_with_pattern" if looks else "log_evidence"
+            return Ranked(name, np.log(total / guesses) - offset, similar / looked)
         mean = errors / looked
         if score == "chamfer":
             return Ranked("negative_chamfer_px", -mean, similar / looked)
@@ -107,7 +117,7 @@ def confidence(name: str, first: float, second: float) -> float:
 
     For the evidence it is 1 - the ratio of both candidates' likelihoods, else 1 - the ratio of their errors.
     """
-    if name == "log_evidence":
+    if name.startswith("log_evidence"):
         return float(1.0 - np.exp(min(second - first, 0.0)))
     a, b = (-first, -second) if name == "negative_chamfer_px" else (1.0 - first, 1.0 - second)
     return float(np.clip(1.0 - a / b, 0.0, 1.0)) if b > 0 else 0.0
