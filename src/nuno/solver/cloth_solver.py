@@ -185,10 +185,12 @@ class ClothSolver(ParticleSolver):
             wp.launch(run_wide, dim=1, inputs=inputs, device=self.device)
         else:
             kernel = run_lanes if self.lanes > 1 else run_worlds
-            self._over_groups(
-                lambda first: wp.launch(kernel, dim=1, inputs=[*common, first, substeps, 1], device=self.device),
-                kernel.module,
-            )
+            before, after = common[:3], common[4:]
+
+            def launch(group: int, piece: Settings, count: int) -> None:
+                wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count, 1], device=self.device)
+
+            self._over_groups(launch, kernel.module, run, substeps)
 
     def _forget_launches(self) -> None:
         self._large = None

@@ -183,10 +183,12 @@ class SoftSolver(ParticleSolver):
             wp.launch(run_soft_wide, dim=1, inputs=inputs, device=self.device)
         else:
             kernel = run_soft_lanes if self.lanes > 1 else run_soft_worlds
-            self._over_groups(
-                lambda first: wp.launch(kernel, dim=1, inputs=[*common, first, substeps], device=self.device),
-                kernel.module,
-            )
+            before, after = common[:3], common[4:]
+
+            def launch(group: int, piece: Settings, count: int) -> None:
+                wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count], device=self.device)
+
+            self._over_groups(launch, kernel.module, run, substeps)
 
 
 def viscous_reply(topology: SoftTopology, viscosity: np.ndarray, inverse_mass: np.ndarray) -> float:
