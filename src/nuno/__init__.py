@@ -37,6 +37,7 @@ from nuno.errors import (
     MeshError,
     MissingPackageError,
     NunoError,
+    RobotModelError,
     SimulationDiverged,
     UnknownNameError,
 )
@@ -56,9 +57,18 @@ if TYPE_CHECKING:
     from nuno.contact_points import ContactPoints
     from nuno.elements import ElementState, elements
     from nuno.estimate.case import PickCase, read_case
+    from nuno.estimate.fold import replay_fold
+    from nuno.estimate.fold_case import FoldCase, read_fold_case
+    from nuno.estimate.fold_result import FoldResult
+    from nuno.estimate.hand_path import HandPath
+    from nuno.estimate.hand_tracking import HandTrack, track_hands
+    from nuno.estimate.layers import Layers, find_layers
     from nuno.estimate.pick import estimate_pick
     from nuno.estimate.pick_result import PickResult
     from nuno.estimate.similarity import similarity
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.links import Links
+    from nuno.robot.reach import Reach
 
 __version__ = "0.1.0"
 
@@ -79,9 +89,16 @@ __all__ = [
     "ElementState",
     "EstimationError",
     "FileFormatError",
+    "FoldCase",
+    "FoldResult",
     "Grip",
+    "HandPath",
+    "HandTrack",
+    "Humanoid",
     "ImageError",
     "InvalidInputError",
+    "Layers",
+    "Links",
     "Material",
     "MeshError",
     "MissingPackageError",
@@ -90,8 +107,10 @@ __all__ = [
     "PickCase",
     "PickResult",
     "Plane",
+    "Reach",
     "Recording",
     "Rigid",
+    "RobotModelError",
     "Sheet",
     "SimulationDiverged",
     "Snapshot",
@@ -117,9 +136,12 @@ __all__ = [
     "elements",
     "estimate_pick",
     "export_body",
+    "find_layers",
     "mesh",
     "plane",
     "read_case",
+    "read_fold_case",
+    "replay_fold",
     "sheet",
     "similarity",
     "soft_box",
@@ -129,10 +151,20 @@ __all__ = [
     "soft_sphere",
     "soft_tetrahedra",
     "sphere",
+    "track_hands",
 ]
 
 # Names whose modules load Warp, OpenCV and the like, and so are imported on first use.
 _LAZY = {
+    "FoldCase": "nuno.estimate.fold_case",
+    "FoldResult": "nuno.estimate.fold_result",
+    "HandPath": "nuno.estimate.hand_path",
+    "HandTrack": "nuno.estimate.hand_tracking",
+    "track_hands": "nuno.estimate.hand_tracking",
+    "Layers": "nuno.estimate.layers",
+    "find_layers": "nuno.estimate.layers",
+    "read_fold_case": "nuno.estimate.fold_case",
+    "replay_fold": "nuno.estimate.fold",
     "ElementState": "nuno.elements",
     "ContactPoints": "nuno.contact_points",
     "elements": "nuno.elements",
@@ -142,6 +174,9 @@ _LAZY = {
     "estimate_pick": "nuno.estimate.pick",
     "read_case": "nuno.estimate.case",
     "similarity": "nuno.estimate.similarity",
+    "Humanoid": "nuno.robot.humanoid",
+    "Links": "nuno.robot.links",
+    "Reach": "nuno.robot.reach",
 }
 
 

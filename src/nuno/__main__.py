@@ -1,4 +1,4 @@
-"""The command line: ``python -m nuno pick CASE_DIR --out DIR``."""
+"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, and ``fold`` likewise."""
 
 from __future__ import annotations
 
@@ -20,16 +20,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pick = commands.add_parser("pick", help="at which point was a cloth picked up? from two images")
     pick.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the two images that it names")
     pick.add_argument("--out", required=True, metavar="DIR", help="where result.json and result.png go")
-    pick.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
     pick.add_argument("--candidates", default="6x6", metavar="NxM", help="grid: N along the longer side (default 6x6)")
-    pick.add_argument(
-        "--progress", action=argparse.BooleanOptionalAction, default=None, help="progress bar (default: on a terminal)"
-    )
+    fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
+    fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
+    fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
+    for command in (pick, fold):
+        command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
+        command.add_argument(
+            "--progress", action=argparse.BooleanOptionalAction, default=None,
+            help="progress bar (default: on a terminal)",
+        )  # fmt: skip
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     _quiet_warp()
     try:
-        return _pick(options)
+        return {"pick": _pick, "fold": _fold}[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
     except (NunoError, OSError) as error:
@@ -48,9 +53,7 @@ def _pick(options: argparse.Namespace) -> int:
     parts = options.candidates.lower().split("x")
     if len(parts) != 2 or not all(part.isdecimal() for part in parts):
         raise InvalidInputError(f"--candidates must be two numbers such as 6x6, got {options.candidates!r}")
-    out = Path(options.out)
-    if out.exists() and not out.is_dir():  # now, and not when the work is done
-        raise InvalidInputError(f"--out must be a folder, or the name of one to make; {out} is a file")
+    _check_out(options.out)
     from nuno.estimate.case import read_case
 
     case = read_case(options.case)
@@ -63,6 +66,30 @@ def _pick(options: argparse.Namespace) -> int:
         f"see {options.out}/result.json and result.png\n"
     )
     return ANSWERED
+
+
+def _fold(options: argparse.Namespace) -> int:
+    _check_out(options.out)
+    from nuno.estimate.fold_case import read_fold_case
+
+    case = read_fold_case(options.case)
+    result = case.replay(device=options.device, progress=options.progress)
+    result.save(options.out, names=case.names)
+    agreement = list(result.agreement.values())
+    told = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
+    sys.stdout.write(
+        f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
+        f"see {options.out}/result.json, strip.png, layers.png and replay.glb\n"
+    )
+    return ANSWERED
+
+
+def _check_out(name: str) -> None:
+    from nuno.errors import InvalidInputError
+
+    out = Path(name)
+    if out.exists() and not out.is_dir():  # now, and not when the work is done
+        raise InvalidInputError(f"--out must be a folder, or the name of one to make; {out} is a file")
 
 
 def _quiet_warp() -> None:

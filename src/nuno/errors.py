@@ -83,3 +83,7 @@ class SimulationDiverged(NunoError, RuntimeError):
             f"the state of {body!r} stopped being finite after t = {time:.4f} s; the world was left as it was "
             "at that time. Smaller steps (substeps=...), softer materials or slower grips help"
         )
+
+
+class RobotModelError(InvalidInputError):
+    """A robot that cannot be used for what is asked: a file that is not there, no legs to stand on ..."""

@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.color import linear, rgb
 from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, UnknownNameError
@@ -98,6 +99,29 @@ class Recording:
         for k in range(1, int(np.ceil(frames - 1e-6)) + 1):
             world.run(begin + min(k, frames) / world.frame_rate - world.time)
             recording.add()
+        return recording
+
+    @classmethod
+    def from_frames(cls, times: ArrayLike, bodies: Iterable[RecordedBody]) -> Recording:
+        """Return a recording of frames that are known, without a world.
+
+        Args:
+            times: (t,) [s], increasing.
+            bodies: What moved; their vertices have as many frames as there are times, or one.
+
+        Raises:
+            InvalidInputError: times that do not increase, no body, or another number of frames.
+        """
+        known = finite_array("times", times, ("t",))
+        chosen = tuple(bodies)
+        if not chosen or (np.diff(known) <= 0.0).any():
+            raise InvalidInputError("a recording needs at least one body, and times that increase")
+        for body in chosen:
+            if len(body.vertices) not in (1, len(known)):
+                raise InvalidInputError(f"{body.name!r} has {len(body.vertices)} frames for {len(known)} times")
+        recording = cls.__new__(cls)
+        recording._world, recording._bodies, recording._frames = None, [], []
+        recording._times, recording._loaded = known.tolist(), chosen
         return recording
 
     def __len__(self) -> int:
