@@ -1,0 +1,189 @@
+"""Descriptions: what Nuno knows of a robot beside its URDF, from a table in TOML."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+import xml.etree.ElementTree as xml
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nuno import quaternion as quat
+from nuno.errors import FileFormatError, MeshError, RobotModelError, UnknownNameError
+from nuno.validation import count, finite_array, number
+
+KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
+FileName = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameOnLink:
+    """A frame that a link carries.
+
+    Attributes:
+        link: The link's name.
+        position: (3,) float [m], in the link's frame.
+        quaternion: (4,) float, (w, x, y, z), likewise.
+        size: (2,) float [m], of the sole along x and y, where the frame is a foot's.
+    """
+
+    link: str
+    position: np.ndarray
+    quaternion: np.ndarray
+    size: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class CameraOnFrame:
+    """A camera that a frame carries.
+
+    Attributes:
+        frame: The frame's name: z looks forward, x right, y down.
+        width: [px].
+        height: [px].
+        field_of_view: Horizontal angle of view [rad].
+        ahead: How far ahead of the frame the pinhole is [m], so that the head's own shapes are behind it.
+    """
+
+    frame: str
+    width: int
+    height: int
+    field_of_view: float
+    ahead: float = 0.0
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A robot's files, and its frames by role.
+
+    Attributes:
+        name: What it is called.
+        urdf: The robot's links and joints.
+        srdf: Pairs of links that may overlap, and postures; None where there is no such file.
+        package_dirs: Folders that ``package://`` names are looked up in.
+        posture: A group state of the SRDF, or joint angles by name [rad]; others are 0.
+        frames: By role ("left_hand", "imu" ...).
+        feet: Of those, the soles of the feet.
+        cameras: By name.
+    """
+
+    name: str
+    urdf: Path
+    srdf: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
+    posture: str | Mapping[str, float] = field(default_factory=dict)
+    frames: Mapping[str, FrameOnLink] = field(default_factory=dict)
+    feet: tuple[str, ...] = ()
+    cameras: Mapping[str, CameraOnFrame] = field(default_factory=dict)
+
+
+def find_description(
+    name: FileName, srdf: FileName | None, package_dirs: Sequence[FileName] | None, robots: FileName | None
+) -> RobotDescription:
+    """Return the description of a robot in a table, or that of a URDF file, which has no roles.
+
+    Raises:
+        UnknownNameError: the table has no robot of that name.
+        RobotModelError: a file that is not there.
+        FileFormatError: a table that cannot be read.
+        MeshError: the URDF names a mesh that is not there.
+    """
+    given = tuple(Path(folder) for folder in package_dirs or ())
+    if Path(name).suffix.lower() in (".urdf", ".xml"):
+        urdf = Path(name).resolve()
+        made = RobotDescription(urdf.stem, urdf, None, given or tuple(urdf.parents[:5]))
+    else:
+        made = _in_table(str(name), KNOWN_ROBOTS if robots is None else Path(robots), given)
+    if srdf is not None:
+        made = RobotDescription(**{**vars(made), "srdf": Path(srdf)})
+    for what, path in (("URDF", made.urdf), ("SRDF", made.srdf)):
+        if path is not None and not path.is_file():
+            raise RobotModelError(f"there is no {what} file {str(path)!r}")
+    _check_meshes(made)
+    return made
+
+
+def robot_data() -> Path:
+    """Return the folder that the package example-robot-data keeps its robots in.
+
+    Raises:
+        RobotModelError: it is not installed.
+    """
+    try:
+        found = distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
+    except PackageNotFoundError as error:
+        raise RobotModelError("the known robots need their data: pip install example-robot-data") from error
+    return Path(str(found))
+
+
+def _in_table(name: str, table: Path, package_dirs: tuple[Path, ...]) -> RobotDescription:
+    try:
+        robots = tomllib.loads(table.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FileFormatError(f"cannot read {str(table)!r} as a table of robots: {error}") from error
+    if name not in robots:
+        raise UnknownNameError("robot", name, list(robots))
+    try:
+        return _description(name, robots[name], table.parent, package_dirs)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FileFormatError(f"the entry {name!r} of {str(table)!r} lacks or misuses {error}") from error
+
+
+def _description(name: str, entry: dict[str, Any], folder: Path, package_dirs: tuple[Path, ...]) -> RobotDescription:
+    feet = {role: _frame(role, given) for role, given in entry.get("feet", {}).items()}
+    frames = {role: _frame(role, given) for role, given in entry.get("frames", {}).items()}
+    cameras = {
+        role: CameraOnFrame(
+            str(given["frame"]), count("width", given["width"]), count("height", given["height"]),
+            number("field_of_view", given["field_of_view"], above=0.0, high=math.pi - 0.01),
+            number("ahead", given.get("ahead", 0.0)),
+        )
+        for role, given in entry.get("cameras", {}).items()
+    }  # fmt: skip
+    urdf, srdf = _placed(entry["urdf"], folder), entry.get("srdf")
+    return RobotDescription(
+        name, urdf, None if srdf is None else _placed(srdf, folder), package_dirs or tuple(urdf.parents[:5]),
+        entry.get("posture", {}), frames | feet, tuple(feet), cameras,
+    )  # fmt: skip
+
+
+def _frame(role: str, given: dict[str, Any]) -> FrameOnLink:
+    size = None if "size" not in given else finite_array(f"{role} size", given["size"], (2,))
+    return FrameOnLink(
+        str(given["link"]), finite_array(f"{role} position", given.get("position", (0.0, 0.0, 0.0)), (3,)),
+        quat.unit(f"{role} quaternion", given.get("quaternion", quat.IDENTITY), (4,)), size,
+    )  # fmt: skip
+
+
+def _placed(name: str, folder: Path) -> Path:
+    beside = folder / name
+    return beside if beside.is_file() else robot_data() / name
+
+
+def _check_meshes(robot: RobotDescription) -> None:
+    """Raise where a mesh is missing: Pinocchio would say so only when meshes are first asked for."""
+    try:
+        root = xml.parse(robot.urdf).getroot()
+    except xml.ParseError as error:
+        raise RobotModelError(f"cannot read {str(robot.urdf)!r} as a URDF: {error}") from error
+    names = dict.fromkeys(mesh.get("filename", "") for mesh in root.iter("mesh"))
+    missing = [name for name in names if not _mesh_is_there(name, robot)]
+    if missing:
+        folders = ", ".join(str(folder) for folder in robot.package_dirs) or "none"
+        raise MeshError(
+            f"{len(missing)} meshes of {robot.name!r} are not there, the first is {missing[0]!r}; "
+            f"package_dirs are {folders}"
+        )
+
+
+def _mesh_is_there(name: str, robot: RobotDescription) -> bool:
+    for scheme in ("package://", "model://"):
+        if name.startswith(scheme):
+            return any((folder / name.removeprefix(scheme)).is_file() for folder in robot.package_dirs)
+    return (robot.urdf.parent / name.removeprefix("file://")).is_file()

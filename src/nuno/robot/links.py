@@ -1,0 +1,121 @@
+"""Links: a robot's shapes in a world, and how they follow it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from nuno import quaternion as quat
+from nuno.body import Body
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.path import Path
+from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+    from nuno.world import World
+
+MESHES = ("collision", "visual")
+
+
+class Links:
+    """The links of a robot as static bodies of a world, "talos/arm_left_1_link" ...
+
+    They stay where they are until ``follow`` sets them on their way to where the robot is; what touches them feels
+    their surfaces move. ``robot.enter(world)`` makes them.
+
+    Args:
+        robot: The robot.
+        world: A world that is no batch.
+        meshes: "collision" or "visual".
+
+    Raises:
+        InvalidInputError: other meshes, or a batch.
+        MeshError: a mesh that cannot be read.
+    """
+
+    def __init__(self, robot: Humanoid, world: World, meshes: str = "collision") -> None:
+        if meshes not in MESHES:
+            raise InvalidInputError(f"meshes must be one of {MESHES}, got {meshes!r}")
+        if world.world_count != 1:
+            raise InvalidInputError(f"a robot enters one world, not a batch of {world.world_count}; imagine after that")
+        self.robot, self.world = robot, world
+        shapes = robot.geometry.shapes(meshes)
+        masks = {} if meshes == "collision" else {"group": 0, "collides_with": 0}
+        self.bodies: tuple[Body, ...] = tuple(
+            Body(own.shape, name=f"{robot.name}/{own.link}", color=own.color, **masks)  # type: ignore[arg-type]
+            for own in shapes
+        )
+        self._joints = np.array([own.joint for own in shapes], dtype=int)
+        self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
+        self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
+        self._inside = True
+        positions, quaternions = self.poses()
+        with world.lock:
+            for body, position, quaternion in zip(self.bodies, positions, quaternions, strict=True):
+                body._position, body._quaternion = position, quaternion
+                world.add(body)
+
+    def poses(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
+        placements = self.robot.update().oMi
+        places = np.array([pin.SE3ToXYZQUAT(placement) for placement in placements])
+        turns = places[self._joints][:, [6, 3, 4, 5]]
+        return places[self._joints, :3] + quat.rotate(turns, self._offsets), quat.multiply(turns, self._turns)
+
+    def follow(self, seconds: float) -> None:
+        """Let the bodies move from where they are to where the robot is now, in ``seconds`` [s] from the world's time.
+
+        Zero puts them there at once: a jump, which drags nothing along.
+
+        Raises:
+            BodyStateError: the links have left their world.
+        """
+        duration = number("seconds", seconds, low=0.0)
+        self._check_inside()
+        positions, quaternions = self.poses()
+        with self.world.lock:
+            start = np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
+            now = self.world.time
+            if duration == 0.0:
+                times, places, turns = np.array([now]), positions[:, None], quaternions[:, None]
+            else:
+                times = np.array([now, now + duration])
+                places = np.stack([start[0], positions], axis=1)
+                turns = np.stack([start[1], quaternions], axis=1)
+            for array in (times, places, turns):
+                array.setflags(write=False)
+            for body, place, turn in zip(self.bodies, places, turns, strict=True):
+                if body._path is None:  # the first time, and after anything else took the body elsewhere
+                    self.world.move(body, Path(times, place, turn))
+                else:  # what ``World.move`` does to a body that follows a path already
+                    body._path, body._position, body._quaternion = _path(times, place, turn), place[0], turn[0]
+
+    def leave(self) -> None:
+        """Take the bodies out of the world.
+
+        Raises:
+            BodyStateError: they have left it already.
+        """
+        self._check_inside()
+        with self.world.lock:
+            for body in self.bodies:
+                if body._world is self.world:
+                    self.world.remove(body)
+        self._inside = False
+
+    def _check_inside(self) -> None:
+        if not self._inside:
+            raise BodyStateError(f"the links of {self.robot.name!r} have left the world")
+        gone = [body.name for body in self.bodies if body._world is not self.world]
+        if gone:
+            raise BodyStateError(f"{len(gone)} links are no longer in the world, the first is {gone[0]!r}")
+
+
+def _path(times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Path:
+    """Return a path of read-only numbers that need no check: 50 of them a tick would take a millisecond."""
+    path = object.__new__(Path)
+    path.__dict__.update(times=times, positions=positions, quaternions=quaternions, interpolation="linear")
+    return path

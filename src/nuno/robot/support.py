@@ -1,0 +1,37 @@
+"""The ground that a robot stands on: outlines of its soles, and how far inside a point is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def convex_outline(points: np.ndarray) -> np.ndarray:
+    """Return the corners (k, 2) of the convex hull of points (n, 2), counterclockwise (Andrew 1979)."""
+    ordered = np.unique(points, axis=0)
+    chains = []
+    for sweep in (ordered, ordered[::-1]):
+        chain: list[np.ndarray] = []
+        for point in sweep:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        chains += chain[:-1]
+    return np.array(chains)
+
+
+def edges_of(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return outward normals (k, 2) and offsets (k,) [m] of a counterclockwise outline: inside is n p <= offset."""
+    along = np.roll(outline, -1, axis=0) - outline
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * outline, axis=1)
+
+
+def distance_inside(outline: np.ndarray, point: np.ndarray) -> float:
+    """Return how far a point (2,) is from the nearest edge [m], negative outside."""
+    normals, offsets = edges_of(outline)
+    return float((offsets - normals @ point).min())
+
+
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

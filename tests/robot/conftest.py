@@ -1,0 +1,33 @@
+"""Robots that several tests read; those that move them make their own."""
+
+import pytest
+
+import nuno
+
+
+@pytest.fixture(scope="session")
+def still_talos():
+    """Talos as it starts; not to be moved."""
+    return nuno.Humanoid()
+
+
+@pytest.fixture
+def talos(still_talos):
+    """Talos, put back as it starts: meshes are read once."""
+    still_talos.stand()
+    yield still_talos
+    still_talos.stand()
+
+
+@pytest.fixture(scope="session")
+def still_g1():
+    """G1 as it starts; not to be moved."""
+    return nuno.Humanoid("g1")
+
+
+@pytest.fixture
+def g1(still_g1):
+    """G1, put back as it starts."""
+    still_g1.stand()
+    yield still_g1
+    still_g1.stand()

@@ -1,0 +1,108 @@
+"""Descriptions: robots from tables and from URDF files, and what is wrong with them."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotModelError, UnknownNameError
+from nuno.robot.description import find_description
+
+URDF = """<robot name="stick">
+  <link name="base">
+    <inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="arm">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0.2 0 0"/><geometry>GEOMETRY</geometry></collision>
+  </link>
+  <joint name="shoulder" type="TYPE"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.5"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="2" effort="3"/></joint>
+</robot>"""
+
+
+def stick(folder, geometry='<box size="0.4 0.1 0.1"/>', kind="revolute"):
+    """Write a robot of two links, and return its path."""
+    path = folder / "stick.urdf"
+    path.write_text(URDF.replace("GEOMETRY", geometry).replace("TYPE", kind))
+    return path
+
+
+def test_a_urdf_needs_no_table(tmp_path):
+    """Its links and joints are known, and it stands with its base at the origin."""
+    robot = nuno.Humanoid(stick(tmp_path))
+    assert (robot.name, robot.joint_names, robot.mass) == ("stick", ("shoulder",), 3.0)
+    np.testing.assert_allclose(robot.frame_pose("arm").position, (0, 0, 0.5))
+    links = robot.enter(nuno.World(device="cpu"))
+    (body,) = links.bodies
+    assert body.shape.size == (0.4, 0.1, 0.1)
+    np.testing.assert_allclose(body.position, (0.2, 0, 0.5), atol=1e-12)
+
+
+def test_a_third_robot_is_added_by_a_table_alone(tmp_path):
+    """Promise: frames, feet, posture and cameras come from the table, files from beside it."""
+    stick(tmp_path)
+    table = tmp_path / "mine.toml"
+    table.write_text("""
+        [stick]
+        urdf = "stick.urdf"
+        posture = { shoulder = 0.5 }
+        frames.hand = { link = "arm", position = [0.4, 0.0, 0.0] }
+        feet.foot = { link = "base", position = [0.0, 0.0, -0.1], size = [0.2, 0.1] }
+        cameras.eye = { frame = "hand", width = 32, height = 24, field_of_view = 1.5707963267948966 }
+    """)
+    robot = nuno.Humanoid("stick", robots=table)
+    np.testing.assert_allclose(robot.position, (0, 0, 0.1), atol=1e-12)  # its sole on the floor
+    np.testing.assert_allclose(robot.angle_vector(), [0.5])
+    hand = (0.4 * np.cos(0.5), 0, 0.6 - 0.4 * np.sin(0.5))
+    np.testing.assert_allclose(robot.frame_pose("hand").position, hand, atol=1e-12)
+    assert np.isclose(robot.camera("eye").fx, 16.0)  # half of 32 px over tan 45 degrees
+    np.testing.assert_allclose(np.ptp(robot.support_polygon(), axis=0), (0.2, 0.1), atol=1e-12)
+
+
+def test_a_joint_that_turns_freely_has_no_limits(tmp_path):
+    """Pinocchio keeps its cosine and sine; the angle goes in and out."""
+    robot = nuno.Humanoid(stick(tmp_path, kind="continuous"))
+    robot.angle_vector([2.5])
+    arm = robot.frame_pose("arm").rotation
+    np.testing.assert_allclose(arm[:, 0], (np.cos(2.5), 0, -np.sin(2.5)), atol=1e-12)
+    robot.take_configuration(robot.configuration())
+    np.testing.assert_allclose(robot.angle_vector(), [2.5])
+    assert robot.joint_limits[1][0] == np.inf
+
+
+def test_bad_robots_raise_named_errors(tmp_path):
+    """What was received and what is valid."""
+    with pytest.raises(UnknownNameError, match="no robot named 'hal'; there are: g1, talos"):
+        nuno.Humanoid("hal")
+    with pytest.raises(RobotModelError, match="no URDF file"):
+        nuno.Humanoid(tmp_path / "none.urdf")
+    with pytest.raises(MeshError, match=r"1 meshes of 'stick' are not there, the first is 'package://lost/arm\.stl'"):
+        nuno.Humanoid(stick(tmp_path, '<mesh filename="package://lost/arm.stl"/>'))
+    with pytest.raises(RobotModelError, match="'shoulder' is neither"):
+        nuno.Humanoid(stick(tmp_path, kind="floating"))
+    with pytest.raises(RobotModelError, match="no SRDF file"):
+        nuno.Humanoid(stick(tmp_path), srdf=tmp_path / "none.srdf")
+    (tmp_path / "torn.urdf").write_text("<robot name='torn'><link")
+    with pytest.raises(RobotModelError, match="as a URDF"):
+        nuno.Humanoid(tmp_path / "torn.urdf")
+    (tmp_path / "odd.stl").write_text("no mesh")
+    with pytest.raises(MeshError, match="cannot read the meshes of 'stick'"):
+        nuno.Humanoid(stick(tmp_path, '<mesh filename="odd.stl"/>')).self_collisions()
+
+
+def test_bad_tables_raise_named_errors(tmp_path):
+    """A table that is torn, or says too little."""
+    table, urdf = tmp_path / "mine.toml", stick(tmp_path)
+    entries = {
+        "[stick": (FileFormatError, "table of robots"),
+        "[stick]\nposture = {}": (FileFormatError, "'urdf'"),
+        "[stick]\nurdf = 'stick.urdf'\nframes.hand = { link = 'leg' }": (UnknownNameError, "no link named 'leg'"),
+        "[stick]\nurdf = 'stick.urdf'\nposture = 'sit'": (UnknownNameError, "no posture named 'sit'"),
+        "[stick]\nurdf = 'stick.urdf'\nposture = { hip = 1.0 }": (UnknownNameError, "no joint named 'hip'"),
+        "[stick]\nurdf = 'stick.urdf'\nframes.hand = { link = 'arm', position = [0.0] }": (InvalidInputError, "shape"),
+    }
+    for text, (error, message) in entries.items():
+        table.write_text(text)
+        with pytest.raises(error, match=message):
+            nuno.Humanoid("stick", robots=table)
+    assert find_description(urdf, None, None, None).feet == ()
