@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from nuno.simulation import Simulation
 
 KINDS = {BALL: SPHERE, BLOCK: BOX, ROD: CAPSULE, DRUM: CYLINDER, HULL: SOLID_MESH}
+SKIN = 5e-4
+"""[m] How far from the surface of a soft body others stay: edges that meet at no distance at all have no side."""
 RIM_POINTS = 16
 """Corners that stand for the rim of a cylinder."""
 
@@ -53,7 +55,7 @@ class CoupledBodies:
             total += solver.particle_count
         self._meshes: list[Any] = []
         surfaces = [
-            SurfaceOfParticles(solver.particle_count, np.asarray(body.faces), 0.5 * solver._scalars[:, THICKNESS])
+            SurfaceOfParticles(solver.particle_count, np.asarray(body.faces), _radius(body, solver), body.is_solid)
             for body, solver in zip(self.particles, solvers, strict=True)
         ]
         elements = make_elements(
@@ -267,3 +269,8 @@ class CoupledBodies:
         holds.place.assign(wp.array(place.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=device))
         turns = np.roll(turn.reshape(-1, 4), -1, axis=-1).astype(np.float32)
         holds.turn.assign(wp.array(turns, dtype=wp.quat, device=device))
+
+
+def _radius(body: Body, solver: Any) -> np.ndarray:
+    """How far (worlds,) [m] others stay from the triangles of a cloth or a soft body."""
+    return np.asarray(np.maximum(0.5 * solver._scalars[:, THICKNESS], SKIN if body.is_solid else 0.0))

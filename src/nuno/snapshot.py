@@ -20,6 +20,7 @@ from nuno.materials import Material
 from nuno.motion import of_world
 from nuno.path import Path
 from nuno.shape import Shape
+from nuno.tie import HoldSpec, TieSpec, spread_spec
 
 if TYPE_CHECKING:
     from nuno.simulation import Simulation
@@ -63,7 +64,7 @@ class GripRecord:
 
     key: str
     body: str
-    spec: GripSpec
+    spec: GripSpec | TieSpec | HoldSpec
     target: str | None
     offsets: np.ndarray | None
 
@@ -126,12 +127,14 @@ class Snapshot:
                 deformed_quaternion=single(body.deformed_quaternion, 1), dynamics=dynamics, path=path(body.path),
             ))  # fmt: skip
         grips = [
-            replace(grip, offsets=batched(grip.offsets), spec=replace(
-                grip.spec, vertices=batched(grip.spec.vertices), corners=batched(grip.spec.corners),
-                barycentric=batched(grip.spec.barycentric), positions=batched(grip.spec.positions),
-            ))
+            replace(
+                grip,
+                # of a held rigid body they are a place and a turn
+                offsets=tuple(map(batched, grip.offsets)) if isinstance(grip.offsets, tuple) else batched(grip.offsets),
+                spec=spread_spec(grip.spec, batched),
+            )
             for grip in self.grips
-        ]  # fmt: skip
+        ]
         friction = tuple((a, b, _plain(single(mu, 0))) for a, b, mu in self.pair_friction)
         return replace(self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count)
 

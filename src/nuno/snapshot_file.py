@@ -25,6 +25,7 @@ from nuno.grip import GripSpec
 from nuno.materials import Cloth, Rigid, Soft
 from nuno.path import Path
 from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+from nuno.tie import HoldSpec, TieSpec
 from nuno.whole_file import replacing
 
 FORMAT = 2
@@ -35,9 +36,10 @@ SHAPES = (
     shapes.TriangleMesh, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
     soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
 )  # fmt: skip
+GRIPS = (GripSpec, TieSpec, HoldSpec)
 TYPES: dict[str, Any] = {
     kind.__name__: kind
-    for kind in (*SHAPES, Cloth, Soft, Rigid, GripSpec, Path, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
+    for kind in (*SHAPES, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
 }
 
 

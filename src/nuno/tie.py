@@ -67,8 +67,11 @@ class HoldSpec:
 
 
 def spread_spec(spec: Any, batched: Any) -> Any:
-    """Return a tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
-    names = ("corners", "weights", "other_corners", "other_weights", "places", "positions", "quaternions")
+    """Return a grip's, tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
+    names = (
+        "vertices", "corners", "barycentric", "weights", "other_corners", "other_weights", "places", "positions",
+        "quaternions",
+    )  # fmt: skip
     return replace(spec, **{name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)})
 
 

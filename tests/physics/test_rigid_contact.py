@@ -24,21 +24,25 @@ def test_ten_boxes_stand():
     assert max(np.abs(solver.velocity(slot)[0]).max() for slot in slots) < 1e-3
 
 
-def test_ten_boxes_dropped_askew_stand():
-    """Promise: turned at random about the vertical, 3 mm off and let fall 1 mm each, they come to rest as a stack."""
+@pytest.mark.parametrize(
+    "order", [range(10), range(9, -1, -1), (3, 7, 1, 9, 0, 5, 8, 2, 6, 4)], ids=["up", "down", "mixed"]
+)
+def test_ten_boxes_dropped_askew_come_to_rest(order):
+    """Promise: turned at random about the vertical, 3 mm off and let fall 1 mm each, they stand, added in any order."""
     solver = on_floor()
     random = np.random.default_rng(0)
-    slots = [
-        drop(solver, CUBE, (*random.normal(0, 0.003, 2), 0.05 + 0.101 * k), about((0, 0, 1), 17 * random.normal()))
-        for k in range(10)
+    poses = [
+        ((*random.normal(0, 0.003, 2), 0.05 + 0.101 * k), about((0, 0, 1), 17 * random.normal())) for k in range(10)
     ]
-    solver.run(0.0, 1.0)
+    added = {k: drop(solver, CUBE, *poses[k]) for k in order}
+    slots = [added[k] for k in range(10)]
+    solver.run(0.0, 5.0)
     start = places(solver, slots)
-    solver.run(1.0, 5.0)
+    solver.run(5.0, 5.0)
     moved = places(solver, slots) - start
     # overlaps of up to 20 um are left alone, ten of them
     np.testing.assert_allclose(places(solver, slots)[:, 2], 0.05 + 0.1 * np.arange(10), atol=3e-4)
-    assert np.abs(moved).max() < 2e-3  # the top of a metre, settling
+    assert np.abs(moved).max() < 1e-3  # the drift that is promised of a straight stack
 
 
 def test_crossing_boards_rest():
@@ -55,11 +59,14 @@ def test_crossing_boards_rest():
     np.testing.assert_allclose(start[:, 2], 0.01 + 0.02 * np.arange(8), atol=3e-4)  # 20 um a layer
 
 
-def test_a_heavy_box_stands_on_a_light_one():
-    """Promise: a hundred times the mass on top."""
+@pytest.mark.parametrize("heavy_first", [False, True])
+def test_a_heavy_box_stands_on_a_light_one(heavy_first):
+    """Promise: a hundred times the mass on top, for 10 s."""
     solver = on_floor()
-    slots = [drop(solver, CUBE, (0, 0, 0.05), density=100.0), drop(solver, CUBE, (0, 0, 0.15), density=10000.0)]
-    solver.run(0.0, 5.0)
+    boxes = [((0, 0, 0.05), 100.0), ((0, 0, 0.15), 10000.0)]
+    slots = [drop(solver, CUBE, place, density=rho) for place, rho in (boxes[::-1] if heavy_first else boxes)]
+    slots = slots[::-1] if heavy_first else slots
+    solver.run(0.0, 10.0)
     np.testing.assert_allclose(places(solver, slots), [[0, 0, 0.05], [0, 0, 0.15]], atol=1e-3)
 
 

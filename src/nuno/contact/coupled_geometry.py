@@ -1,6 +1,7 @@
 """Where the candidates of coupled bodies touch: weights, normal and distance of each row for one substep.
 
-All is taken where the substep began, when nothing crossed: that tells the side. A row whose parts are too close
+All is taken where the substep began, when nothing crossed: that tells the side, and of a face of a solid body the
+outside is known. A row whose parts are too close
 already asks for what they have and a little more, so that they part slowly.
 """
 
@@ -95,6 +96,8 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
             x, particles.p[first + q[1]], particles.p[first + q[2]], particles.p[first + q[3]]
         )
         side = wp.where(height < 0.0, -1.0, 1.0)
+        if elements.solid[bodies[1]] != 0:
+            side = 1.0
         gap = height * side
         n = n0 * side
         weights = wp.vec4(1.0, -b[0], -b[1], -b[2])
@@ -125,11 +128,16 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
             x, particles.p[first + q[0]], particles.p[first + q[1]], particles.p[first + q[2]]
         )
         side = wp.where(height < 0.0, 1.0, -1.0)
-        gap = wp.abs(height)
+        if elements.solid[bodies[0]] != 0:
+            side = -1.0
+        gap = -height * side
         n = n0 * side
         weights = wp.vec4(b[0], b[1], b[2], 0.0)
         inside = wp.min(b[0], wp.min(b[1], b[2])) + 1.0e-3
     if inside <= 0.0 or gap > apart + reach:
+        return
+    if kind != VERTEX_RIGID and gap < -(apart + reach):
+        # far inside a solid body, this is not the face that it came through
         return
     rows.active[world * rows.room + wp.atomic_add(rows.active_count, world, 1)] = r
     rows.normal[r] = n

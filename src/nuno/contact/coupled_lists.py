@@ -44,6 +44,7 @@ class Elements:
     touch: wp.array(dtype=int)
     friction: wp.array(dtype=float)
     radius: wp.array(dtype=float)
+    solid: wp.array(dtype=int)  # by body, whether its triangles enclose it
     low: wp.array(dtype=wp.vec3)
     high: wp.array(dtype=wp.vec3)
 

@@ -20,11 +20,13 @@ class SurfaceOfParticles:
         particles: Particles of the body, inner ones included.
         faces: (m, 3) int, their corners among the particles.
         radius: (worlds,) float [m], half the thickness.
+        solid: Whether the faces enclose the body, corners anticlockwise from outside.
     """
 
     particles: int
     faces: np.ndarray
     radius: np.ndarray
+    solid: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +134,7 @@ def make_elements(
     for body, surface in enumerate(particles):
         radius[:, body] = surface.radius
     made.radius = put(radius.ravel(), float)
+    made.solid = put([*(surface.solid for surface in particles), *(False for _ in rigid)], int)
     made.low = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     made.high = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     return made
