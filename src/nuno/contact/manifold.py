@@ -288,19 +288,18 @@ def lay_over(
 
 
 @wp.func
-def snapped(parts: Parts, a: Convex, q: wp.quat, b: Convex, n: wp.vec3, own: int):
-    """The normal, or that of a plane face of b or a that is as good as parallel to it; a's comes first if ``own``."""
+def snapped(parts: Parts, a: Convex, q: wp.quat, b: Convex, n: wp.vec3):
+    """The normal, or that of a plane face of b or a that is as good as parallel to it."""
     result = n
     fb, ib = face_normal(parts, b, n)
     fa, ia = face_normal(parts, a, wp.quat_rotate_inv(q, -n))
     fa = -wp.quat_rotate(q, fa)
     flat_a = a.kind == BLOCK or a.kind == HULL or (a.kind == DRUM and ia == 0)
     flat_b = b.kind == BLOCK or b.kind == HULL or b.kind == TRIANGLE or (b.kind == DRUM and ib == 0)
-    if flat_a and wp.dot(fa, n) > SNAP:
-        result = fa
     if flat_b and wp.dot(fb, n) > SNAP:
-        if own == 0 or not flat_a:
-            result = fb
+        result = fb
+    elif flat_a and wp.dot(fa, n) > SNAP:
+        result = fa
     return result
 
 
@@ -311,20 +310,16 @@ def collide(
     x: wp.vec3,
     q: wp.quat,
     b: Convex,
-    own: int,
     margin: float,
     place: wp.array(dtype=wp.vec3),
     gap: wp.array(dtype=float),
 ):
-    """Normal (b's frame, from b to a), the least they are apart, and how many points are within ``margin``.
-
-    Of two faces that are nearly parallel, b's gives the normal, or a's if ``own``.
-    """
+    """Normal (b's frame, from b to a), the least they are apart, and how many points are within ``margin``."""
     found = core_direction(parts, a, x, q, b)
     n = wp.vec3(found[0], found[1], found[2])
     if found[3] == 0.0:
         n = way_out(parts, a, x, q, b)
-    n = snapped(parts, a, q, b, n, own)
+    n = snapped(parts, a, q, b, n)
     gap_n = gap_along(parts, a, x, q, b, n)
     count = int(0)
     if gap_n <= margin:

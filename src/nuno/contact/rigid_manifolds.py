@@ -86,17 +86,13 @@ def moves(s: RigidState, i: int, slot: int):
 
 
 @wp.func
-def frame_for(s: RigidState, parts: Parts, p: int, q: int, i: int, j: int, normal: wp.vec3, gravity: wp.vec3):
-    """Which body's faces and turns a normal follows: 0 the partner's, 1 the owner's; ``normal`` looks to the owner.
-
-    Of two with plane faces the upper one's: with the lower one's, tall stacks sway and are slow to rest.
-    """
+def frame_for(s: RigidState, parts: Parts, p: int, q: int, i: int, j: int):
+    """Which body's turns a normal follows: 0 the partner's, 1 the owner's, where the partner is round and may roll."""
     flat_a = parts.kind[p] == BLOCK or parts.kind[p] == HULL
     flat_b = parts.kind[q] == BLOCK or parts.kind[q] == HULL
     result = int(0)
-    if s.inverse_mass[i] > 0.0 and s.inverse_mass[j] > 0.0 and flat_a:
-        if not flat_b or wp.dot(normal, gravity) < 0.0:
-            result = 1
+    if s.inverse_mass[i] > 0.0 and s.inverse_mass[j] > 0.0 and flat_a and not flat_b:
+        result = 1
     return result
 
 
@@ -121,7 +117,6 @@ def take_points(
     normal: wp.vec3,
     count: int,
     moved: float,
-    gravity: wp.vec3,
     place: wp.array(dtype=wp.vec3),
     gap: wp.array(dtype=float),
 ):
@@ -149,7 +144,7 @@ def take_points(
             slip = wp.vec3(0.0)
         old_slip[k] = slip
     n = wp.quat_rotate(qb, wp.quat_rotate(parts.turn[q], normal))
-    c.frame[e] = frame_for(s, parts, p, q, i, j, n, gravity)
+    c.frame[e] = frame_for(s, parts, p, q, i, j)
     turn = turn_for(s, c, e, i, j)
     in_body = wp.quat_rotate_inv(turn, n)
     t = wp.quat_rotate(turn, tangent_of(in_body))

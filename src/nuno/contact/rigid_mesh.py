@@ -160,7 +160,6 @@ def collide_mesh(
     q: wp.quat,
     margin: float,
     moved: float,
-    gravity: wp.vec3,
     place: wp.array(dtype=wp.vec3),
     gap: wp.array(dtype=float),
 ):
@@ -237,4 +236,4 @@ def collide_mesh(
                     gap[h] = gaps[m * HELD + h]
                 count = fewer(place, gap, count, n)
             if count > 0 or c.count[entry] > 0:
-                take_points(s, parts, c, entry, p, i, j, n, count, moved, gravity, place, gap)
+                take_points(s, parts, c, entry, p, i, j, n, count, moved, place, gap)

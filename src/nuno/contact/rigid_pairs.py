@@ -19,7 +19,6 @@ from nuno.contact.rigid_manifolds import (
     SPEED,
     TRAVEL,
     Contacts,
-    frame_for,
     moves,
     ready,
     take_points,
@@ -224,14 +223,13 @@ def keep_within(parts: Parts, p: int):
 
 
 @wp.func
-def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int, dt: float, gravity: wp.vec3):
+def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int, dt: float, down: float):
     """Find the entry's points anew where that is due."""
     q = c.partner[e]
     a = parts.slot[p]
     b = parts.slot[q]
     i = world * s.capacity + a
     j = world * s.capacity + b
-    down = wp.length(gravity)
     speed = moves(s, i, a) * (wp.length(s.velocity[i]) + parts.radius[p] * wp.length(s.spin[i]))
     # a partner's spin counts where the owner is
     away = s.position[i] - s.position[j]
@@ -268,7 +266,7 @@ def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int
         part = convex_of(parts, p)
         if parts.kind[q] >= SURFACE:
             c.clear[e] = 0.0
-            collide_mesh(s, parts, c, world, e, p, i, j, part, x, turn, wide, known, gravity, place, gap)
+            collide_mesh(s, parts, c, world, e, p, i, j, part, x, turn, wide, known, place, gap)
         else:
             normal = wp.vec3(0.0, 0.0, 1.0)
             least = float(0.0)
@@ -276,17 +274,15 @@ def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int
             if parts.kind[q] == FLAT:
                 normal, least, count = collide_flat(parts, part, x, turn, wide, place, gap)
             else:
-                other = convex_of(parts, q)
-                own = frame_for(s, parts, p, q, i, j, away, gravity)
-                normal, least, count = collide(parts, part, x, turn, other, own, wide, place, gap)
+                normal, least, count = collide(parts, part, x, turn, convex_of(parts, q), wide, place, gap)
             c.clear[e] = wp.max(least, 0.0)
             if count > 0 or n > 0:
-                take_points(s, parts, c, e, p, i, j, normal, count, known, gravity, place, gap)
+                take_points(s, parts, c, e, p, i, j, normal, count, known, place, gap)
 
 
 @wp.func
 def refresh_rows(
-    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, gravity: wp.vec3, thread: int, threads: int
+    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, thread: int, threads: int
 ):
     """All manifolds, and what the passes need of them."""
     for p in range(thread, parts.count, threads):
@@ -295,8 +291,8 @@ def refresh_rows(
             for k in range(c.row):
                 if c.partner[first + k] >= 0 and c.patch[first + k] == 0:
                     if may_act(s, parts, c, world, first + k, p) == 1:
-                        refresh(s, parts, c, world, first + k, p, dt, gravity)
+                        refresh(s, parts, c, world, first + k, p, dt, down)
             for k in range(c.row):
                 if c.partner[first + k] >= 0 and c.count[first + k] > 0:
                     if may_act(s, parts, c, world, first + k, p) == 1:
-                        ready(s, parts, c, world, first + k, p, dt, wp.length(gravity))
+                        ready(s, parts, c, world, first + k, p, dt, down)

@@ -174,8 +174,12 @@ def aim_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: 
 
 
 @wp.func
-def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
-    """Velocities: what touches parts at the speed of its bounce, and does not slip while friction holds it."""
+def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float, back: int):
+    """Velocities: what touches parts at the speed of its bounce, and does not slip while friction holds it.
+
+    ``back`` takes the points in reverse. They stand in a round, and pass after pass the one way would drive what rests
+    to wobble the same way round: a stack of boxes on its corners, or a heavy box on a light one.
+    """
     p = (e - world * c.parts * c.row) / c.row
     a = parts.slot[p]
     b = parts.slot[c.partner[e]]
@@ -225,7 +229,8 @@ def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
         vb = vb - wb * push
         ob = ob - ib * wp.cross(brm, push)
         changed = 1
-    for k in range(c.count[e]):
+    for h in range(c.count[e]):
+        k = wp.where(back == 1, c.count[e] - 1 - h, h)
         o = e * POINTS + k
         ra = c.arm_a[o]
         rb = c.arm_b[o]
@@ -277,7 +282,8 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
     ta = turn_between(s.rotation_before[i], s.rotation[i])
     tb = turn_between(s.rotation_before[j], s.rotation[j])
     changed = int(0)
-    for k in range(c.count[e]):
+    for h in range(c.count[e]):
+        k = c.count[e] - 1 - h
         o = e * POINTS + k
         ra = c.arm_a[o]
         rb = c.arm_b[o]

@@ -47,7 +47,7 @@ def predict_worlds(
     for k in range(thread, s.capacity, threads):
         begin_body(s, base + k, s.active[k])
     barrier(threads)
-    refresh_rows(s, parts, c, world, run.dt, run.gravity, thread, threads)
+    refresh_rows(s, parts, c, world, run.dt, run.down, thread, threads)
     barrier(threads)
     up = -wp.normalize(run.gravity)
     if threads == 1:
@@ -91,10 +91,10 @@ def finish_worlds(s: RigidState, parts: Parts, c: Contacts, run: RigidSettings, 
     for k in range(thread, c.counts[world * COUNTS + ENTRIES], threads):
         aim_entry(s, parts, c, world, c.order[order + k], run.dt, still)
     barrier(threads)
-    for _ in range(run.passes):
+    for m in range(run.passes):
         for r in range(c.counts[world * COUNTS + ROUNDS]):
             for k in range(c.bounds[order + r] + thread, c.bounds[order + r + 1], threads):
-                slow_entry(s, parts, c, world, c.order[order + k], run.dt)
+                slow_entry(s, parts, c, world, c.order[order + k], run.dt, m % 2)
             barrier(threads)
     for r in range(c.counts[world * COUNTS + ROUNDS]):
         for k in range(c.bounds[order + r] + thread, c.bounds[order + r + 1], threads):

@@ -44,15 +44,15 @@ BODY = dict(
 """Arrays of `RigidState` with a row for each body of each world."""
 SAVED = ("position", "rotation", "velocity", "spin", "force", "torque")
 ENTRY = dict(
-    partner=int, patch=int, count=int, frame=int, friction=float, bounce=float, normal=wp.vec3, clear=float, margin=float,
-    built_place=wp.vec3, built_turn=wp.quat,
+    partner=int, patch=int, count=int, frame=int, friction=float, bounce=float, normal=wp.vec3, clear=float,
+    margin=float, built_place=wp.vec3, built_turn=wp.quat,
 )  # fmt: skip
 """Arrays of `Contacts` with a row for each pair, which last."""
 POINT = dict(local_a=wp.vec3, local_b=wp.vec3, force=wp.vec3)
 PASSING = dict(
-    normal_now=(wp.vec3, 1), tangent_now=(wp.vec3, 1), order=(int, 1), waiting=(int, 1), bounds=(int, 1), height=(float, 1),
-    arm_a=(wp.vec3, POINTS), arm_b=(wp.vec3, POINTS), mass=(wp.vec3, POINTS), start=(wp.vec4, POINTS), aim=(float,
-    POINTS),
+    normal_now=(wp.vec3, 1), tangent_now=(wp.vec3, 1), order=(int, 1), waiting=(int, 1), bounds=(int, 1),
+    height=(float, 1), arm_a=(wp.vec3, POINTS), arm_b=(wp.vec3, POINTS), mass=(wp.vec3, POINTS),
+    start=(wp.vec4, POINTS), aim=(float, POINTS),
 )  # fmt: skip
 """Arrays of `Contacts` that every substep fills."""
 
