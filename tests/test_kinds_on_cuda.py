@@ -36,9 +36,9 @@ def scene(device, worlds=1):
 
 
 def test_the_same_physics_as_on_the_cpu():
-    """Contacts are solved all at once there and one by one here: a bouncing box is off by some millimetres."""
+    """Contacts are solved all at once there and one by one here: what bounces is off by 0.3 mm, and 1 mm is allowed."""
     for here, there in zip(scene("cpu"), scene("cuda:0"), strict=True):
-        np.testing.assert_allclose(there.mean(axis=1), here.mean(axis=1), atol=8e-3)
+        np.testing.assert_allclose(there.mean(axis=1), here.mean(axis=1), atol=1e-3)
 
 
 def test_the_same_bits_again_and_in_a_batch():

@@ -3,6 +3,7 @@
 import warp as wp
 
 from nuno.contact.block_lists import GONE, WIDTH, closed_in, list_blocks, measure_blocks
+from nuno.contact.flat_blocks import forget_flat, mark_flat, mark_uncreased
 from nuno.contact.nearness import bound_blocks, middles
 from nuno.contact.pair_lists import FORGET, find_creases, pick_touching, swept
 from nuno.contact.rounds import find_in_rounds
@@ -46,19 +47,24 @@ def find_together(t: StateFloat, topo: Topology, run: Settings, thread: int, thr
                 t.notes[TRAVEL] = 0.0
                 t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
                 t.listed[3 * n + GONE] = gone
+            # the last percent is for rounding, in here and in the displacements
+            far = t.scalars[THICKNESS] + 1.01 * run.margin
             for i in range(thread, n, threads):
                 t.listed[i] = t.x[i]
                 t.listed[n + i] = t.y[i]
                 t.listed[2 * n + i] = t.z[i]
+            mark_uncreased(t, topo, far, thread, threads)
             middles(t, topo, thread, threads)
             bound_blocks(t, topo, thread, threads)
             barrier(threads)
+            mark_flat(t, topo, far, thread, threads)
+            barrier(threads)
             if again:
                 list_blocks(t, topo, run.margin, thread, threads)
-            # the last percent is for rounding, in here and in the displacements
-            far = t.scalars[THICKNESS] + 1.01 * run.margin
             find_creases(t, topo, far * far, thread, threads)
             find_in_rounds(t, topo, far, thread, threads)
+            barrier(threads)
+            forget_flat(t, topo, thread, threads)
         else:
             if thread == 0:
                 t.notes[TRAVEL] = 0.0

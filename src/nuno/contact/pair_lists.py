@@ -30,7 +30,7 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
     within,
 )
-from nuno.solver.state import PICK_REACH, PICKED, SPEED, THICKNESS, Settings, Topology
+from nuno.solver.state import PICK_REACH, PICKED, SPEED, THICKNESS, Settings, StateFloat, Topology
 
 PICK_AHEAD = wp.constant(1.5)
 """Substeps for which the pairs that may touch are picked, at the speed of the moment."""
@@ -39,8 +39,8 @@ FORGET = wp.constant(1.0e8)
 
 
 @wp.func
-def find_vertex_triangle(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any):
-    """Vertices of block a near triangles of block b."""
+def find_vertex_triangle(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any, item: int, items: int):
+    """Vertices of block a near triangles of block b: every ``items``-th, from ``item`` modulo ``items`` on."""
     lx = t.bounds[6 * b] - far
     ly = t.bounds[6 * b + 1] - far
     lz = t.bounds[6 * b + 2] - far
@@ -49,7 +49,8 @@ def find_vertex_triangle(t: Any, topo: Topology, a: int, b: int, far: Any, far2:
     hz = t.bounds[6 * b + 5] + far
     first = topo.block_face_start[b]
     last = topo.block_face_start[b + 1]
-    for k in range(topo.block_vertex_start[a], topo.block_vertex_start[a + 1]):
+    start = topo.block_vertex_start[a] + wp.where(item < 0, item + items, item)
+    for k in range(start, topo.block_vertex_start[a + 1], items):
         i = topo.block_vertex[k]
         x = t.x[i]
         y = t.y[i]
@@ -68,8 +69,8 @@ def find_vertex_triangle(t: Any, topo: Topology, a: int, b: int, far: Any, far2:
 
 
 @wp.func
-def find_edge_edge(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any):
-    """Edges of block a near edges of block b, each pair once where both are the same block."""
+def find_edge_edge(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any, item: int, items: int):
+    """Edges of block a near edges of block b, each pair once where both are the same block; by shares as above."""
     lx = t.bounds[6 * b] - far
     ly = t.bounds[6 * b + 1] - far
     lz = t.bounds[6 * b + 2] - far
@@ -78,7 +79,8 @@ def find_edge_edge(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any):
     hz = t.bounds[6 * b + 5] + far
     offset = topo.block_face.shape[0]
     last = topo.block_edge_start[b + 1]
-    for j in range(topo.block_edge_start[a], topo.block_edge_start[a + 1]):
+    start = topo.block_edge_start[a] + wp.where(item < 0, item + items, item)
+    for j in range(start, topo.block_edge_start[a + 1], items):
         m = 4 * (offset + j)
         x = t.middle[m]
         y = t.middle[m + 1]
@@ -105,12 +107,16 @@ def find_edge_edge(t: Any, topo: Topology, a: int, b: int, far: Any, far2: Any):
 
 
 @wp.func
-def find_creases(t: Any, topo: Topology, far2: Any, thread: int, threads: int):
-    """The further pairs of edges that are near each other."""
+def find_creases(t: StateFloat, topo: Topology, far2: float, thread: int, threads: int):
+    """The further pairs of edges that are near each other, less those that the flags of flat windows rule out."""
     for k in range(thread, topo.crease.shape[0], threads):
-        q = topo.crease[k]
-        hit = near_edges(t, q[0], q[1], q[2], q[3], far2)
-        append(hit, t.pair_count, 1, t.edge_edge, q[0], q[1], q[2], q[3])
+        tame = bool(False)
+        if topo.columns > 0:
+            tame = t.moved[topo.crease_window[k]] != 0
+        if not tame:
+            q = topo.crease[k]
+            hit = near_edges(t, q[0], q[1], q[2], q[3], far2)
+            append(hit, t.pair_count, 1, t.edge_edge, q[0], q[1], q[2], q[3])
 
 
 @wp.func

@@ -8,6 +8,7 @@ where that is too small, the rounds take fewer blocks at a time.
 
 import warp as wp
 
+from nuno.contact.flat_blocks import in_flat
 from nuno.contact.nearness import append, near_edges, near_triangle
 from nuno.solver.lanes import barrier
 from nuno.solver.state import StateFloat, Topology
@@ -175,7 +176,7 @@ def suspect_of(t: StateFloat, topo: Topology, a: int, b: int, far: float, thread
 
 @wp.func
 def suspect(t: StateFloat, topo: Topology, far: float, first: int, last: int, thread: int, threads: int):
-    """Note the suspects of the listed pairs of blocks first to last, where their boxes meet."""
+    """Note the suspects of the listed pairs of blocks first to last, where boxes meet and the cloth is not flat."""
     for start in range(first + thread - thread % WARP, last, threads):
         k = start + thread % WARP
         pair = int(0)
@@ -188,6 +189,8 @@ def suspect(t: StateFloat, topo: Topology, far: float, first: int, last: int, th
             gy = wp.min(t.bounds[a + 4] - t.bounds[b + 1], t.bounds[b + 4] - t.bounds[a + 1])
             gz = wp.min(t.bounds[a + 5] - t.bounds[b + 2], t.bounds[b + 5] - t.bounds[a + 2])
             on = wp.min(gx, wp.min(gy, gz)) + far > 0.0
+            if on:
+                on = not in_flat(t, topo, pair >> 16, pair & 0xFFFF)
         left = vote(on)
         while left != 0:
             chosen = told(pair, lowest(left))

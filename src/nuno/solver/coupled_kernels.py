@@ -6,12 +6,13 @@ from nuno.contact.coupled_rows import Particles, Rows, drag_row, push_row, share
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
+from nuno.solver.warps import anyone
 
 LAST_PASSES = wp.constant(4)
 """Passes over friction alone at the end: what the last pushes moved sideways, by normals that differ a little, would
 otherwise creep."""
 ENOUGH = wp.constant(1.0e-8)
-"""[m] Passes end, where one thread works, once nothing is farther than this from where it should be."""
+"""[m] Passes end once nothing is farther than this from where it should be."""
 
 
 @wp.struct
@@ -107,6 +108,10 @@ def solve(
             barrier(threads)
             if threads == 1 and wrong < ENOUGH:
                 done = 1
+            if threads > 1:
+                # all threads come here, and all get the same answer
+                if not anyone(wrong >= ENOUGH):
+                    done = 1
     if thread == 0:
         for k in range(ties.count):
             r = world * ties.count + k

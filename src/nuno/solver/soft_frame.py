@@ -8,12 +8,14 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.renewal import shares_work
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.frame import near_shapes
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
-from nuno.solver.shared import BLOCKS_AT_ONCE, shared_buffer
+from nuno.solver.shared import BLOCKS_AT_ONCE, SHARED_FLOATS, place_in, shared_buffer
+from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
 from nuno.solver.soft_state import CRUMPLED, SEEN, SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra, view
 from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SCALARS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
 from nuno.solver.tetrahedron import entry, solve_tetrahedron
@@ -86,11 +88,29 @@ def viscous(t: Any, table: Any, run: Settings, thread: int, threads: int):
 
 
 @wp.func
+def viscous(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    if shares_work(threads):
+        viscous_ahead(t, table, run, thread, threads)
+    else:
+        for c in range(table.colour.shape[0] - 1):
+            damp_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
+
+
+@wp.func
 def elastic(t: Any, table: Any, run: Settings, thread: int, threads: int):
     """One pass over the tetrahedra's elasticity, colour by colour, always in this order: at rest nothing moves."""
     for c in range(table.colour.shape[0] - 1):
         solve_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
         barrier(threads)
+
+
+@wp.func
+def elastic(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    if shares_work(threads):
+        elastic_ahead(t, table, run, thread, threads)
+    else:
+        for c in range(table.colour.shape[0] - 1):
+            solve_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
 
 
 @wp.func
@@ -213,6 +233,11 @@ def run_soft_wide(
             t.notes[SPEED] = largest(p.notes[SPEED])
 
 
+# quotients and roots as the processor has them: see `nuno.solver.shared`
+for _name in ("run_soft_blocks", "run_soft_blocks_shared", "run_soft_few_shared"):
+    wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True
+
+
 @wp.kernel(
     enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks"
 )  # fmt: skip
@@ -225,30 +250,64 @@ def run_soft_blocks(
     advance(t, topo, run, shapes, substeps, tid % threads, threads)
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_shared")
-def run_soft_blocks_shared(
-    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+@wp.func
+def run_shared(
+    s: SoftFloat,
+    topo: Tetrahedra,
+    size: SoftSizes,
+    run: Settings,
+    shapes: Shapes,
+    substeps: int,
+    tid: int,
+    threads: int,
 ):
-    """The same with x, y, z and w in shared memory for as long as the launch takes."""
-    tid = wp.tid()
+    """A world by a block with x, y, z and w, and v if it fits, in shared memory for as long as the launch takes."""
     n = topo.particles
     thread = tid % threads
     t = view(s, tid / threads, n, size)
     outside = view(s, tid / threads, n, size)
     buffer = shared_buffer()
-    step = wp.uint64(n) * wp.uint64(4)
-    t.x = wp.array(ptr=buffer, shape=(n,), dtype=float)
-    t.y = wp.array(ptr=buffer + step, shape=(n,), dtype=float)
-    t.z = wp.array(ptr=buffer + step * wp.uint64(2), shape=(n,), dtype=float)
-    t.w = wp.array(ptr=buffer + step * wp.uint64(3), shape=(n,), dtype=float)
+    roomy = 7 * n <= SHARED_FLOATS
+    t.x = place_in(buffer, 0, n)
+    t.y = place_in(buffer, 1, n)
+    t.z = place_in(buffer, 2, n)
+    t.w = place_in(buffer, 3, n)
+    if roomy:
+        t.vx = place_in(buffer, 4, n)
+        t.vy = place_in(buffer, 5, n)
+        t.vz = place_in(buffer, 6, n)
     for i in range(thread, n, threads):
         t.x[i] = outside.x[i]
         t.y[i] = outside.y[i]
         t.z[i] = outside.z[i]
         t.w[i] = outside.w[i]
+        if roomy:
+            t.vx[i] = outside.vx[i]
+            t.vy[i] = outside.vy[i]
+            t.vz[i] = outside.vz[i]
     barrier(threads)
     advance(t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
         outside.z[i] = t.z[i]
+        if roomy:
+            outside.vx[i] = t.vx[i]
+            outside.vy[i] = t.vy[i]
+            outside.vz[i] = t.vz[i]
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_shared")
+def run_soft_blocks_shared(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """Worlds that queue up for multiprocessors."""
+    run_shared(s, topo, size, run, shapes, substeps, wp.tid(), threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_soft_few_shared")
+def run_soft_few_shared(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """Worlds that have a multiprocessor each, and so all of its registers."""
+    run_shared(s, topo, size, run, shapes, substeps, wp.tid(), threads)

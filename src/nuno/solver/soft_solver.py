@@ -16,6 +16,7 @@ from nuno.solver.shared import SHARED_PARTICLES
 from nuno.solver.soft_frame import (
     run_soft_blocks,
     run_soft_blocks_shared,
+    run_soft_few_shared,
     run_soft_lanes,
     run_soft_wide,
     run_soft_worlds,
@@ -172,8 +173,10 @@ class SoftSolver(ParticleSolver):
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
             fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
+            few = self.group_count <= wp.get_device(self.device).sm_count
+            shared = run_soft_few_shared if few else run_soft_blocks_shared
             wp.launch(
-                run_soft_blocks_shared if fits else run_soft_blocks, dim=self.group_count * BLOCK_THREADS,
+                shared if fits else run_soft_blocks, dim=self.group_count * BLOCK_THREADS,
                 inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
             )  # fmt: skip
         elif self.plan == "vector":
