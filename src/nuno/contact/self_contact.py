@@ -35,8 +35,8 @@ from nuno.solver.state import FRICTION, THICKNESS, Settings
 LEAVE_SPEED = wp.constant(0.5)
 """[m/s] Layers found too close part no faster than this."""
 PASSES = wp.constant(2)
-"""Times that the summed contacts of many threads are solved in a substep: a mean leaves some of an approach undone,
-and a pair that is pressed on comes through bit by bit."""
+"""Times that contacts are solved in a substep. Once leaves some of an approach undone where a particle has several: a
+pair that is pressed on comes through bit by bit, and what is left over turns into spin."""
 UNIT = wp.constant(1.0e-8)
 """[m] Step of the fixed-point sums: integers add up to the same whatever the order of threads."""
 HEED = wp.constant(63.0)

@@ -210,7 +210,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            for _again in range(wp.where(threads > 1, PASSES, 1)):
+            for _again in range(PASSES):
                 touch_edge_edge(t, n, run, thread, threads)
                 touch_vertex_triangle(t, n, run, thread, threads)
                 barrier(threads)

@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.renewal import renew_lists
-from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import PASSES, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.frame import (
     bend_lines,
@@ -163,9 +163,9 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
         if run.parts & PULLS != 0:
             pull_points(t, run, 0, 1)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            touch_edge_edge(t, n, run, 0, 1)
-            touch_vertex_triangle(t, n, run, 0, 1)
-            take_moves(t, n, 0, 1)
+            for _again in range(PASSES):
+                touch_edge_edge(t, n, run, 0, 1)
+                touch_vertex_triangle(t, n, run, 0, 1)
         if run.parts & SHAPES != 0:
             read_loads(t, run, 0, 1)
             p.notes[CLOCK] = fill(p.x[0], t.notes[CLOCK])  # moving shapes are where the clock says
