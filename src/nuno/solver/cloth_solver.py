@@ -13,6 +13,7 @@ from nuno.contact.world_room import listing_room
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.frame import run_lanes, run_worlds
+from nuno.solver.groups import run_groups
 from nuno.solver.large import CELLS, LINES, PATCHES, TRIANGLES, TWISTS, YARNS, LargePlan
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import FEW_THREADS, MANY_THREADS, SHARED_PARTICLES, run_blocks, run_blocks_shared
@@ -190,7 +191,7 @@ class ClothSolver(ParticleSolver):
             def launch(group: int, piece: Settings, count: int) -> None:
                 wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count, 1], device=self.device)
 
-            self._over_groups(launch, kernel.module, run, substeps)
+            run_groups(launch, kernel.module, self.group_count, run, substeps)
 
     def _forget_launches(self) -> None:
         self._large = None

@@ -6,10 +6,7 @@ What they are the corners of, and so the elastic constraints between them, is fo
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from queue import Empty, SimpleQueue
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,34 +36,9 @@ if TYPE_CHECKING:
 
 MU = 15
 """Where a row of the table of static shapes has its friction, and that of the pair."""
-PIECES = 4
-"""Launches of a group of lanes in a run, between which threads may change groups."""
 GHOST = 2.0e-3
 """Share of its inverse mass that a stiffly held vertex has while constraints pull at it: enough that rounding is 0.1 %
 of a load in the mean of a frame, and too little to give way."""
-
-_threads: ThreadPoolExecutor | None = None
-
-
-def _pool() -> ThreadPoolExecutor:
-    """A thread per core; Warp's CPU launches release the GIL."""
-    global _threads
-    if _threads is None:
-        _threads = ThreadPoolExecutor(_cores(), thread_name_prefix="nuno-lanes")
-    return _threads
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))
-
-
-def _from(run: Settings, start: int) -> Settings:
-    """The same settings from a later substep on."""
-    later = Settings()
-    for name in run._cls.vars:  # type: ignore[attr-defined]
-        setattr(later, name, getattr(run, name))
-    later.first = run.first + start
-    return later
 
 
 class ParticleSolver:
@@ -168,37 +140,6 @@ class ParticleSolver:
         state.notes = self._empty(NOTES, self._number)
         state.box = self._empty(6, self._number)
         state.worlds = self.world_count
-
-    def _over_groups(
-        self, launch: Callable[[int, Settings, int], None], module: Any, run: Settings, substeps: int
-    ) -> None:
-        """Call ``launch`` with every group of lanes, settings and a number of substeps, a thread per core.
-
-        Each group goes through the run piece by piece, so that three groups on two cores take one and a half times as
-        long as one, not twice.
-        """
-        if self.group_count == 1:
-            launch(0, run, substeps)
-            return
-        wp.load_module(module, device=self.device)  # here, for every thread would compile it for itself
-        pieces = [run] if substeps < 2 * PIECES else [_from(run, k * substeps // PIECES) for k in range(PIECES)]
-        ends = [piece.first - run.first for piece in pieces[1:]] + [substeps]
-        waiting: SimpleQueue[tuple[int, int]] = SimpleQueue()
-        for group in range(self.group_count):
-            waiting.put((group, 0))
-
-        def work(_: int) -> None:
-            while True:
-                try:
-                    group, k = waiting.get_nowait()
-                except Empty:
-                    return
-                launch(group, pieces[k], ends[k] - (pieces[k].first - run.first))
-                if k + 1 < len(pieces):
-                    waiting.put((group, k + 1))
-
-        threads = min(_cores(), self.group_count)
-        list(_pool().map(work, range(threads)))
 
     # -- state
 

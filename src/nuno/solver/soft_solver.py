@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.scene.soft import SoftTopology, moduli, shape_gradients
+from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import SHARED_PARTICLES
@@ -191,7 +192,7 @@ class SoftSolver(ParticleSolver):
             def launch(group: int, piece: Settings, count: int) -> None:
                 wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count], device=self.device)
 
-            self._over_groups(launch, kernel.module, run, substeps)
+            run_groups(launch, kernel.module, self.group_count, run, substeps)
 
 
 def viscous_reply(topology: SoftTopology, viscosity: np.ndarray, inverse_mass: np.ndarray) -> float:
