@@ -10,27 +10,27 @@ FORCE = 5.0  # [N] of each finger
 
 
 CREEPS = pytest.mark.xfail(
-    strict=True, reason="at 1.05 of 2 mu N a settled cloth slips 0.7 mm and is then held; at 1.2 it creeps 4 mm/s"
+    strict=True, reason="the fingers' corners press on cells of 10 mm that are creased there: at 1.05 it slips 0.8 mm, at 1.2 4 mm"
 )
 
 
-def pinched(mu, mass, lift, duration, **more):
+def pinched(mu, mass, lift, duration, *, cells=16, finger=0.03, **more):
     """Return the world, its cloth, its fingers and the vertex in their middle, once they have closed."""
     world = nuno.World(device="cpu")
-    size, cells = 0.16, 16
+    size = 0.16
     cloth = nuno.sheet((size, size), (cells, cells), position=(0.0, 0.0, 0.6)).rotate(np.pi / 2, "x")
     world.add(cloth)
     world.attach(cloth, nuno.Cloth(area_density=mass / size**2, friction=mu, **more))
     fingers = []
     for side in (-1, 1):
         place = np.array([0.0, side * 0.012, 0.66])
-        finger = world.add(nuno.box((0.03, 0.02, 0.03), position=place, friction=mu))
-        world.attach(finger, nuno.Rigid(mass=0.1, friction=mu))
+        box = world.add(nuno.box((finger, 0.02, finger), position=place, friction=mu))
+        world.attach(box, nuno.Rigid(mass=0.1, friction=mu))
         keys = [place, place, place + np.array([0.0, 0.0, lift])]
         path = nuno.Path([0.0, 0.5, 0.5 + duration], keys, interpolation="minimum_jerk")
-        world.grip(finger, to=path, free=(0.0, 1.0, 0.0))
-        world.push(finger, (0.0, -side * FORCE, 0.0))
-        fingers.append(finger)
+        world.grip(box, to=path, free=(0.0, 1.0, 0.0))
+        world.push(box, (0.0, -side * FORCE, 0.0))
+        fingers.append(box)
     world.ignore_contact(*fingers)
     near = int(np.argmin(np.linalg.norm(cloth.vertices - [0.0, 0.0, 0.66], axis=1)))
     return world, cloth, fingers, near
@@ -54,16 +54,25 @@ def test_a_lifted_cloth_does_not_creep(seconds):
     assert cloth.vertices[:, 2].min() > low + 0.08  # it came along
 
 
-@pytest.mark.parametrize(("part", "holds"), [(0.95, True), pytest.param(1.05, False, marks=CREEPS)])
-def test_the_cloth_slips_where_it_is_too_heavy(part, holds):
+COARSE, FINE = {"cells": 16, "finger": 0.03}, {"cells": 24, "finger": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("part", "holds", "size"),
+    [(0.95, True, COARSE), pytest.param(1.05, False, COARSE, marks=CREEPS), (0.95, True, FINE), (1.05, False, FINE)],
+)
+def test_the_cloth_slips_where_it_is_too_heavy(part, holds, size):
     """Coulomb: two fingers at N hold 2 mu N; a weight of 0.95 of that stays and one of 1.05 slips."""
     mu, mass = 0.1, 2.0 * 0.1 * FORCE / GRAVITY
-    world, cloth, fingers, near = pinched(0.6, part * mass, lift=0.0, duration=1.0, damping=0.05, air_drag=20.0)
+    world, cloth, fingers, near = pinched(
+        0.6, part * mass, lift=0.0, duration=1.0, damping=0.05, air_drag=20.0, **size
+    )  # fmt: skip
     world.run(2.0)  # at rest at first: a cloth that swings pulls by more than its weight
     start = slip(cloth, fingers, near)
     for finger in fingers:
         world.set_friction(cloth, finger, mu)
     world.run(0.75)
     fallen = start[2] - slip(cloth, fingers, near)[2]
-    # free of all but 5 % of its weight it falls 0.05 / 2 * 9.81 * 0.75^2 = 0.13 m less drag; 2 mm is a slip
+    # free of all but 5 % of its weight it falls 0.05 / 2 * 9.81 * 0.75^2 = 0.13 m less drag; 2 mm is a slip. The fine
+    # one falls 4.9 mm and is then caught where the next row of vertices comes between the fingers
     assert fallen < 0.5e-3 if holds else fallen > 2e-3
