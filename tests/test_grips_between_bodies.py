@@ -73,7 +73,7 @@ def test_a_weld_of_a_cloth_to_a_box_hangs_the_box():
     assert before - box.position[2] == pytest.approx(0.5 * GRAVITY * 0.2**2, abs=0.02)
 
 
-LEAK = pytest.mark.xfail(strict=True, reason="a soft body welded to a cloth gains 0.4 % of momentum in 0.3 s: rounding, the more the shorter the substeps")
+LEAK = pytest.mark.xfail(strict=True, reason="0.4 % of momentum in 0.3 s: rounding, which grows with the substeps")
 
 
 def made(kind, at):

@@ -10,7 +10,7 @@ FORCE = 5.0  # [N] of each finger
 
 
 CREEPS = pytest.mark.xfail(
-    strict=True, reason="the fingers' corners press on cells of 10 mm that are creased there: at 1.05 it slips 0.8 mm, at 1.2 4 mm"
+    strict=True, reason="fingers' corners press on cells of 10 mm, creased there: at 1.05 it slips 0.8 mm, at 1.2 4 mm"
 )
 
 
