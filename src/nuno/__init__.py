@@ -40,6 +40,8 @@ from nuno.errors import (
     RobotModelError,
     SimulationDiverged,
     UnknownNameError,
+    ViewerError,
+    WalkError,
 )
 from nuno.export import export_body
 from nuno.grip import Grip
@@ -53,6 +55,7 @@ from nuno.surface import SurfacePoints
 from nuno.world import World
 
 if TYPE_CHECKING:
+    from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
     from nuno.camera.table import Table
     from nuno.contact_points import ContactPoints
     from nuno.elements import ElementState, elements
@@ -66,9 +69,20 @@ if TYPE_CHECKING:
     from nuno.estimate.pick import estimate_pick
     from nuno.estimate.pick_result import PickResult
     from nuno.estimate.similarity import similarity
+    from nuno.robot.footsteps import Footstep
+    from nuno.robot.hands import Hand
+    from nuno.robot.head_cameras import HeadCameras
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
+    from nuno.robot.sensor_model import SensorModel
+    from nuno.robot.sensors import Readings, Sensors
+    from nuno.robot.stereo import StereoPoints, StereoTrack, locate_marker, track_hands_in_stereo, triangulate
+    from nuno.robot.stride import Stride
+    from nuno.robot.walk import Walk
+    from nuno.robot.walking import continue_walk, plan_walk, plan_walk_footsteps, plan_walk_velocity, stop_walk
+    from nuno.viewer.film import Film
+    from nuno.viewer.viewer import Viewer
 
 __version__ = "0.1.0"
 
@@ -78,6 +92,7 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "Chequer",
     "Cloth",
     "ClothMesh",
     "ClothNotFoundError",
@@ -89,14 +104,19 @@ __all__ = [
     "ElementState",
     "EstimationError",
     "FileFormatError",
+    "Film",
     "FoldCase",
     "FoldResult",
+    "Footstep",
     "Grip",
+    "Hand",
     "HandPath",
     "HandTrack",
+    "HeadCameras",
     "Humanoid",
     "ImageError",
     "InvalidInputError",
+    "Lamp",
     "Layers",
     "Links",
     "Material",
@@ -106,11 +126,15 @@ __all__ = [
     "Path",
     "PickCase",
     "PickResult",
+    "Picture",
     "Plane",
     "Reach",
+    "Readings",
     "Recording",
     "Rigid",
     "RobotModelError",
+    "SensorModel",
+    "Sensors",
     "Sheet",
     "SimulationDiverged",
     "Snapshot",
@@ -122,22 +146,34 @@ __all__ = [
     "SoftSphere",
     "SoftTetrahedra",
     "Sphere",
+    "StereoPoints",
+    "StereoTrack",
+    "Stride",
     "SurfacePoints",
     "Table",
     "TriangleMesh",
     "UnknownNameError",
+    "Viewer",
+    "ViewerError",
+    "Walk",
+    "WalkError",
     "World",
     "box",
     "capsule",
     "cloth_mesh",
     "compound",
+    "continue_walk",
     "cylinder",
     "draw",
     "elements",
     "estimate_pick",
     "export_body",
     "find_layers",
+    "locate_marker",
     "mesh",
+    "plan_walk",
+    "plan_walk_footsteps",
+    "plan_walk_velocity",
     "plane",
     "read_case",
     "read_fold_case",
@@ -151,7 +187,11 @@ __all__ = [
     "soft_sphere",
     "soft_tetrahedra",
     "sphere",
+    "stop_walk",
+    "take_picture",
     "track_hands",
+    "track_hands_in_stereo",
+    "triangulate",
 ]
 
 # Names whose modules load Warp, OpenCV and the like, and so are imported on first use.
@@ -177,6 +217,30 @@ _LAZY = {
     "Humanoid": "nuno.robot.humanoid",
     "Links": "nuno.robot.links",
     "Reach": "nuno.robot.reach",
+    "Film": "nuno.viewer.film",
+    "Viewer": "nuno.viewer.viewer",
+    "Footstep": "nuno.robot.footsteps",
+    "Stride": "nuno.robot.stride",
+    "Walk": "nuno.robot.walk",
+    "continue_walk": "nuno.robot.walking",
+    "plan_walk": "nuno.robot.walking",
+    "plan_walk_footsteps": "nuno.robot.walking",
+    "plan_walk_velocity": "nuno.robot.walking",
+    "stop_walk": "nuno.robot.walking",
+    "Sensors": "nuno.robot.sensors",
+    "SensorModel": "nuno.robot.sensor_model",
+    "Readings": "nuno.robot.sensors",
+    "Hand": "nuno.robot.hands",
+    "HeadCameras": "nuno.robot.head_cameras",
+    "Picture": "nuno.camera.picture",
+    "Lamp": "nuno.camera.picture",
+    "Chequer": "nuno.camera.picture",
+    "take_picture": "nuno.camera.picture",
+    "triangulate": "nuno.robot.stereo",
+    "track_hands_in_stereo": "nuno.robot.stereo",
+    "StereoTrack": "nuno.robot.stereo",
+    "StereoPoints": "nuno.robot.stereo",
+    "locate_marker": "nuno.robot.stereo",
 }
 
 

@@ -71,6 +71,7 @@ class Body(Coordinates):
         self._name = name or shape.kind
         self._world: Simulation | None = None
         self._dynamics: Dynamics | None = None
+        self._links: Any = None  # the robot's links that it is one of
         self._path: Path | None = None  # that the static body follows, whose pose is always that of the world's time
         # Vertices (worlds, n, 3) of a static body that dynamics have deformed, and the pose they belong to.
         self._deformed: tuple[np.ndarray, Pose] | None = None

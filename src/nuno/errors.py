@@ -75,10 +75,11 @@ class SimulationDiverged(NunoError, RuntimeError):
     Args:
         body: Name of the body.
         time: Simulated time [s] of the last good state.
+        worlds: Which worlds of a batch; empty where that is not known.
     """
 
-    def __init__(self, body: str, time: float) -> None:
-        self.body, self.time = body, time
+    def __init__(self, body: str, time: float, worlds: tuple[int, ...] = ()) -> None:
+        self.body, self.time, self.worlds = body, time, worlds
         super().__init__(
             f"the state of {body!r} stopped being finite after t = {time:.4f} s; the world was left as it was "
             "at that time. Smaller steps (substeps=...), softer materials or slower grips help"
@@ -87,3 +88,62 @@ class SimulationDiverged(NunoError, RuntimeError):
 
 class RobotModelError(InvalidInputError):
     """A robot that cannot be used for what is asked: a file that is not there, no legs to stand on ..."""
+
+
+class WalkError(NunoError, RuntimeError):
+    """A walk that the robot cannot do: it would fall, slip, or go beyond what its joints can.
+
+    Args:
+        message: What is in the way, and what helps.
+        time: When, in the walk [s]; None where that is not known.
+        measures: What was found of the walk (``WalkMeasures``), or None where none came about.
+    """
+
+    def __init__(self, message: str, time: float | None = None, measures: object = None) -> None:
+        self.time, self.measures = time, measures
+        super().__init__(message)
+
+
+class NotConnectedError(NunoError, ConnectionError):
+    """A connection that cannot be made: nobody listens there, or the port is taken."""
+
+
+class ConnectionLostError(NotConnectedError):
+    """A connection that was there and has ended."""
+
+
+class RobotTimeoutError(NunoError, TimeoutError):
+    """A robot that does not answer, or tell what is asked, in time."""
+
+
+class RefusedError(NunoError, RuntimeError):
+    """What a robot was asked for on the wire, and does not do."""
+
+
+class MessageError(InvalidInputError):
+    """A message on the wire that is not understood.
+
+    Args:
+        message: What was received, and what is valid.
+        identity: The id of the message, where it has one.
+    """
+
+    def __init__(self, message: str, identity: str | int | None = None) -> None:
+        self.identity = identity
+        super().__init__(message)
+
+
+class ViewerError(NunoError, RuntimeError):
+    """A viewer that cannot do what is asked: it is closed, or its port is taken."""
+
+
+class ResultsInUseError(NunoError, RuntimeError):
+    """A results file that another sweep is writing to."""
+
+
+class ResultsMismatchError(NunoError, ValueError):
+    """A results file of another sweep: another trial, other parameters."""
+
+
+class WorkerLostError(NunoError, RuntimeError):
+    """An executor whose workers died, and that cannot be made anew."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,16 +20,65 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
+class Convoy:
+    """Paths of many bodies with the same keys in time, such as a robot's links; they are worked out together.
+
+    Attributes:
+        keys: Of the bodies, n of them.
+        times: (k,) float [s].
+        positions: (n, k, 3) float [m].
+        quaternions: (n, k, 4) float.
+        arrived: Where the bodies were last put: the time [s], positions (n, 3) and quaternions (n, 4).
+    """
+
+    keys: tuple[str, ...]
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+    arrived: tuple[float, np.ndarray, np.ndarray] | None = None
+
+    @cached_property
+    def paths(self) -> list[Path]:
+        """The path of each body, of read-only numbers that need no check: they are made every frame."""
+        for array in (self.times, self.positions, self.quaternions):
+            array.setflags(write=False)
+        made = []
+        for position, quaternion in zip(self.positions, self.quaternions, strict=True):
+            path = object.__new__(Path)
+            path.__dict__.update(
+                times=self.times, positions=position, quaternions=quaternion, interpolation="linear", convoy=self
+            )
+            made.append(path)
+        return made
+
+    def at(self, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
+        """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path._between`` says of times."""
+        first, last, s = between
+        a, b = self.positions[:, first], self.positions[:, last]
+        return a + s[..., None] * (b - a), quat.slerp(self.quaternions[:, first], self.quaternions[:, last], s)
+
+
+@dataclass(frozen=True, eq=False)
 class Schedule:
     """Where led bodies are in a run: at its start, and in the middle and at the end of each frame.
 
     Attributes:
         times: (k,) float [s].
-        poses: By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4).
+        alone: By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4).
+        convoys: Keys of bodies, n each, their positions (n, k, 3) and quaternions (n, k, 4).
     """
 
     times: np.ndarray
-    poses: dict[str, Pose]
+    alone: dict[str, Pose]
+    convoys: tuple[tuple[tuple[str, ...], np.ndarray, np.ndarray], ...] = ()
+
+    @cached_property
+    def poses(self) -> dict[str, Pose]:
+        """Of all bodies, by key, as in ``alone``."""
+        found = dict(self.alone)
+        for keys, places, turns in self.convoys:
+            found |= {key: (place, turn) for key, place, turn in zip(keys, places, turns, strict=True)}
+        return found
 
 
 def is_led(frame: Coordinates) -> bool:
@@ -45,10 +95,35 @@ def make_schedule(bodies: Iterable[Body], start: float, duration: float, frame: 
         times = np.append(times, [start + duration - 0.5 * rest, start + duration])
     # the same instants, to the bit, whether a span is gone through at once or in pieces
     times = np.round(times, 9)
-    bodies = list(bodies)
+    convoys, bodies = convoys_of(bodies)
+    moved = tuple((own.keys, *own.at(path._between(times))) for own, path in convoys)
+    if not bodies:
+        return Schedule(times, {}, moved)
     led = {root.key: root for body in bodies if (root := _led_by(body)) is not None}
     roots = dict(zip(led, paths_at([body._path for body in led.values()], times), strict=True))
-    return Schedule(times, {body.key: _pose_of(body, roots) for body in bodies})
+    return Schedule(times, {body.key: _pose_of(body, roots) for body in bodies}, moved)
+
+
+def convoys_of(bodies: Iterable[Body]) -> tuple[list[tuple[Convoy, Path]], list[Body]]:
+    """Return the convoys that are whole and next to each other among bodies, each with one of its paths; the others."""
+    bodies = list(bodies)
+    whole: list[tuple[Convoy, Path]] = []
+    others: list[Body] = []
+    k = 0
+    while k < len(bodies):
+        path = bodies[k]._path
+        convoy: Convoy | None = None if path is None else path.__dict__.get("convoy")
+        if convoy is not None:
+            after = k + len(convoy.keys)
+            near = bodies[k:after]
+            if [body._path for body in near] == convoy.paths and tuple([body.key for body in near]) == convoy.keys:
+                assert path is not None
+                whole.append((convoy, path))
+                k = after
+                continue
+        others.append(bodies[k])
+        k += 1
+    return whole, others
 
 
 def paths_at(paths: Sequence[Path | None], times: np.ndarray) -> list[tuple[np.ndarray, np.ndarray | None]]:
@@ -126,7 +201,14 @@ def of_world(path: Path, world: int) -> Path:
 
 def arrive(bodies: Iterable[Body], time: float) -> None:
     """Set the poses of bodies that follow paths to where those are at ``time`` [s]."""
-    led = [body for body in bodies if body._path is not None]
+    by_key = {body.key: body for body in bodies if body._path is not None}
+    convoys, led = convoys_of(by_key.values())
+    for convoy, path in convoys:
+        places, turns = convoy.at(path._between(np.array(time)))
+        convoy.__dict__["arrived"] = (time, places, turns)
+        for key, own_place, own_turn in zip(convoy.keys, places, turns, strict=True):
+            body = by_key[key]
+            body._position, body._quaternion = own_place, own_turn
     for body, (place, turn) in zip(led, paths_at([body._path for body in led], np.array(time)), strict=True):
         body._position = place
         if turn is not None:

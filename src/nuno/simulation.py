@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import uuid
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -21,12 +21,13 @@ from nuno.device import checked_device, found_device
 from nuno.dynamics import SOON, Dynamics, ParticleDynamics, make_colliders, make_dynamics
 from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
 from nuno.grip import Grip
-from nuno.motion import Schedule, arrive, is_led, make_schedule
+from nuno.motion import Schedule, arrive, convoys_of, is_led, make_schedule
 from nuno.stepping import Stepping
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.background import Background
+    from nuno.driver import Driver
     from nuno.materials import Material
     from nuno.rigid_dynamics import RigidScene
 
@@ -57,9 +58,13 @@ class Simulation:
         self._collider_version = 0
         self._led: list[Body] | None = None  # bodies that follow a path or a body that does; None: to be found anew
         self._schedule: Schedule | None = None
+        self._rests = False  # whether led bodies are where they were in the frame before
+        self._resting: tuple[Any, ...] | None = None  # what led bodies followed when they were told to rest
+        self.drivers: list[Driver] = []  # asked around every frame, such as a simulated robot
         self._background: Background | None = None
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
+        self._watchers: list[Any] = []  # viewers and films: told (``seen``) of each piece of a run, under the lock
 
     def __repr__(self) -> str:
         batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
@@ -214,17 +219,37 @@ class Simulation:
 
     def _schedule_led(self, start: float, duration: float) -> None:
         """Tell colliders and grips where the led bodies are in the run from ``start`` on."""
+        led = self._led_bodies()
+        self._rests = self._led_rest(led, start)
+        if self._rests:
+            return
         self._schedule = None
-        if led := self._led_bodies():
+        if led:
             self._schedule = make_schedule(led, start, duration, 1.0 / self.frame_rate)
             for colliders in self._colliders.values():
                 colliders.follow(self._schedule)
 
-    def _advance(self, duration: float, end: float | None = None) -> None:
-        """Advance everything, or leave the world as it was and raise."""
+    def _led_rest(self, led: list[Body], start: float) -> bool:
+        """Return whether all paths had ended when they were last told of, and nothing has changed since."""
+        before, self._resting = self._resting, None
+        if not led or self._rigid is not None:
+            return False
+        convoys, others = convoys_of(led)
+        if others or any(start < convoy.times[-1] for convoy, _ in convoys):
+            return False
+        self._resting = (self._collider_version, *(convoy for convoy, _ in convoys))
+        return self._resting == before
+
+    def _advance(
+        self, duration: float, end: float | None = None, each_frame: Callable[[float], None] | None = None
+    ) -> None:
+        """Advance everything, or leave the world as it was and raise; ``each_frame`` is as in ``World.run``."""
         start = self._time
         finish = start + duration if end is None else end
+        for driver in self.drivers:
+            driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
+        self._rests = False
         saved = [(d, d.state()) for d in moving.values() if isinstance(d, ParticleDynamics)]
         rigid = None if self._rigid is None else self._rigid.save()
         self._bring_colliders()
@@ -238,20 +263,41 @@ class Simulation:
             for stop in stops:
                 if moving:
                     self._schedule_led(now, stop - now)
-                self._stepping.run(now, stop)
+                if each_frame is None:
+                    self._stepping.run(now, stop)
+                else:
+                    self._run_frames(now, stop, each_frame)
                 now = stop
             for body, dynamics in moving.items():
-                if not np.all(dynamics.finite()):
-                    raise SimulationDiverged(body.name, start)
+                finite = np.atleast_1d(dynamics.finite())
+                if not finite.all():
+                    raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
         except BaseException:
             for own, state in saved:
                 own.load_state(state)
             if self._rigid is not None and rigid is not None:
                 self._rigid.load(rigid)
+            for driver in self.drivers:
+                driver.cancel_frame()
             raise
         for body, dynamics in moving.items():
             dynamics.pushes = [p for p in dynamics.pushes if p.end is None or p.end > finish + SOON]
             if body._children:
                 self._colliders_changed()  # what follows the body has moved along
-        arrive(self._led_bodies(), finish)
+        if not self._rests:
+            arrive(self._led_bodies(), finish)
         self._time = finish
+        for driver in self.drivers:
+            driver.end_frame()
+        for watcher in tuple(self._watchers):
+            watcher.seen()
+
+    def _run_frames(self, time: float, stop: float, each_frame: Callable[[float], None]) -> None:
+        """Advance from ``time`` to ``stop`` [s] frame by frame, telling the time after each."""
+        frame = 1.0 / self.frame_rate
+        ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
+        if not len(ends) or stop - ends[-1] > SOON:
+            ends = np.append(ends, stop)
+        for begin, end in zip([time, *ends[:-1]], ends, strict=True):
+            self._stepping.run(float(begin), float(end))
+            each_frame(float(end))

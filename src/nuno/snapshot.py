@@ -84,6 +84,7 @@ class Snapshot:
     pair_friction: tuple[tuple[str, str, Any], ...]
     ignored: tuple[tuple[str, str], ...]
     from_file: bool = field(default=False)
+    drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
 
     def spread(self, world_count: int) -> Snapshot:
         """Return a batch of equal copies of this one world."""
@@ -136,7 +137,9 @@ class Snapshot:
             for grip in self.grips
         ]
         friction = tuple((a, b, _plain(single(mu, 0))) for a, b, mu in self.pair_friction)
-        return replace(self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count)
+        return replace(
+            self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count, drivers=()
+        )  # a driver moves the one world that it is in
 
 
 def capture(world: Simulation) -> Snapshot:
@@ -150,7 +153,7 @@ def capture(world: Simulation) -> Snapshot:
         bodies=tuple(_body_record(body, world) for body in world._bodies.values()),
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
-        ignored=tuple(ignored),
+        ignored=tuple(ignored), drivers=tuple((driver, driver.save()) for driver in world.drivers),
     )  # fmt: skip
 
 
@@ -197,6 +200,9 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     if snapshot.from_file:
         _rename_keys(world, bodies)
     world._colliders_changed()
+    for driver, state in snapshot.drivers:
+        if driver in world.drivers:
+            driver.load(state)
 
 
 def _body_record(body: Body, world: Simulation) -> BodyRecord:

@@ -116,7 +116,8 @@ def _encoded(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         arrays[name] = value
         return {"array": name}
     if is_dataclass(value) and not isinstance(value, type):
-        items = {f.name: _encoded(getattr(value, f.name), arrays) for f in fields(value) if f.init}
+        kept = [f.name for f in fields(value) if f.init and f.metadata.get("file", True)]
+        items = {name: _encoded(getattr(value, name), arrays) for name in kept}
         return {"type": type(value).__name__, "fields": items}
     if isinstance(value, tuple | list):
         return [_encoded(item, arrays) for item in value]

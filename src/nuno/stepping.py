@@ -194,6 +194,9 @@ class Stepping:
 def _led(spec: Any, time: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Where a path leads its points at a time [s], and how they accelerated before it: (worlds, k, 3) [m], [m/s2]."""
     worlds, k, m = spec.positions.shape[:3]
-    path = Path(spec.times, spec.positions.reshape(worlds * k, m, 3), None, spec.interpolation)
-    now, before, earlier = (path.at(time - n * step).reshape(worlds, k, 3) for n in range(3))
+    path = object.__new__(Path)  # its numbers were checked when the grip was made: this runs every tick
+    keys = spec.positions.reshape(worlds * k, m, 3)
+    path.__dict__.update(times=spec.times, positions=keys, quaternions=None, interpolation=spec.interpolation)
+    places = path.at(time - step * np.arange(3.0)).reshape(worlds, k, 3, 3)
+    now, before, earlier = (places[:, :, n] for n in range(3))
     return now, (now - 2.0 * before + earlier) / step**2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -344,28 +345,37 @@ class World(Simulation):
         """Advance by one frame."""
         self.run(1.0 / self.frame_rate)
 
-    def run(self, seconds: float, progress: bool | None = None) -> None:
+    def run(
+        self, seconds: float, progress: bool | None = None, *, each_frame: Callable[[float], None] | None = None
+    ) -> None:
         """Advance by whole frames and a shorter last one; in the background, sleep until that time has come.
 
         Args:
             seconds: How long [s] of simulated time.
             progress: Show a progress bar; None shows one in a terminal after two seconds.
+            each_frame: Called with the time [s] at the end of each frame. What is dynamic is as it is then; ``time``
+                and the bodies that follow paths go on some frames at a time only.
 
         Raises:
+            BodyStateError: ``each_frame`` is given for a world that runs in the background.
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
         span = number("seconds", seconds, low=0.0)
         with self._call():
             begin = self._time
         if self.is_running:
+            if each_frame is not None:
+                raise BodyStateError("a world that runs in the background tells no frames; stop it first")
             self._wait_until(begin + span)
             return
         frames = span * self.frame_rate
-        pieces = max(1, math.ceil(math.floor(frames + 1e-6) / CHUNK))
-        ends = [begin + k * CHUNK / self.frame_rate for k in range(1, pieces)] + [begin + span]
+        chunk = min(CHUNK, math.gcd(*(watcher.frames for watcher in self._watchers)) or CHUNK)
+        chunk = 1 if self.drivers else chunk  # they are asked frame by frame
+        pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
+        ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
         for end in _with_bar(ends, pieces, progress):
             with self._call():
-                self._advance(end - self._time, end)
+                self._advance(end - self._time, end, each_frame)
 
     def start(self, real_time_factor: float = 1.0) -> None:
         """Run in the background, at ``real_time_factor`` times real time (``math.inf``: as fast as possible).

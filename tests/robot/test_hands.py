@@ -7,6 +7,7 @@ import nuno
 from nuno.dynamics import vertex_shares
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.hands import Hand, hands_of
+from nuno.robot.sensors import Sensors
 
 TOWEL = nuno.Cloth(area_density=0.3, damping=0.02, air_drag=5.0)
 
@@ -16,7 +17,9 @@ def with_towel(robot, size=0.2, cells=8):
     world = nuno.World(device="cpu")
     links = robot.enter(world)
     place = robot.frame_pose("left_hand").to_world([(0.0, 0.0, 0.02)])[0]
-    towel = world.add(nuno.sheet((size, size), cells=(cells, cells), position=place + (0.5 * size, 0.5 * size, 0.0)))
+    towel = world.add(
+        nuno.sheet((size, size), cells=(cells, cells), position=np.add(place, (0.5 * size, 0.5 * size, 0.0)))
+    )
     world.attach(towel, TOWEL)
     return world, links, towel, Hand(links, "left_hand")
 
@@ -88,7 +91,9 @@ def test_a_rigid_box_is_held_as_a_whole(talos):
     world = nuno.World(device="cpu")
     links = talos.enter(world)
     frame = talos.frame_pose("left_hand")
-    box = world.add(nuno.box((0.3, 0.02, 0.05), position=frame.to_world([(0, 0, 0.03)])[0], quaternion=frame.quaternion))
+    box = world.add(
+        nuno.box((0.3, 0.02, 0.05), position=frame.to_world([(0, 0, 0.03)])[0], quaternion=frame.quaternion)
+    )
     world.attach(box, nuno.Rigid(mass=0.2))
     hand = Hand(links, "left_hand")
     assert hand.close() == (box,)
@@ -105,7 +110,7 @@ def test_a_coarse_cloth_is_held_by_its_surface(talos):
     world = nuno.World(device="cpu")
     links = talos.enter(world)
     place = talos.frame_pose("left_hand").to_world([(0, 0, 0.02)])[0]
-    sheet = world.add(nuno.sheet((0.4, 0.4), cells=(2, 2), position=place + (0.1, 0.1, 0)))
+    sheet = world.add(nuno.sheet((0.4, 0.4), cells=(2, 2), position=np.add(place, (0.1, 0.1, 0))))
     world.attach(sheet, TOWEL)
     hand = Hand(links, "left_hand")
     assert hand.close() == (sheet,)
@@ -161,3 +166,80 @@ def test_bad_input(talos):
         Hand(links, "tail")
     with pytest.raises(InvalidInputError, match=r"at most 0\.092 m apart, got 0\.2"):
         Hand(links, "left_hand").move(0.2)
+
+
+INERTIAL = """<inertial><mass value="0.2"/>
+    <inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial>"""
+CLAMP = f"""<robot name="clamp">
+  <link name="body">{INERTIAL}</link>
+  <link name="palm">{INERTIAL}
+    <collision><origin xyz="0 -0.05 0"/><geometry><box size="0.06 0.02 0.06"/></geometry></collision></link>
+  <link name="thumb">{INERTIAL}
+    <collision><origin xyz="0 0.01 0"/><geometry><box size="0.06 0.02 0.06"/></geometry></collision></link>
+  <joint name="wrist" type="revolute"><parent link="body"/><child link="palm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="palm"/><child link="thumb"/><axis xyz="0 1 0"/>
+    <origin xyz="0 -0.04 0"/><limit lower="0" upper="0.08" effort="100" velocity="1"/></joint>
+</robot>"""
+
+TABLE = """[clamp]
+urdf = "clamp.urdf"
+[clamp.posture]
+slide = 0.08
+[clamp.frames]
+left_hand = { link = "palm" }
+left_wrist = { link = "palm" }
+[clamp.hands.left_hand]
+low = [-0.03, -0.04, -0.03]
+high = [0.03, 0.04, 0.03]
+joint = "slide"
+open = 0.08
+closed = 0.0
+width = 0.08
+"""
+
+
+def test_contact_alone_holds_where_friction_suffices(tmp_path):
+    """A clamp whose jaw slides shut on a sponge lifts it without a grip; its wrist bears the weight; open, it falls.
+
+    Squeezed by a tenth, 2e4 Pa over 0.04 x 0.04 m press with 3 N: friction holds 25 times the weight, 0.19 N.
+    """
+    (tmp_path / "clamp.urdf").write_text(CLAMP)
+    (tmp_path / "robots.toml").write_text(TABLE)
+    robot = nuno.Humanoid("clamp", robots=tmp_path / "robots.toml")
+    robot.translate((0, 0, 0.5))
+    world = nuno.World(device="cpu")
+    table = world.add(nuno.box((0.3, 0.3, 0.1), position=(0, 0, 0.43)))
+    sponge = world.add(nuno.soft_box((0.04, 0.04, 0.04), cells=(3, 3, 3), position=(0, -0.0195, 0.5005)))
+    world.attach(sponge, nuno.Soft(youngs_modulus=2e4, poisson_ratio=0.3, density=300.0, friction=0.8, damping=0.05))
+    links = robot.enter(world)
+    for body in links.bodies:
+        body.friction = 0.8
+    hand = Hand(links, "left_hand")
+    sensors = Sensors(robot, links)
+    empty = sensors.read()
+    assert hand.move(0.036) == {"slide": pytest.approx(0.036)}
+    links.follow(0.4)
+    world.run(0.5)
+    before = sponge.vertices.mean(axis=0)
+    robot.translate((0, 0, 0.1))
+    links.follow(0.8)
+    world.run(1.0)
+    assert hand.held == ()
+    rise = sponge.vertices.mean(axis=0) - before
+    np.testing.assert_allclose(rise, (0, 0, 0.1), atol=2e-3)  # [m], a straight path starts and stops at once
+    bottom = sponge.vertices[:, 2].min()
+    assert bottom > table.vertices[:, 2].max() + 0.09
+    world.run(0.5)
+    weights = []
+    for _ in range(20):
+        world.step()
+        weights.append(sensors.read().wrenches["left_wrist"][2] - empty.wrenches["left_wrist"][2])
+    weight = 300.0 * 0.04**3 * 9.81
+    assert np.mean(weights) == pytest.approx(-weight, rel=0.02)
+    creep = sponge.vertices[:, 2].min() - bottom
+    assert abs(creep) < 5e-4  # [m] in most of a second
+    hand.move(0.08)
+    links.follow(0.2)
+    world.run(0.5)
+    assert sponge.vertices[:, 2].max() < before[2] + 0.03  # it lies on the table again

@@ -109,7 +109,7 @@ def track_hands(
         pixels, found = _follow(seen, times, camera, place, z[:, hand], np.median(seen[0][core], axis=0), radius)
         rays = zip(pixels, z[:, hand], strict=True)
         positions = np.stack([camera.back_project(pixel, height) for pixel, height in rays])
-        gaps = _gaps(times, sorted(seen), found)
+        gaps = gaps_without(times, sorted(seen), found)
         for first, last in gaps:
             log.info("hand %d was not found from %.2f s to %.2f s", hand, first, last)
         tracks.append(HandTrack(times, positions, pixels, found, gaps))
@@ -140,7 +140,7 @@ def _follow(
             depth = (heights[k] - origin[2]) / ray[2] if abs(ray[2]) > 1e-9 else -1.0
             if depth > 0.0:
                 size = max(camera.fx, camera.fy) * radius / depth
-                measured = _look(images[k], state[0], size, colour, WINDOW + 3.0 * float(np.sqrt(spread[0, 0])))
+                measured = look_near(images[k], state[0], size, colour, WINDOW + 3.0 * float(np.sqrt(spread[0, 0])))
                 if measured is not None:
                     gain = spread[:, 0] / (spread[0, 0] + NOISE**2)
                     state = state + gain[:, None] * (measured - state[0])
@@ -163,7 +163,7 @@ def _motion(step: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[1.0, step], [0.0, 1.0]]), UNREST**2 * np.outer(effect, effect) + 1e-9 * np.eye(2)
 
 
-def _look(image: np.ndarray, near: np.ndarray, size: float, colour: np.ndarray, window: float) -> np.ndarray | None:
+def look_near(image: np.ndarray, near: np.ndarray, size: float, colour: np.ndarray, window: float) -> np.ndarray | None:
     """The pixel (2,) of the disc of ``size`` [px] within ``window`` [px] that is most like the hand, or None."""
     reach = int(np.ceil(window + RING * size + 2))
     u0, v0 = np.floor(near).astype(int) - reach
@@ -190,7 +190,8 @@ def _look(image: np.ndarray, near: np.ndarray, size: float, colour: np.ndarray, 
     return np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum()
 
 
-def _gaps(times: np.ndarray, shown: list[int], found: np.ndarray) -> tuple[tuple[float, float], ...]:
+def gaps_without(times: np.ndarray, shown: list[int], found: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Begin and end [s] of each stretch of the frames ``shown`` in which the hand was not ``found`` (k,)."""
     gaps: list[tuple[float, float]] = []
     last = times[shown[0]]
     missing = False

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from nuno import quaternion as quat
-from nuno.errors import FileFormatError, MeshError, RobotModelError, UnknownNameError
+from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotModelError, UnknownNameError
 from nuno.validation import count, finite_array, number
 
 KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
@@ -49,6 +49,7 @@ class CameraOnFrame:
         height: [px].
         field_of_view: Horizontal angle of view [rad].
         ahead: How far ahead of the frame the pinhole is [m], so that the head's own shapes are behind it.
+        aside: How far to the right of the frame it is [m]; half the baseline of a stereo pair.
     """
 
     frame: str
@@ -56,6 +57,28 @@ class CameraOnFrame:
     height: int
     field_of_view: float
     ahead: float = 0.0
+    aside: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class HandOnFrame:
+    """What a hand closes on, in the frame of the same name.
+
+    Attributes:
+        low: (3,) float [m], lower corner of the volume between the open fingers.
+        high: (3,) float [m], upper corner.
+        joint: The joint that closes it, or None.
+        open: The joint's position when the hand is open [rad or m].
+        closed: Likewise when the fingers meet.
+        width: How far apart the open fingers are [m]; 0 of a hand without fingers.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    joint: str | None = None
+    open: float = 0.0
+    closed: float = 0.0
+    width: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +94,7 @@ class RobotDescription:
         frames: By role ("left_hand", "imu" ...).
         feet: Of those, the soles of the feet.
         cameras: By name.
+        hands: By the name of the frame of each hand that closes.
     """
 
     name: str
@@ -81,6 +105,7 @@ class RobotDescription:
     frames: Mapping[str, FrameOnLink] = field(default_factory=dict)
     feet: tuple[str, ...] = ()
     cameras: Mapping[str, CameraOnFrame] = field(default_factory=dict)
+    hands: Mapping[str, HandOnFrame] = field(default_factory=dict)
 
 
 def find_description(
@@ -142,14 +167,15 @@ def _description(name: str, entry: dict[str, Any], folder: Path, package_dirs: t
         role: CameraOnFrame(
             str(given["frame"]), count("width", given["width"]), count("height", given["height"]),
             number("field_of_view", given["field_of_view"], above=0.0, high=math.pi - 0.01),
-            number("ahead", given.get("ahead", 0.0)),
+            number("ahead", given.get("ahead", 0.0)), number("aside", given.get("aside", 0.0)),
         )
         for role, given in entry.get("cameras", {}).items()
     }  # fmt: skip
+    hands = {role: _hand(role, given) for role, given in entry.get("hands", {}).items()}
     urdf, srdf = _placed(entry["urdf"], folder), entry.get("srdf")
     return RobotDescription(
         name, urdf, None if srdf is None else _placed(srdf, folder), package_dirs or tuple(urdf.parents[:5]),
-        entry.get("posture", {}), frames | feet, tuple(feet), cameras,
+        entry.get("posture", {}), frames | feet, tuple(feet), cameras, hands,
     )  # fmt: skip
 
 
@@ -159,6 +185,15 @@ def _frame(role: str, given: dict[str, Any]) -> FrameOnLink:
         str(given["link"]), finite_array(f"{role} position", given.get("position", (0.0, 0.0, 0.0)), (3,)),
         quat.unit(f"{role} quaternion", given.get("quaternion", quat.IDENTITY), (4,)), size,
     )  # fmt: skip
+
+
+def _hand(role: str, given: dict[str, Any]) -> HandOnFrame:
+    low, high = (finite_array(f"{role} {end}", given[end], (3,)) for end in ("low", "high"))
+    if (low >= high).any():
+        raise InvalidInputError(f"the volume of {role!r} needs low below high, got {low} and {high}")
+    joint = given.get("joint")
+    opened, closed = (number(f"{role} {end}", given[end] if joint else 0.0) for end in ("open", "closed"))
+    return HandOnFrame(low, high, joint, opened, closed, number(f"{role} width", given.get("width", 0.0), low=0.0))
 
 
 def _placed(name: str, folder: Path) -> Path:

@@ -135,7 +135,7 @@ def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
         )
     vertices = np.array(own.vertices())
     if as_hull:
-        vertices, faces = _hull(vertices)
+        vertices, faces = convex_hull(vertices)
     else:
         triangles = [own.tri_indices(k) for k in range(own.num_tris)]
         faces = np.array([(t[0], t[1], t[2]) for t in triangles], dtype=np.int64)
@@ -146,7 +146,7 @@ def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
     return shape, shape.centre
 
 
-def _hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners (k, 3) and faces (m, 3), looking outwards, of the convex hull of points (n, 3)."""
     from scipy.spatial import ConvexHull
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -131,6 +132,12 @@ class Humanoid(Coordinates):
         upper = np.where(self._turns_freely, np.inf, self.model.upperPositionLimit[self._rows])
         return lower, upper
 
+    @cached_property
+    def is_slide(self) -> np.ndarray:
+        """(n,) bool, whether a joint slides; others turn."""
+        return np.array(["Prismatic" in own.shortname() or own.shortname()[:-1] == "JointModelP"
+                         for own in self.model.joints[2:]], dtype=bool)  # fmt: skip
+
     @property
     def velocity_limits(self) -> np.ndarray:
         """(n,) float [rad/s; m/s for slides]."""
@@ -140,6 +147,15 @@ class Humanoid(Coordinates):
     def effort_limits(self) -> np.ndarray:
         """(n,) float [N m; N for slides]."""
         return np.array(self.model.effortLimit[6:])
+
+    def copy(self) -> Humanoid:
+        """Return another such robot, at the same place and in the same posture; nothing follows it."""
+        made = copy.copy(self)  # what never changes is shared: the description, the model, the meshes
+        made._position, made._quaternion = self._pose()
+        made._parent, made._children = None, []
+        made.data, made.scratch = self.model.createData(), self.model.createData()
+        made._angles, made._is_current = self._angles.copy(), False
+        return made
 
     # Where everything is
 
@@ -181,7 +197,7 @@ class Humanoid(Coordinates):
         if name not in cameras:
             raise UnknownNameError("camera", name, list(cameras))
         own = cameras[name]
-        pose = self.frame_pose(own.frame).translate((0.0, 0.0, own.ahead))
+        pose = self.frame_pose(own.frame).translate((own.aside, 0.0, own.ahead))
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = pose.rotation, pose.position
         focal = 0.5 * own.width / math.tan(0.5 * own.field_of_view)
@@ -228,10 +244,14 @@ class Humanoid(Coordinates):
         position, quaternion = self._pose()
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InvalidInputError("a robot has one pose, not one for each world")
+        return self.configuration_of(self._angles, np.concatenate([position, quaternion[1:], quaternion[:1]]))
+
+    def configuration_of(self, angles: np.ndarray, base: np.ndarray) -> np.ndarray:
+        """Return the configuration (nq,) with angles (n,) and a base (7,): position, quaternion (x, y, z, w)."""
         q = np.zeros(self.model.nq)
-        q[:3], q[3:6], q[6] = position, quaternion[1:], quaternion[0]
-        q[self._rows] = np.where(self._turns_freely, np.cos(self._angles), self._angles)
-        q[self._rows[self._turns_freely] + 1] = np.sin(self._angles[self._turns_freely])
+        q[:7] = base
+        q[self._rows] = np.where(self._turns_freely, np.cos(angles), angles)
+        q[self._rows[self._turns_freely] + 1] = np.sin(angles[self._turns_freely])
         return q
 
     def take_configuration(self, q: np.ndarray) -> None:
@@ -241,11 +261,21 @@ class Humanoid(Coordinates):
             InvalidInputError: another length, not finite, or a joint beyond its limit.
         """
         q = finite_array("q", q, (self.model.nq,))
-        angles = q[self._rows]
-        free = self._turns_freely
-        angles[free] = np.arctan2(q[self._rows[free] + 1], angles[free])
-        self._angles = self.checked_angles(angles)
+        self._angles = self.checked_angles(self.angles_of(q))
         self._place(q[:3].copy(), quat.unit("q[3:7]", q[[6, 3, 4, 5]], (4,)))
+
+    def angles_of(self, q: np.ndarray) -> np.ndarray:
+        """Return the joints' angles (n,) in a configuration (nq,)."""
+        angles = q[self._rows]
+        if (free := self._turns_freely).any():
+            angles[free] = np.arctan2(q[self._rows[free] + 1], angles[free])
+        return angles
+
+    def move_to(self, angles: np.ndarray, base: np.ndarray | None = None) -> None:
+        """Take angles (n,) within limits, and a pose (7,) of the base as in a configuration, without any checks."""
+        self._angles, self._is_current = angles, False
+        if base is not None:
+            self._place(base[:3].copy(), base[[6, 3, 4, 5]])
 
     def update(self) -> Any:
         """Return Pinocchio's data, with joints and frames where they are now."""

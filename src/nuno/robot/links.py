@@ -10,7 +10,7 @@ import pinocchio as pin
 from nuno import quaternion as quat
 from nuno.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.path import Path
+from nuno.motion import Convoy
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -48,15 +48,23 @@ class Links:
             Body(own.shape, name=f"{robot.name}/{own.link}", color=own.color, **masks)  # type: ignore[arg-type]
             for own in shapes
         )
+        self._keys = tuple(body.key for body in self.bodies)
         self._joints = np.array([own.joint for own in shapes], dtype=int)
         self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
         self._inside = True
+        self._convoy: Convoy | None = None  # on which they are under way
+        for body in self.bodies:
+            body._links = self  # a viewer draws the robot's visual meshes in their place
         positions, quaternions = self.poses()
         with world.lock:
             for body, position, quaternion in zip(self.bodies, positions, quaternions, strict=True):
                 body._position, body._quaternion = position, quaternion
                 world.add(body)
+
+    def joint_of(self, k: int) -> int:
+        """Return Pinocchio's index of the joint that carries the k-th body."""
+        return int(self._joints[k])
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
@@ -77,21 +85,28 @@ class Links:
         self._check_inside()
         positions, quaternions = self.poses()
         with self.world.lock:
-            start = np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
-            now = self.world.time
+            start, now = self._arrived(), self.world.time
             if duration == 0.0:
                 times, places, turns = np.array([now]), positions[:, None], quaternions[:, None]
             else:
                 times = np.array([now, now + duration])
                 places = np.stack([start[0], positions], axis=1)
                 turns = np.stack([start[1], quaternions], axis=1)
-            for array in (times, places, turns):
-                array.setflags(write=False)
-            for body, place, turn in zip(self.bodies, places, turns, strict=True):
+            self._convoy = Convoy(self._keys, times, places, turns)
+            paths = self._convoy.paths
+            for body, path, place, turn in zip(self.bodies, paths, places, turns, strict=True):
                 if body._path is None:  # the first time, and after anything else took the body elsewhere
-                    self.world.move(body, Path(times, place, turn))
+                    self.world.move(body, path)
                 else:  # what ``World.move`` does to a body that follows a path already
-                    body._path, body._position, body._quaternion = _path(times, place, turn), place[0], turn[0]
+                    body._path, body._position, body._quaternion = path, place[0], turn[0]
+
+    def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
+        convoy = self._convoy
+        if convoy is not None and convoy.arrived is not None and convoy.arrived[0] == self.world.time:
+            if [body._path for body in self.bodies] == convoy.paths:
+                return convoy.arrived[1:]
+        return np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
 
     def leave(self) -> None:
         """Take the bodies out of the world.
@@ -112,10 +127,3 @@ class Links:
         gone = [body.name for body in self.bodies if body._world is not self.world]
         if gone:
             raise BodyStateError(f"{len(gone)} links are no longer in the world, the first is {gone[0]!r}")
-
-
-def _path(times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> Path:
-    """Return a path of read-only numbers that need no check: 50 of them a tick would take a millisecond."""
-    path = object.__new__(Path)
-    path.__dict__.update(times=times, positions=positions, quaternions=quaternions, interpolation="linear")
-    return path

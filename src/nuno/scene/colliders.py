@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 UNBOUNDED = 1.0e9
 """[m] Bounding radius of a plane."""
+ENDLESS = 2**30
+"""Substeps of the frame in which all stand still."""
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
@@ -56,7 +58,9 @@ class Colliders:
         self._meshes = meshes
         # (worlds, led, 3) [m], where the led bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
+        self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
+        self._convoy: tuple[tuple[str, ...], np.ndarray, np.ndarray] | None = None
 
     @classmethod
     def from_bodies(
@@ -133,33 +137,66 @@ class Colliders:
         worlds = len(self.shapes.pose) // (len(self.led) * SLOT_SIZE)
         place = np.empty((worlds, len(self.led), 2 * frames + 1, 3))
         turn = np.empty((worlds, len(self.led), 2 * frames + 1, 4))
-        for slot, body in enumerate(self.led):
-            place[:, slot], turn[:, slot] = schedule.poses[body.key]
-        if self._centres.any():
+        slots = self._slots
+        for key, pose in schedule.alone.items():
+            if key in slots:
+                place[:, slots[key]], turn[:, slots[key]] = pose
+        for keys, places, turns in schedule.convoys:
+            own, rows = self._slots_of(keys)
+            place[:, own], turn[:, own] = places[rows], turns[rows]
+        if self._has_centres:
             place += quat.rotate(turn, self._centres[:, :, None])
         # the short way round between neighbours, which the kernels blend number by number
         flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
         turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
-        table = np.zeros((worlds, len(self.led), FRAMES, FRAME_SIZE), dtype=np.float32)
+        table = self._table
         first = 2 * np.arange(frames + 1)
         base = np.round(place[:, :, first] * 1024.0) / 1024.0
         table[:, :, : frames + 1, :3] = base
         for k in range(3):
             # the frame that begins at the end stands still
             which = np.minimum(first + k, 2 * frames)
-            key = table[:, :, : frames + 1, 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
-            key[..., :3] = place[:, :, which] - base
-            key[..., 3:] = turn[:, :, which]
-        self.shapes.pose.assign(table.ravel())
-        self.shapes.haste.assign(np.array([self._haste(schedule.times, place, turn)], dtype=np.float32))
+            into = table[:, :, : frames + 1, 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
+            into[..., :3] = place[:, :, which] - base
+            into[..., 3:] = turn[:, :, which]
+        haste = self._haste(schedule.times, place, turn)
+        if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
+            self._haste_on_cpu[0] = haste
+        else:
+            self.shapes.pose.assign(table.ravel())
+            self.shapes.haste.assign(np.array([haste], dtype=np.float32))
         self._times = schedule.times
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        """Key poses (worlds, led, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
+        shape = (-1, len(self.led), FRAMES, FRAME_SIZE)
+        pose = self.shapes.pose
+        found = pose.numpy() if pose.device.is_cpu else np.zeros(len(pose), dtype=np.float32)
+        return np.asarray(found.reshape(shape))
+
+    @cached_property
+    def _haste_on_cpu(self) -> np.ndarray:
+        return np.asarray(self.shapes.haste.numpy())
+
+    @cached_property
+    def _slots(self) -> dict[str, int]:
+        return {body.key: slot for slot, body in enumerate(self.led)}
+
+    def _slots_of(self, keys: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the slots of those of many bodies that have one, and which they are."""
+        if self._convoy is None or self._convoy[0] is not keys:
+            pairs = [(self._slots[key], row) for row, key in enumerate(keys) if key in self._slots]
+            own, rows = np.array(pairs, dtype=int).reshape(-1, 2).T
+            self._convoy = (keys, own, rows)
+        return self._convoy[1], self._convoy[2]
 
     def _haste(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray) -> float:
         """The fastest that any point of the led bodies moves [m/s]."""
         span = np.diff(times)
         radii = self._radii[:, None]
-        speed = np.linalg.norm(np.diff(place, axis=2), axis=-1) / span
-        dot = np.clip(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 0.0, 1.0)
+        speed = np.linalg.norm(place[:, :, 1:] - place[:, :, :-1], axis=-1) / span
+        dot = np.minimum(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 1.0)
         return float((speed + 2.0 * np.arccos(dot) / span * radii).max())
 
     @cached_property
@@ -175,8 +212,8 @@ class Colliders:
         if self.led and len(self._times) > 1:
             starts = self._times[::2]
             first = int(np.argmin(np.abs(starts - time)))
-            # at the end all stand still, for however long
-            span = round((starts[first + 1] - starts[first]) / dt) if first + 1 < len(starts) else 1
+            # at the end all stand still, for however long: that frame has no end
+            span = round((starts[first + 1] - starts[first]) / dt) if first + 1 < len(starts) else ENDLESS
             self.shapes.timing.assign(np.array([first, max(1, span)], dtype=np.int32))
 
 

@@ -1,0 +1,188 @@
+"""Hands: what closes between a robot's fingers is gripped, until they open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from nuno import quaternion as quat
+from nuno.body import Body
+from nuno.coordinates import Coordinates, Pose, compose, invert
+from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.grip import Grip
+from nuno.robot.description import HandOnFrame
+from nuno.surface import SurfacePoints
+from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.robot.links import Links
+
+PROBES = 5
+"""Points along each side of the closing volume from which the nearest surface is looked for."""
+
+
+class Hand:
+    """A hand of a robot that is in a world.
+
+    When it closes, what is between its fingers is gripped by the link that carries them, and bears on it until the hand
+    opens. A cloth or soft body is gripped by its vertices in the closing volume, or, where it is so coarse that none is
+    in it, by the nearest points of its surface; a rigid body as a whole. The joint that shows the fingers closed moves
+    on its own (``joint_angles``), as do fingers that hold by friction alone.
+
+    Args:
+        links: The robot's links in the world.
+        name: "left_hand" or "right_hand": the frame that the description says the closing volume of.
+
+    Raises:
+        UnknownNameError: the description has no such hand.
+        InvalidInputError: no link of the hand has a shape in the world.
+    """
+
+    def __init__(self, links: Links, name: str) -> None:
+        robot = links.robot
+        if name not in robot.description.hands:
+            raise UnknownNameError("hand", name, list(robot.description.hands))
+        self.links, self.name = links, name
+        self.description: HandOnFrame = robot.description.hands[name]
+        if self.description.joint is not None:
+            robot.joint_index(self.description.joint)
+        self.body, self._offset = carrier(links, name)
+        self._grips: list[Grip] = []
+
+    def __repr__(self) -> str:
+        held = ", ".join(body.name for body in self.held) or "nothing"
+        return f"<{self.name} of {self.links.robot.name!r}, holds {held}>"
+
+    @property
+    def grips(self) -> tuple[Grip, ...]:
+        """What it holds with; a body that was detached or removed is no longer among them."""
+        return tuple(grip for grip in self._grips if grip.active)
+
+    @property
+    def held(self) -> tuple[Body, ...]:
+        """The bodies that it holds."""
+        return tuple(grip.body for grip in self.grips)
+
+    @property
+    def width(self) -> float:
+        """How far apart the fingers are [m], by the joint as it is now; of a hand without a joint, when open."""
+        own = self.description
+        if own.joint is None:
+            return own.width
+        robot = self.links.robot
+        angle = robot.angle_vector()[robot.joint_index(own.joint)]
+        return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
+
+    def joint_angles(self, width: float) -> dict[str, float]:
+        """Return the joint's position by name when the fingers are ``width`` [m] apart; empty without a joint.
+
+        Raises:
+            InvalidInputError: the fingers do not go so far apart.
+        """
+        own = self.description
+        wanted = number("width", width, low=0.0)
+        if wanted > own.width + 1e-9:
+            raise InvalidInputError(f"the fingers of {self.name!r} are at most {own.width} m apart, got {wanted} m")
+        if own.joint is None:
+            return {}
+        return {own.joint: own.closed + (own.open - own.closed) * wanted / own.width}
+
+    def volume(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners (3,) and (3,) [m] of the closing volume, in the frame of the hand."""
+        return self.description.low.copy(), self.description.high.copy()
+
+    def close(self, bodies: Sequence[Body | str] | None = None) -> tuple[Body, ...]:
+        """Grip what is in the closing volume, and return the bodies that are held: none where it is empty.
+
+        What the hand held before it lets go first.
+
+        Args:
+            bodies: Dynamic bodies that it may take; None are all.
+
+        Raises:
+            BodyStateError: a body that is static or in another world, or links that have left theirs.
+        """
+        world = self.links.world
+        with world.lock:
+            self.open()
+            frame = Coordinates(*compose(self.body._pose(), self._offset))  # where the body is, not where it is sent
+            chosen = [b for b in world.bodies if b.is_dynamic] if bodies is None else [world._own(b) for b in bodies]
+            for body in chosen:
+                where = self._inside(body, frame)
+                if where is not False:
+                    self._grips.append(world.grip(body, where, to=self.body))
+        return self.held
+
+    def open(self) -> None:
+        """Let go of everything: what was held moves on as if it had never been."""
+        for grip in self._grips:
+            grip.release()
+        self._grips = []
+
+    def move(self, width: float) -> dict[str, float]:
+        """Open to a width [m], letting go where that is wider than now, and return the joint's position as it then is.
+
+        The robot takes it; ``links.follow`` moves the fingers there. To take hold, ``close``.
+        """
+        angles = self.joint_angles(width)
+        if self.description.joint is None or width > self.width + 1e-9:
+            self.open()
+        if angles:
+            self.links.robot.angle_vector(angles)
+        return angles
+
+    def _inside(self, body: Body, frame: Coordinates) -> np.ndarray | SurfacePoints | bool | None:
+        """Return the points of a body that are in the closing volume, None for a rigid body in it, else False."""
+        low, high = self.volume()
+        local = frame.to_local(body.vertices)
+        if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
+            return False
+        rigid = body._dynamics is not None and body._dynamics.is_rigid
+        inside = np.flatnonzero(((local >= low) & (local <= high)).all(axis=1))
+        if len(inside):
+            return None if rigid else inside
+        steps = [np.linspace(a, b, PROBES) for a, b in zip(low, high, strict=True)]
+        probes = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
+        found = body.closest(frame.to_world(probes))
+        points = np.einsum("kc,kcx->kx", found.barycentric, local[body.faces[found.faces]])
+        near = ((points >= low) & (points <= high)).all(axis=1)
+        if not near.any():
+            return False
+        if rigid:
+            return None
+        # as many points as there are to tell how the surface is turned, and no two the same
+        nearest = np.flatnonzero(near)[np.argsort(np.linalg.norm(points[near] - 0.5 * (low + high), axis=1))]
+        kept: list[int] = []
+        for k in nearest:
+            if all(np.linalg.norm(points[k] - points[j]) > 0.25 * (high - low).min() for j in kept):
+                kept.append(int(k))
+        return SurfacePoints(found.faces[kept[:3]], found.barycentric[kept[:3]])
+
+
+def carrier(links: Links, frame: str) -> tuple[Body, Pose]:
+    """Return the body that carries a frame of the robot, and where the frame is in the body's own.
+
+    It is the body of the frame's link, or, where that has no shape, one of a link that is fixed to it.
+
+    Raises:
+        InvalidInputError: there is none.
+    """
+    robot = links.robot
+    own = robot.model.frames[robot.frame_index(frame)]
+    role = robot.description.frames.get(frame)
+    name = f"{robot.name}/{frame if role is None else role.link}"
+    fixed = np.flatnonzero(links._joints == own.parentJoint)
+    if not len(fixed):
+        raise InvalidInputError(f"no link that is fixed to {frame!r} of {robot.name!r} has a shape in the world")
+    k = next((k for k in fixed if links.bodies[k].name == name), fixed[0])
+    x, y, z, w = pin.Quaternion(own.placement.rotation).coeffs()
+    placed = (np.array(own.placement.translation), quat.unit("quaternion", (w, x, y, z), (4,)))
+    return links.bodies[k], compose(invert((links._offsets[k], links._turns[k])), placed)
+
+
+def hands_of(links: Links) -> dict[str, Hand]:
+    """Return the hands of a robot that is in a world, by name."""
+    return {name: Hand(links, name) for name in links.robot.description.hands}

@@ -1,0 +1,145 @@
+"""Head cameras: what the cameras on a robot's head see, its own arms included."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.body import Body
+from nuno.camera.camera import Camera
+from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
+from nuno.coordinates import compose, invert
+from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.robot.hands import carrier
+from nuno.robot.sensor_model import EARLY
+from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.robot.links import Links
+
+STEREO = ("head_left", "head_right")
+LOOKS = ("visual", "collision")
+
+
+class HeadCameras:
+    """Cameras of a robot that is in a world.
+
+    Each ``look`` gives a picture of every camera: colour, depth and which body is seen where. A camera is where the
+    link is that carries it, and the robot is drawn as it looks, at its links' places in the world.
+
+    Args:
+        links: The robot's links in the world.
+        names: Which cameras, of the robot's description.
+        size: Times the description's pixels each way.
+        looks: "visual": the robot's visual meshes in place of its collision shapes; "collision": those.
+        lamp: The light; None is one above.
+        background: Colour where nothing is.
+        patterns: Chequers of bodies (or names).
+        samples: Each pixel's colour is the mean of so many by so many.
+        noise: Standard deviation of each pixel's channels [levels of 255].
+        rate: Pictures a second [1/s]; None takes them whenever asked. In between the last ones stand.
+        latency: How long after they were taken pictures are given [s].
+        seed: Of the noise; every picture has another.
+
+    Raises:
+        UnknownNameError: the robot has no such camera.
+        InvalidInputError: a value that cannot be used.
+    """
+
+    def __init__(
+        self, links: Links, names: Sequence[str] = STEREO, *, size: float = 1.0, looks: str = "visual",
+        lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7), patterns: Mapping[Any, Chequer] | None = None,
+        samples: int = 1, noise: float = 0.0, rate: float | None = None, latency: float = 0.0, seed: int = 0,
+    ) -> None:  # fmt: skip
+        if looks not in LOOKS:
+            raise InvalidInputError(f"looks must be one of {LOOKS}, got {looks!r}")
+        cameras = links.robot.description.cameras
+        for name in names:
+            if name not in cameras:
+                raise UnknownNameError("camera", name, list(cameras))
+        self.links, self.names = links, tuple(names)
+        self._scale = number("size", size, above=0.0)
+        self._rate = None if rate is None else number("rate", rate, above=0.0)
+        self._latency, self._seed, self._taken = number("latency", latency, low=0.0), int(seed), 0
+        self._options: dict[str, Any] = {
+            "lamp": lamp, "background": background, "patterns": patterns, "samples": samples, "noise": noise,
+        }  # fmt: skip
+        self._carriers = {name: carrier(links, cameras[name].frame) for name in self.names}
+        self._instead = _visual_bodies(links) if looks == "visual" else {}
+        self._last = -np.inf
+        self._coming: deque[tuple[float, dict[str, Picture]]] = deque()
+        self._told: tuple[float, dict[str, Picture]] | None = None
+
+    def camera(self, name: str) -> Camera:
+        """Return a camera where its link is now.
+
+        Raises:
+            UnknownNameError: it is none of these.
+        """
+        if name not in self._carriers:
+            raise UnknownNameError("camera", name, list(self._carriers))
+        body, offset = self._carriers[name]
+        own = self.links.robot.description.cameras[name]
+        ahead = (np.array((own.aside, 0.0, own.ahead)), np.array((1.0, 0.0, 0.0, 0.0)))
+        place, turn = compose(compose(body._pose(), offset), ahead)
+        made = self.links.robot.camera(name)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = _matrix(turn), place
+        return replace(made, camera_to_world=pose).scaled(self._scale)
+
+    def look(self) -> dict[str, Picture]:
+        """Return the newest picture that has arrived of every camera, by name; all were taken at one time."""
+        world = self.links.world
+        with world.lock:
+            now = world.time
+            if self._told is not None and now < self._last - EARLY:
+                self._coming.clear()  # a world that was restored
+                self._told, self._taken = None, 0
+            self._last = now
+            newest = self._coming[-1] if self._coming else self._told
+            due = newest is None or self._rate is None or now >= newest[0] + 1.0 / self._rate - EARLY
+            if due:
+                self._coming.append((now, self._take()))
+        while self._coming and (self._told is None or self._coming[0][0] + self._latency <= now + EARLY):
+            self._told = self._coming.popleft()
+        assert self._told is not None
+        return self._told[1]
+
+    def _take(self) -> dict[str, Picture]:
+        for body, others in self._instead.items():
+            for each, offset in others:
+                each._position, each._quaternion = compose(body._pose(), offset)
+        instead = {body: [each for each, _ in others] for body, others in self._instead.items()}
+        pictures = {}
+        for name in self.names:
+            self._taken += 1
+            pictures[name] = take_picture(
+                self.links.world, self.camera(name), instead=instead, seed=self._seed * 1_000_003 + self._taken,
+                **self._options,
+            )  # fmt: skip
+        return pictures
+
+
+def _visual_bodies(links: Links) -> dict[Body, list[tuple[Body, Any]]]:
+    """What the links look like, by the bodies that stand for them in the world, and where in the bodies' frames."""
+    drawn: dict[Body, list[tuple[Body, Any]]] = {body: [] for body in links.bodies}
+    prefix = f"{links.robot.name}/"
+    joints = list(links._joints)
+    by_name = {body.name: k for k, body in reversed(list(enumerate(links.bodies)))}
+    for own in links.robot.geometry.shapes("visual"):
+        k = by_name.get(prefix + own.link, joints.index(own.joint) if own.joint in joints else None)
+        if k is None or links._joints[k] != own.joint:
+            continue  # a joint without any collision shape has no body that could carry its looks
+        offset = compose(invert((links._offsets[k], links._turns[k])), (own.position, own.quaternion))
+        drawn[links.bodies[k]].append((Body(own.shape, name=prefix + own.link, color=own.color), offset))
+    return drawn
+
+
+def _matrix(turn: np.ndarray) -> np.ndarray:
+    from nuno.coordinates import Coordinates
+
+    return Coordinates(quaternion=turn).rotation

@@ -1,0 +1,24 @@
+"""RobotState: where a robot is and how it moves, at one time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """A robot's configuration and motion, in Pinocchio's coordinates with the free base first.
+
+    Attributes:
+        time: [s], of the world.
+        q: (nq,) float, configuration: position [m] and quaternion (x, y, z, w) of the base, then the joints.
+        v: (nv,) float, velocity: of the base in its own frame [m/s, rad/s], then the joints' [rad/s].
+        a: (nv,) float, acceleration likewise, that of the base without gravity.
+    """
+
+    time: float
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray

@@ -1,0 +1,83 @@
+"""Walk: a planned and checked walk, tick by tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+
+from nuno.robot.footsteps import Footstep
+from nuno.robot.state import RobotState
+from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.robot.walk_check import WalkMeasures
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A walk that begins and ends with both feet on the floor, at rest; see ``plan_walk``.
+
+    One that continues another begins where that was left (``continue_walk``, ``stop_walk``): its times go on from
+    there.
+
+    Attributes:
+        dt: Between two ticks [s].
+        times: (n,) float [s].
+        configurations: (n, nq) float, Pinocchio's, the base with it, in the world.
+        velocities: (n, nv) float, of the base in its own frame [m/s, rad/s], then the joints' [rad/s].
+        accelerations: (n, nv) float, likewise.
+        footsteps: Those that are made in it, in order; of one that continues another, from the step under way.
+        support: (n,) int, 0 both feet stand, 1 the left one, 2 the right one.
+        feet: (n, 2, 4) float, x, y, z [m] and yaw [rad] of the left and right sole.
+        centre: (n, 3) float, of mass [m].
+        zmp: (n, 2) float, the zero moment point of all links [m].
+        zmp_wanted: (n, 2) float, where it was to be [m].
+        measures: How far it is from what the robot cannot do.
+    """
+
+    dt: float
+    times: np.ndarray
+    configurations: np.ndarray
+    velocities: np.ndarray
+    accelerations: np.ndarray
+    footsteps: tuple[Footstep, ...]
+    support: np.ndarray
+    feet: np.ndarray
+    centre: np.ndarray
+    zmp: np.ndarray
+    zmp_wanted: np.ndarray
+    measures: WalkMeasures
+    plan: Any = field(repr=False)  # what continue_walk goes on from
+
+    def __repr__(self) -> str:
+        return f"<Walk of {len(self.footsteps)} steps, {self.times[0]:.2f} to {self.times[-1]:.2f} s>"
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    def configuration_at(self, time: float) -> np.ndarray:
+        """Return the configuration (nq,) at a time [s]; before and after the walk that of its ends."""
+        k, share = self._tick(time)
+        if share == 0.0:
+            return self.configurations[k].copy()
+        return np.array(pin.interpolate(self.plan.model, self.configurations[k], self.configurations[k + 1], share))
+
+    def state_at(self, time: float) -> RobotState:
+        """Return configuration, velocity and acceleration at a time [s]; before and after the walk at rest."""
+        k, share = self._tick(time)
+        parts = []
+        for part in (self.velocities, self.accelerations):
+            parts.append(part[k].copy() if share == 0.0 else (1.0 - share) * part[k] + share * part[k + 1])
+        return RobotState(float(time), self.configuration_at(time), *parts)
+
+    def _tick(self, time: float) -> tuple[int, float]:
+        at = (number("time", time) - self.times[0]) / self.dt
+        k = int(np.clip(np.floor(at + 1e-9), 0, len(self.times) - 1))
+        if k == len(self.times) - 1 or at <= k + 1e-9:
+            return k, 0.0
+        return k, float(at - k)

@@ -1,0 +1,290 @@
+"""Films: what a viewer drew, frame by frame, as one file for any browser."""
+
+from __future__ import annotations
+
+import html
+import logging
+import math
+import os
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.color import rgb
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.export import check_extension, one_world
+from nuno.mesh.primitives import PLANE_HALF
+from nuno.viewer.actor import Actor, light_of
+from nuno.viewer.cast import CREASE
+from nuno.viewer.message import pack
+from nuno.viewer.page import film_page
+from nuno.viewer.rigid_motion import rigid_motion
+from nuno.viewer.stage import Stage
+from nuno.viewer.view import View
+from nuno.whole_file import replacing
+
+if TYPE_CHECKING:
+    from nuno.recording import Recording
+
+LOG = logging.getLogger(__name__)
+
+STEPS = 65535  # into which the room that a thing's points ever take is divided, each way
+
+
+@dataclass(eq=False)
+class Track:
+    """One actor's way through a film.
+
+    Attributes:
+        actor: The actor.
+        first: The frame that it entered at.
+        last: The frame that it was gone at, or None.
+        frames: Those at which it had moved.
+        poses: Where it was then, (7,) each; or, of one that deforms or of marks,
+        points: its points then, (n, 3) each.
+    """
+
+    actor: Actor
+    first: int
+    last: int | None = None
+    frames: list[int] = field(default_factory=list)
+    poses: list[np.ndarray] = field(default_factory=list)
+    points: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, frame: int) -> None:
+        """Take the actor's present state in."""
+        self.frames.append(frame)
+        if self.actor.pose is not None:
+            self.poses.append(self.actor.pose)
+        else:
+            self.points.append(self.actor.points)
+
+    def content(self) -> dict[str, Any]:
+        """Return what the page needs."""
+        actor = self.actor
+        row: dict[str, Any] = {
+            "first": self.first, "last": self.last, "frames": np.array(self.frames, np.uint32),
+            "path": actor.path, **{name: _short(value) for name, value in actor.shape.items()},
+        }  # fmt: skip
+        if self.poses:
+            return row | {"poses": np.array(self.poses, np.float32).ravel(), **_packed(actor.points[None])}
+        if actor.shape["kind"] in ("mesh", "lines"):
+            return row | _packed(np.array(self.points))
+        counts = np.array([len(points) for points in self.points], np.uint32)
+        return row | {"counts": counts, "values": np.concatenate(self.points).astype(np.float32).ravel()}
+
+
+class Film:
+    """What was drawn of a world while it was recorded; ``Viewer.record`` starts one, ``stop`` ends it.
+
+    With ``with``, it is stopped, and saved where a path was given, at the end of the block.
+
+    Args:
+        stage: What is drawn; None where the tracks are known.
+        rate: Frames per simulated second [1/s].
+        path: Where it is saved at the end of a ``with`` block, or None.
+    """
+
+    def __init__(self, stage: Stage | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
+        self._stage, self._rate, self._path = stage, rate, path
+        self._tracks: dict[int, Track] = {}
+        self._times: list[float] = []
+        self._failed: Exception | None = None
+        self.view: View | None = None
+        self._period = 1 if stage is None else max(1, int(stage.world.frame_rate / rate + 1e-6))
+        if stage is not None:
+            with stage.world.lock:
+                self._take()
+                stage.world._watchers.append(self)
+
+    @classmethod
+    def of(cls, recording: Recording, *, world: int | None = None) -> Film:
+        """Return a film of a recording.
+
+        Args:
+            recording: The recording.
+            world: Which world of a batch; None for a single world.
+
+        Raises:
+            InvalidInputError: the recording is empty, or a batch without ``world``.
+        """
+        film = cls(None)
+        film._times = recording.times.tolist()
+        if not film._times:
+            raise InvalidInputError("the recording is empty; add a frame first")
+        for body in recording.bodies:
+            points = one_world(body.skin(), world, axis=1)
+            local, poses = rigid_motion(points)
+            plane = points.shape[1] == 4 and float(np.ptp(local, axis=0).max()) >= PLANE_HALF  # stands for all of it
+            actor = Actor(
+                ("recording", body.name), "mesh", local, color=light_of(rgb(body.color)), opacity=1.0, endless=plane,
+                triangles=body.faces.astype(np.uint32).ravel(), lines=np.empty(0, np.uint32),
+                crease=CREASE if poses is not None else None,
+            )  # fmt: skip
+            track = Track(actor, 0)
+            for frame in range(len(points)):
+                if poses is not None:
+                    actor.place(poses[frame])
+                else:
+                    actor.shift(points[frame])
+                if frame == 0 or actor.moved:
+                    track.add(frame)
+                actor.moved = False
+            film._tracks[actor.number] = track
+        return film
+
+    def __enter__(self) -> Film:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+        if kind is None and self._path is not None:
+            self.save(self._path)
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def __repr__(self) -> str:
+        return f"<Film of {len(self._times)} frames, {self.duration:.2f} s>"
+
+    def _repr_html_(self) -> str:
+        page = html.escape(film_page(self.message(), "Nuno"), quote=True)
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 500px; border: none"></iframe>'
+
+    @property
+    def frames(self) -> int:
+        """How many frames of a run may go by between two calls of ``seen``, so that none is missed."""
+        if self._stage is None:
+            return self._period
+        done = round((self._stage.world._time - self._times[-1]) * self._stage.world.frame_rate)
+        return math.gcd(self._period, max(0, self._period - done))
+
+    @property
+    def times(self) -> np.ndarray:
+        """(t,) float64 [s], the world's clock at each frame."""
+        return np.array(self._times)
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first frame to the last."""
+        return self._times[-1] - self._times[0] if self._times else 0.0
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether it goes on."""
+        return self._stage is not None
+
+    def stop(self) -> None:
+        """Take the last frame and end the recording; nothing where it has ended.
+
+        Raises:
+            Exception: whatever kept it from taking a frame.
+        """
+        stage = self._stage
+        if stage is None:
+            return
+        with stage.world.lock:
+            self._stage = None
+            stage.world._watchers = [other for other in stage.world._watchers if other is not self]
+            if self._failed is None and stage.world._time > self._times[-1]:
+                self._take(stage)
+        if self.view is None:
+            self.view = View.around(*stage.bounds())
+        if self._failed is not None:
+            raise self._failed
+
+    def seen(self) -> None:
+        """Take a frame in where one is due; the world calls this under its lock after each piece of a run."""
+        if self._stage is None or self._failed is not None:
+            return
+        now = self._stage.world._time
+        try:
+            if now >= self._times[-1] + (1.0 - 1e-3) / self._rate:  # where time was set back, later than ever before
+                self._take()
+        except Exception as error:  # the world must go on; ``stop`` tells
+            LOG.exception("the recording ended at t = %.3f s", now)
+            self._failed = error
+
+    def save(self, path: str | os.PathLike[str], title: str = "Nuno") -> None:
+        """Write one .html file with all that it needs; a file that is there is replaced.
+
+        Args:
+            path: Ends with .html.
+            title: The page's title.
+
+        Raises:
+            InvalidInputError: the path does not end with .html.
+        """
+        goal = FilePath(path)
+        check_extension(goal, ".html")
+        written = film_page(self.message(), title).encode()
+        with replacing(goal) as partial:
+            partial.write_bytes(written)
+
+    def message(self) -> bytes:
+        """Return the film as the page takes it.
+
+        Raises:
+            BodyStateError: it is still being recorded.
+        """
+        if self._stage is not None:
+            raise BodyStateError("the film is being recorded; stop it first")
+        view = self.view or self._view_of_all()
+        times = np.array(self._times) - self._times[0]
+        content = {
+            "do": "film", "start": self._times[0], "times": times.astype(np.float32),
+            "tracks": [track.content() for track in self._tracks.values()],
+        }  # fmt: skip
+        return pack({"commands": [view.command(), content]})
+
+    def _take(self, stage: Stage | None = None) -> None:
+        stage = stage or self._stage
+        assert stage is not None
+        stage.look()
+        left, entered, moved = stage.settle()
+        frame = len(self._times)
+        self._times.append(stage.time)
+        for number in left:
+            if number in self._tracks:
+                self._tracks[number].last = frame
+        for actor in entered:
+            self._tracks[actor.number] = Track(actor, frame)
+        for actor in [*entered, *moved]:
+            self._tracks[actor.number].add(frame)
+
+    def _view_of_all(self) -> View:
+        corners = []
+        for track in self._tracks.values():
+            if track.actor.shape.get("endless"):
+                continue
+            if track.poses:
+                reach = np.abs(track.actor.points).max()
+                places = np.array(track.poses)[:, :3]
+                corners += [places.min(axis=0) - reach, places.max(axis=0) + reach]
+            elif track.points:
+                points = np.concatenate(track.points)
+                corners += [points.min(axis=0), points.max(axis=0)]
+        if not corners:
+            return View.around(np.full(3, -0.5), np.full(3, 0.5))
+        return View.around(np.min(corners, axis=0).astype(float), np.max(corners, axis=0).astype(float))
+
+
+def _packed(points: np.ndarray) -> dict[str, Any]:
+    """Return points (t, n, 3) in whole steps of the room that they take, each frame as the change from that before."""
+    low, high = points.min(axis=(0, 1)).astype(float), points.max(axis=(0, 1)).astype(float)
+    step = np.maximum(high - low, 1e-9) / STEPS
+    whole = np.rint((points - low) / step).astype(np.uint16)
+    changes = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1]))  # modulo 65536, as the page adds
+    return {"low": low.tolist(), "step": step.tolist(), "changes": changes.ravel()}
+
+
+def _short(value: Any) -> Any:
+    """Return an array of small numbers in two bytes each."""
+    if isinstance(value, np.ndarray) and value.dtype == np.uint32 and (not len(value) or value.max() <= STEPS):
+        return value.astype(np.uint16)
+    return value

@@ -1,0 +1,87 @@
+"""Marks: what a viewer draws besides bodies: held points, contact forces, the frusta of cameras."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.camera.camera import Camera
+from nuno.coordinates import Pose
+from nuno.grip import GripSpec
+from nuno.tie import HoldSpec
+
+if TYPE_CHECKING:
+    from nuno.grip import Grip
+    from nuno.simulation import Simulation
+
+FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6], dtype=np.uint32)
+"""Edges of ``frustum``: from the pinhole to the corners, round the image, and a stroke where up is."""
+
+
+def held_points(world: Simulation, index: int) -> np.ndarray:
+    """Return where the grips of one world hold, (k, 3) float [m]; of a rigid body, the origin of its frame."""
+    found = [np.empty((0, 3))]
+    for dynamics in world._attached():
+        for grip in dynamics.grips:
+            found.append(_points_of(grip, index))
+    return np.concatenate(found)
+
+
+def _points_of(grip: Grip, index: int) -> np.ndarray:
+    spec: Any = grip._spec
+    if isinstance(spec, HoldSpec):
+        place = grip.body._pose()[0]
+        return np.atleast_2d(place[index] if place.ndim == 2 else place)
+    vertices = grip.body._vertices()
+    vertices = vertices[index if len(vertices) > 1 else 0] if vertices.ndim == 3 else vertices
+    if isinstance(spec, GripSpec):
+        if spec.vertices is not None:
+            chosen = spec.vertices[index]
+            return vertices[chosen[chosen >= 0]]
+        corners, weights = spec.corners, spec.barycentric
+    else:
+        corners, weights = spec.corners, spec.weights
+    assert corners is not None and weights is not None
+    valid = corners[index][:, 0] >= 0
+    return np.einsum("kc,kcx->kx", weights[index][valid], vertices[corners[index][valid]])
+
+
+def contact_arrows(world: Simulation, scale: float, indices: list[int]) -> list[np.ndarray]:
+    """Return the contact forces on dynamic bodies, of some worlds: (2 k, 3) float [m] each, where and whereto.
+
+    Args:
+        world: The world.
+        scale: Length [m/N].
+        indices: Which worlds.
+    """
+    from nuno.contact_points import contact_points
+
+    rows: list[list[np.ndarray]] = [[] for _ in indices]
+    for body in list(world._bodies.values()):
+        if body._dynamics is None:
+            continue
+        found = contact_points(world, body)
+        ends = np.stack([found.points, found.points + scale * found.forces], axis=1)
+        for k, index in enumerate(indices):
+            rows[k].append(ends[found.worlds == index].reshape(-1, 3))
+    return [np.concatenate(row) if row else np.empty((0, 3)) for row in rows]
+
+
+def frustum(camera: Camera, depth: float) -> np.ndarray:
+    """Return the corners of a camera's frustum in its own frame, (7, 3) float [m]; see ``FRUSTUM``."""
+    w, h = camera.width - 0.5, camera.height - 0.5
+    pixels = np.array([(-0.5, -0.5), (w, -0.5), (w, h), (-0.5, h)])
+    rays = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    corners = depth * np.column_stack([rays, np.ones(4)])
+    middle = corners[:2].mean(axis=0)
+    up = middle + 0.3 * (middle - corners[2:].mean(axis=0))
+    return np.vstack([np.zeros(3), corners, middle, up])
+
+
+def camera_pose(camera: Camera) -> Pose:
+    """Return where a camera is: (3,) [m] and (4,)."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(camera.camera_to_world[:3, :3]).as_quat()
+    return camera.camera_to_world[:3, 3], np.array((w, x, y, z))

@@ -1,0 +1,100 @@
+"""Styles: in which way a body is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.body import Body, Color
+from nuno.color import rgb
+from nuno.drawing import Mode, draw
+from nuno.errors import InvalidInputError
+from nuno.soft_shape import SoftShape
+from nuno.validation import number
+
+MODES = ("surface", "wireframe", "tetrahedra")
+
+
+@dataclass(frozen=True, eq=False)
+class Style:
+    """How a body is drawn.
+
+    Attributes:
+        mode: "surface", "wireframe" or "tetrahedra".
+        explode: As ``nuno.draw`` takes it.
+        slice_at: Likewise.
+        color: In place of the body's own, or None.
+        opacity: In (0, 1].
+        visible: Whether it is drawn at all.
+    """
+
+    mode: Mode = "surface"
+    explode: float = 1.3
+    slice_at: tuple[ArrayLike, ArrayLike] | None = None
+    color: Color | None = None
+    opacity: float = 1.0
+    visible: bool = True
+
+    def __post_init__(self) -> None:
+        if self.mode not in MODES:
+            raise InvalidInputError(f'mode must be "surface", "wireframe" or "tetrahedra", got {self.mode!r}')
+        number("explode", self.explode, low=1.0)
+        number("opacity", self.opacity, above=0.0, high=1.0)
+        if self.color is not None:
+            rgb(self.color)
+
+    def check(self, body: Body) -> None:
+        """Check that the body can be drawn so.
+
+        Raises:
+            InvalidInputError: tetrahedra of a body that has none, or a plane that leaves nothing.
+        """
+        draw(body, self.mode, explode=self.explode, slice_at=self.slice_at)
+
+    def points(self, body: Body, vertices: np.ndarray) -> np.ndarray:
+        """Return the vertices of ``nuno.draw``, (k, 3), when the body's are at (n, 3) [m]."""
+        if not isinstance(body.shape, SoftShape) or self.mode == "wireframe":
+            return vertices
+        made = body.shape.tetrahedra()
+        if self.mode == "surface":
+            return made.skin_vertices(vertices)
+        if self.slice_at is not None:
+            return vertices
+        corners = vertices[made.tets]
+        away = corners.mean(axis=1, keepdims=True) - vertices.mean(axis=0)
+        return (corners + (self.explode - 1.0) * away).reshape(-1, 3)
+
+
+@dataclass(eq=False)
+class Styles:
+    """The styles of a viewer, and what it marks.
+
+    Attributes:
+        usual: Of all bodies but those in ``own``.
+        own: By body key.
+        grips: Whether held points are marked.
+        contacts: Whether contact forces are drawn.
+        force_scale: Length of a force's arrow [m/N].
+        cameras: By name: a camera, the body that carries it or None, and how deep its frustum is drawn [m].
+    """
+
+    usual: Style = Style()
+    own: dict[str, Style] = field(default_factory=dict)
+    grips: bool = True
+    contacts: bool = False
+    force_scale: float = 0.02
+    cameras: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        # one object for all bodies: what is drawn is made anew where a body's style is another
+        self._solid = replace(self.usual, mode="surface") if self.usual.mode == "tetrahedra" else self.usual
+
+    def of(self, body: Body) -> Style:
+        """Return the style of a body; where the usual one is of tetrahedra and it has none, that of its surface."""
+        own = self.own.get(body.key)
+        if own is not None:
+            return own
+        return self.usual if isinstance(body.shape, SoftShape) else self._solid
