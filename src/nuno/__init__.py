@@ -30,14 +30,19 @@ from nuno.drawing import Drawing, draw
 from nuno.errors import (
     BodyStateError,
     ClothNotFoundError,
+    ConnectionLostError,
     EstimationError,
     FileFormatError,
     ImageError,
     InvalidInputError,
     MeshError,
+    MessageError,
     MissingPackageError,
+    NotConnectedError,
     NunoError,
+    RefusedError,
     RobotModelError,
+    RobotTimeoutError,
     SimulationDiverged,
     UnknownNameError,
     ViewerError,
@@ -70,17 +75,24 @@ if TYPE_CHECKING:
     from nuno.estimate.pick_result import PickResult
     from nuno.estimate.similarity import similarity
     from nuno.robot.footsteps import Footstep
+    from nuno.robot.goal import Goal, Tolerances
     from nuno.robot.hands import Hand
     from nuno.robot.head_cameras import HeadCameras
     from nuno.robot.humanoid import Humanoid
+    from nuno.robot.interface import RobotInterface
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
     from nuno.robot.sensor_model import SensorModel
     from nuno.robot.sensors import Readings, Sensors
+    from nuno.robot.servo import ServoCommand
+    from nuno.robot.simulated_robot import SimulatedRobot
     from nuno.robot.stereo import StereoPoints, StereoTrack, locate_marker, track_hands_in_stereo, triangulate
     from nuno.robot.stride import Stride
+    from nuno.robot.trajectory import JointTrajectory
     from nuno.robot.walk import Walk
     from nuno.robot.walking import continue_walk, plan_walk, plan_walk_footsteps, plan_walk_velocity, stop_walk
+    from nuno.robot.wire.client import WireRobot
+    from nuno.robot.wire.server import RobotServer
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
 
@@ -97,6 +109,7 @@ __all__ = [
     "ClothMesh",
     "ClothNotFoundError",
     "Compound",
+    "ConnectionLostError",
     "ContactPoints",
     "Coordinates",
     "Cylinder",
@@ -108,6 +121,7 @@ __all__ = [
     "FoldCase",
     "FoldResult",
     "Footstep",
+    "Goal",
     "Grip",
     "Hand",
     "HandPath",
@@ -116,12 +130,15 @@ __all__ = [
     "Humanoid",
     "ImageError",
     "InvalidInputError",
+    "JointTrajectory",
     "Lamp",
     "Layers",
     "Links",
     "Material",
     "MeshError",
+    "MessageError",
     "MissingPackageError",
+    "NotConnectedError",
     "NunoError",
     "Path",
     "PickCase",
@@ -131,11 +148,17 @@ __all__ = [
     "Reach",
     "Readings",
     "Recording",
+    "RefusedError",
     "Rigid",
+    "RobotInterface",
     "RobotModelError",
+    "RobotServer",
+    "RobotTimeoutError",
     "SensorModel",
     "Sensors",
+    "ServoCommand",
     "Sheet",
+    "SimulatedRobot",
     "SimulationDiverged",
     "Snapshot",
     "Soft",
@@ -151,12 +174,14 @@ __all__ = [
     "Stride",
     "SurfacePoints",
     "Table",
+    "Tolerances",
     "TriangleMesh",
     "UnknownNameError",
     "Viewer",
     "ViewerError",
     "Walk",
     "WalkError",
+    "WireRobot",
     "World",
     "box",
     "capsule",
@@ -241,6 +266,14 @@ _LAZY = {
     "StereoTrack": "nuno.robot.stereo",
     "StereoPoints": "nuno.robot.stereo",
     "locate_marker": "nuno.robot.stereo",
+    "RobotServer": "nuno.robot.wire.server",
+    "WireRobot": "nuno.robot.wire.client",
+    "SimulatedRobot": "nuno.robot.simulated_robot",
+    "RobotInterface": "nuno.robot.interface",
+    "JointTrajectory": "nuno.robot.trajectory",
+    "ServoCommand": "nuno.robot.servo",
+    "Tolerances": "nuno.robot.goal",
+    "Goal": "nuno.robot.goal",
 }
 
 

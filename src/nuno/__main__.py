@@ -1,4 +1,4 @@
-"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, and ``fold`` likewise."""
+"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, ``fold`` likewise, and ``serve talos``."""
 
 from __future__ import annotations
 
@@ -24,8 +24,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
-    for command in (pick, fold):
+    serve = commands.add_parser(
+        "serve", help="put a simulated robot on the wire, for clients of the rosbridge protocol"
+    )
+    serve.add_argument("robot", nargs="?", default="talos", help="talos (default), g1, or the path of a URDF file")
+    serve.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
+    serve.add_argument("--port", type=int, default=9090, help="0 takes a free one (default 9090)")
+    pace = serve.add_mutually_exclusive_group()
+    pace.add_argument(
+        "--factor", type=float, default=1.0, help="simulated over real time (default 1; inf: at full speed)"
+    )
+    pace.add_argument("--stepped", action="store_true", help="let time pass only while a client waits for it")
+    for command in (pick, fold, serve):
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
+    for command in (pick, fold):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="progress bar (default: on a terminal)",
@@ -34,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     _quiet_warp()
     try:
-        return {"pick": _pick, "fold": _fold}[options.command](options)
+        return {"pick": _pick, "fold": _fold, "serve": _serve}[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
     except (NunoError, OSError) as error:
@@ -81,6 +93,22 @@ def _fold(options: argparse.Namespace) -> int:
         f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
         f"see {options.out}/result.json, strip.png, layers.png and replay.glb\n"
     )
+    return ANSWERED
+
+
+def _serve(options: argparse.Namespace) -> int:
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.simulated_robot import SimulatedRobot
+    from nuno.robot.wire.server import RobotServer
+    from nuno.world import World
+
+    robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))
+    factor = None if options.stepped else options.factor
+    with RobotServer(robot, options.host, options.port, real_time_factor=factor) as server:
+        sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
+        sys.stdout.flush()
+        while not server.join(1.0):
+            pass
     return ANSWERED
 
 

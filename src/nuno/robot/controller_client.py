@@ -1,0 +1,48 @@
+"""ControllerClient: what a program asked of one of a robot's controllers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nuno.robot.goal import Goal, Tolerances
+from nuno.robot.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    from nuno.robot.joint_interface import JointInterface
+
+Controller = dict[str, Any]
+"""One controller: "controller_type" (its name here), "controller_action" and "controller_state" (what the wire calls
+its action and the topic of its state), "action_type", and "joint_names"."""
+
+
+class ControllerClient:
+    """What this program asked of one controller: its last goal.
+
+    Args:
+        interface: The robot's.
+        controller: The controller.
+    """
+
+    def __init__(self, interface: JointInterface, controller: Controller) -> None:
+        self.interface, self.controller = interface, controller
+        self.goal: Goal | None = None
+
+    def send_goal(
+        self, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None
+    ) -> Goal:
+        """Send a trajectory that starts in ``start_time`` [s], in place of the one under way."""
+        self.goal = self.interface.send_trajectory(self.controller, trajectory, start_time, tolerances)
+        return self.goal
+
+    def is_interpolating(self) -> bool:
+        """Whether the last goal is under way."""
+        return self.goal is not None and not self.goal.is_done
+
+    def wait_for_result(self, timeout: float = 0.0) -> bool:
+        """Wait until the last goal ended, up to ``timeout`` [s], 0 for ever; return whether there is one that did."""
+        goal = self.goal
+        return goal is not None and self.interface.wait_until(lambda: goal.is_done, timeout)
+
+    def cancel_all_goals(self) -> None:
+        """Let the controller give up what it does, whoever asked for it; it holds where it is."""
+        self.interface.cancel_trajectories(self.controller)

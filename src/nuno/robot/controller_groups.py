@@ -1,0 +1,42 @@
+"""Groups of joints that a controller each moves: arms, legs, hands, head and torso, as the model shows them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+
+LIMBS = {"larm": "left_hand", "rarm": "right_hand", "lleg": "left_foot", "rleg": "right_foot", "head": "head_camera"}
+"""Limbs by the names that robots' interfaces have for them, and the role of the frame at their end."""
+
+
+def controller_groups(robot: Humanoid) -> dict[str, tuple[str, ...]]:
+    """Return the joints of each controller, "larm_controller" and so on; every joint is in one of them.
+
+    A limb's joints are those that carry its end and no other limb's; those that carry several are the torso's. What a
+    limb's last joint carries besides its end, such as fingers, is that arm's hand: "lhand_controller". A robot whose
+    description names no ends has one "fullbody_controller".
+    """
+    ends = {limb: role for limb, role in LIMBS.items() if role in robot.description.frames}
+    if not ends:
+        return {"fullbody_controller": robot.joint_names} if robot.joint_names else {}
+    model = robot.model
+    chains = {
+        limb: [j for j in model.supports[model.frames[robot.frame_index(role)].parentJoint] if j >= 2]
+        for limb, role in ends.items()
+    }
+    group: dict[int, str] = {}
+    for limb, chain in chains.items():
+        for j in chain:
+            group[j] = "torso" if j in group else limb
+    for j in range(2, model.njoints):  # parents come before their children
+        if j not in group:
+            above = group.get(model.parents[j], "torso")
+            group[j] = above.replace("arm", "hand")
+    order = ("larm", "rarm", "lhand", "rhand", "head", "torso", "lleg", "rleg")
+    return {
+        f"{name}_controller": tuple(model.names[j] for j in sorted(group) if group[j] == name)
+        for name in order
+        if name in group.values()
+    }

@@ -1,0 +1,496 @@
+"""JointInterface: the joints of a robot as its driver offers them, whether it is real, simulated or behind a wire.
+
+Names, order of arguments, defaults, units and what is returned are those of scikit-robot's interface to a real robot
+(0.4.7), so that a program written for that runs here. What a robot itself must bring are the abstract methods.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.errors import InvalidInputError, RobotTimeoutError, UnknownNameError
+from nuno.robot.controller_client import Controller, ControllerClient
+from nuno.robot.controller_groups import controller_groups
+from nuno.robot.goal import Goal, Tolerances
+from nuno.robot.readings import JointState
+from nuno.robot.trajectory import JointTrajectory
+from nuno.validation import finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+
+logger = logging.getLogger(__name__)
+
+TICK = 0.01
+"""[s] Between two looks at what is waited for."""
+STATE_TIMEOUT = 3.0
+"""[s] How long a fresh joint state is waited for."""
+STILL = (np.deg2rad(0.1), 0.01)
+"""[rad], [m] Changes of hinges and slides that count as none when the shortest time is worked out."""
+INTERPOLATIONS = ("linear", "minjerk")
+
+
+class JointInterface(ABC):
+    """The joints of a robot and the controllers that move them.
+
+    Angle vectors are (n,) [rad; m for slides] in the order of ``robot.joint_names``; where one is sent, a mapping from
+    joint names does as well, other joints staying where they are.
+
+    Args:
+        robot: The model; the interface keeps a copy, ``robot``, that shows what was last known of the real one.
+        default_controller: The name of all controllers together.
+        controller_timeout: How long a controller is waited for at the beginning [s]; None for ever.
+        namespace: What the names of actions and topics begin with.
+    """
+
+    def __init__(
+        self, robot: Humanoid, default_controller: str = "default_controller", *,
+        controller_timeout: float | None = 3.0, namespace: str | None = None,
+    ) -> None:  # fmt: skip
+        self.robot = robot.copy()
+        self.controller_timeout, self.namespace = controller_timeout, namespace
+        self.controller_table: dict[str, list[ControllerClient]] = {}
+        self.controller_param_table: dict[str, list[Controller]] = {}
+        self.controller_type = default_controller
+        self.joint_state: JointState | None = None
+        self._joints = frozenset(self.robot.joint_names)
+        self._velocities = np.zeros(len(self.robot.joint_names))
+        self._efforts = np.zeros(len(self.robot.joint_names))
+        self.controller_actions = self.add_controller(default_controller, create_actions=True)
+
+    # What a robot must bring
+
+    @abstractmethod
+    def now(self) -> float:
+        """Return the time of the robot's clock [s]."""
+
+    @abstractmethod
+    def sleep(self, seconds: float) -> None:
+        """Let the robot's clock go on by ``seconds`` [s]; the place of ``time.sleep`` in a program for robots."""
+
+    @abstractmethod
+    def read_joint_state(self) -> JointState | None:
+        """Return the newest joint state there is, None before the first; it may lack joints."""
+
+    @abstractmethod
+    def read_reference(self) -> JointState | None:
+        """Return where the controllers want the joints now, None where that is not known; it may lack joints."""
+
+    @abstractmethod
+    def send_trajectory(
+        self, controller: Controller, trajectory: JointTrajectory, start_time: float, tolerances: Tolerances | None
+    ) -> Goal:
+        """Send a trajectory to a controller, to start ``start_time`` [s] from now, and return the goal at once.
+
+        A trajectory that the controller does not take comes back as a goal that was rejected or aborted.
+        """
+
+    @abstractmethod
+    def cancel_trajectories(self, controller: Controller) -> None:
+        """Let a controller give up what it does; its goal ends as preempted, and the joints hold where they are."""
+
+    @abstractmethod
+    def is_busy(self, controller: Controller) -> bool:
+        """Return whether a controller follows a goal, whoever sent it."""
+
+    def has_controller(self, controller: Controller) -> bool:
+        """Return whether the robot has a controller, once that is known or ``controller_timeout`` has passed."""
+        return True
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Wait until a condition holds, up to ``timeout`` [s] of the robot's clock, None or 0 for ever.
+
+        Returns:
+            Whether it holds.
+        """
+        end = None if not timeout else self.now() + timeout
+        while not condition():
+            if end is not None and self.now() >= end:
+                return False
+            self.sleep(TICK)
+        return True
+
+    # Controllers
+
+    def default_controller(self) -> list[Controller]:
+        """Return the controllers of the robot; by default one for each group of joints that its model shows."""
+        return [
+            {
+                "controller_type": name,
+                "controller_action": f"{name}/follow_joint_trajectory",
+                "controller_state": f"{name}/state",
+                "action_type": "control_msgs/FollowJointTrajectoryAction",
+                "joint_names": list(joints),
+            }
+            for name, joints in controller_groups(self.robot).items()
+        ]
+
+    def add_controller(
+        self, controller_type: str, joint_enable_check: bool = True, create_actions: bool | None = None
+    ) -> list[ControllerClient]:
+        """Let a name stand for the controllers of ``default_controller``, and return them.
+
+        Args:
+            controller_type: The name.
+            joint_enable_check: Whether one that does not answer leaves the name without any.
+            create_actions: Whether to make them known, each also by its own name; else only the name is taken for
+                default.
+        """
+        made: dict[str, list[ControllerClient]] = {}
+        controllers = self.default_controller()
+        if create_actions:
+            for controller in controllers:
+                if self.has_controller(controller):
+                    made[controller["controller_type"]] = [ControllerClient(self, controller)]
+                    continue
+                logger.warning("the controller %r does not answer", controller["controller_type"])
+                if joint_enable_check:
+                    return []
+        else:
+            self.controller_type = controller_type
+        self.controller_table[controller_type] = [client for clients in made.values() for client in clients]
+        self.controller_param_table[controller_type] = controllers
+        self.controller_table.update(made)
+        self.controller_param_table.update(
+            {own["controller_type"]: [own] for own in controllers if own["controller_type"] in made}
+        )
+        return self.controller_table[controller_type]
+
+    # State
+
+    def update_robot_state(self, wait_until_update: bool | float = False) -> bool:
+        """Bring ``robot`` to the newest joint state.
+
+        Args:
+            wait_until_update: Wait for one that is newer than now, or than a time [s] of the robot's clock.
+
+        Returns:
+            Whether there is one.
+        """
+        if wait_until_update is not False and wait_until_update is not None:
+            since = self.now() if wait_until_update is True else number("wait_until_update", wait_until_update)
+            if not self.wait_until(lambda: self._newer_than(since), STATE_TIMEOUT):
+                return False
+        state = self.read_joint_state()
+        if state is None:
+            return False
+        self.joint_state = state
+        angles = self.robot.angle_vector()
+        rows = [(k, self.robot.joint_index(name)) for k, name in enumerate(state.names) if name in self._joints]
+        of_state, of_robot = np.array(rows, dtype=int).reshape(-1, 2).T
+        angles[of_robot] = state.positions[of_state]
+        self._show(angles)
+        self._velocities[of_robot] = state.velocities[of_state]
+        self._efforts[of_robot] = state.efforts[of_state]
+        return True
+
+    def potentio_vector(self) -> np.ndarray:
+        """Return the angles (n,) that were last known or sent, without asking the robot."""
+        return self.robot.angle_vector()
+
+    def velocity_vector(self) -> np.ndarray:
+        """Return the joints' velocities (n,) [rad/s; m/s], fresh."""
+        self._refresh()
+        return self._velocities.copy()
+
+    def torque_vector(self) -> np.ndarray:
+        """Return the joints' torques (n,) [N m; N for slides], fresh."""
+        self._refresh()
+        return self._efforts.copy()
+
+    def reference_vector(self) -> np.ndarray:
+        """Return where the controllers want the joints now, (n,).
+
+        Raises:
+            RobotTimeoutError: the controllers do not tell.
+        """
+        if not self.wait_until(lambda: self.read_reference() is not None, STATE_TIMEOUT):
+            raise RobotTimeoutError(f"the controllers told no reference within {STATE_TIMEOUT:g} s")
+        state = self.read_reference()
+        assert state is not None
+        angles = self.robot.angle_vector()
+        for name, position in zip(state.names, state.positions, strict=True):
+            if name in self._joints:
+                angles[self.robot.joint_index(name)] = position
+        return angles
+
+    def error_vector(self) -> np.ndarray:
+        """Return how far the joints are from where the controllers want them, (n,), reference less measured."""
+        self._refresh()
+        return self.sub_angle_vector(self.reference_vector(), self.robot.angle_vector())
+
+    # Motions
+
+    def angle_vector(
+        self, av: ArrayLike | Mapping[str, float] | None = None, time: float | None = None,
+        controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
+        velocities: ArrayLike | None = None, interpolation: str | None = None, interpolation_dt: float = 0.01,
+    ) -> Any:  # fmt: skip
+        """Send the joints to angles, and return at once; without any, wait for a fresh joint state and return it.
+
+        Args:
+            av: (n,), or by name.
+            time: How long the motion takes [s]; shorter than the velocity limits allow is stretched, None takes
+                ``time_scale`` times the shortest.
+            controller_type: Which controllers move; None for the default.
+            start_time: When it starts [s] from now.
+            time_scale: At least 1.
+            velocities: (n,) [rad/s; m/s] on arrival; None for rest.
+            interpolation: "linear" or "minjerk" sends many points on such a motion; None the last one only.
+            interpolation_dt: [s] between those.
+
+        Returns:
+            The angles (n,), those sent where any were; False where there is no such controller; what
+            ``angle_vector_sequence`` returns where ``interpolation`` was asked for.
+
+        Raises:
+            RobotTimeoutError: no joint state came.
+            InvalidInputError: not finite, another length, a time that is negative or no number.
+        """
+        if av is None:
+            self._refresh()
+            return self.robot.angle_vector()
+        wanted = self._checked_vector("av", av)
+        clients = self._clients_of(controller_type)
+        if clients is None:
+            return False
+        start = number("start_time", start_time, low=0.0)
+        arrival = np.zeros_like(wanted) if velocities is None else finite_array("velocities", velocities, wanted.shape)
+        present = self._present()
+        duration = self._checked_time(time, present, wanted, controller_type, time_scale)
+        if interpolation is not None:
+            return self._interpolated(
+                present, wanted, duration, controller_type, start, interpolation, interpolation_dt
+            )
+        self._show(wanted)
+        self._send(clients, np.array([duration]), wanted[None], arrival[None], start)
+        return wanted
+
+    def angle_vector_sequence(
+        self, avs: Sequence[ArrayLike | Mapping[str, float]], times: Sequence[float | None] | float | None = None,
+        controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
+    ) -> Any:  # fmt: skip
+        """Send the joints through many angles, and return at once.
+
+        At a point between, a joint passes with the mean of the velocities before and after, or rests where those
+        differ in sign; at the last it rests.
+
+        Args:
+            avs: The angles, (n,) each, or by name.
+            times: How long each takes [s] from the one before, or one number for all; stretched and chosen as in
+                ``angle_vector``.
+            controller_type: Which controllers move; None for the default.
+            start_time: When it starts [s] from now.
+            time_scale: At least 1.
+
+        Returns:
+            The angles that were sent, a list; False where there is no such controller.
+
+        Raises:
+            RobotTimeoutError: no joint state came.
+            InvalidInputError: no angles; other values than ``angle_vector`` takes; another number of times.
+        """
+        clients = self._clients_of(controller_type)
+        wanted = [self._checked_vector(f"avs[{k}]", av) for k, av in enumerate(avs)]
+        if not wanted:
+            raise InvalidInputError("avs must hold at least one vector of angles")
+        each: list[Any] = list(times) if isinstance(times, Sequence | np.ndarray) else [times] * len(wanted)
+        if len(each) != len(wanted):
+            raise InvalidInputError(f"times must be one for each of {len(wanted)} vectors, got {len(each)}")
+        if clients is None:
+            return False
+        start = number("start_time", start_time, low=0.0)
+        ways = [self._present(), *wanted]
+        spans = np.array([
+            self._checked_time(each[k], ways[k], ways[k + 1], controller_type, time_scale) for k in range(len(wanted))
+        ])  # fmt: skip
+        steps = np.array([self.sub_angle_vector(b, a) for a, b in itertools.pairwise(ways)])
+        slopes = np.divide(steps, spans[:, None], out=np.zeros_like(steps), where=spans[:, None] > 0.0)
+        velocities = np.zeros_like(steps)
+        velocities[:-1] = np.where(steps[:-1] * steps[1:] >= 0.0, 0.5 * (slopes[:-1] + slopes[1:]), 0.0)
+        velocities[:-1][(spans[:-1] <= 0.0) | (spans[1:] <= 0.0)] = 0.0
+        self._show(wanted[-1])
+        self._send(clients, np.cumsum(spans), np.array(wanted), velocities, start)
+        return wanted
+
+    def wait_interpolation(self, controller_type: str | None = None, timeout: float = 0) -> list[bool]:
+        """Wait until the motions that were sent have ended.
+
+        Args:
+            controller_type: Of which controllers; None for the default.
+            timeout: How long at most [s], for each controller; 0 is for ever.
+
+        Returns:
+            Of each controller, whether its motion is still under way.
+
+        Raises:
+            UnknownNameError: there is no such controller.
+        """
+        longest = number("timeout", timeout, low=0.0)
+        clients = self._known_clients(controller_type)
+        for client in clients:
+            client.wait_for_result(longest)
+        return [client.is_interpolating() for client in clients]
+
+    def is_interpolating(self, controller_type: str | None = None) -> bool:
+        """Return whether a motion that was sent from here is under way.
+
+        Raises:
+            UnknownNameError: there is no such controller.
+        """
+        return any(client.is_interpolating() for client in self._known_clients(controller_type))
+
+    def is_moving(self, controller_type: str | None = None) -> bool:
+        """Return whether a controller follows a goal, whoever sent it.
+
+        Raises:
+            UnknownNameError: there is no such controller.
+        """
+        return any(self.is_busy(client.controller) for client in self._known_clients(controller_type))
+
+    def cancel_angle_vector(self) -> None:
+        """Let all controllers give up what they do; the joints hold where they are."""
+        for client in self.controller_actions:
+            client.cancel_all_goals()
+
+    def stop_motion(self, stop_time: float = 0.0, wait: bool = True) -> None:
+        """Bring the joints to rest within ``stop_time`` [s], at once where it is 0.
+
+        Args:
+            stop_time: [s]; shorter than the velocity limits allow is stretched.
+            wait: Return when they rest.
+        """
+        duration = number("stop_time", stop_time, low=0.0)
+        self.cancel_angle_vector() if duration == 0.0 else self._slow_down(duration)
+        if wait:
+            self.wait_interpolation()
+
+    def angle_vector_duration(
+        self, start_av: ArrayLike, end_av: ArrayLike, controller_type: str | None = None,
+        return_joint_names: bool = False,
+    ) -> Any:  # fmt: skip
+        """Return the shortest time [s] between two vectors of angles at the velocity limits.
+
+        Args:
+            start_av: (n,).
+            end_av: (n,).
+            controller_type: Whose joints count; None for the default.
+            return_joint_names: Return a list of (time, joint name) instead.
+
+        Raises:
+            UnknownNameError: there is no such controller.
+        """
+        start, end = self._checked_vector("start_av", start_av), self._checked_vector("end_av", end_av)
+        name = self.controller_type if controller_type is None else controller_type
+        if name not in self.controller_param_table:
+            raise UnknownNameError("controller", name, list(self.controller_param_table))
+        moved = {joint for own in self.controller_param_table[name] for joint in own["joint_names"]}
+        change = np.abs(self.sub_angle_vector(end, start))
+        still = change < np.where(self.robot.is_slide, STILL[1], STILL[0])
+        counts = np.array([joint in moved for joint in self.robot.joint_names]) & ~still
+        times = np.where(counts, change / self.robot.velocity_limits, 0.0)
+        if return_joint_names:
+            return list(zip(times.tolist(), self.robot.joint_names, strict=True))
+        return float(times.max())
+
+    def sub_angle_vector(self, v0: ArrayLike, v1: ArrayLike) -> np.ndarray:
+        """Return v0 - v1, (n,); of joints that turn freely the shorter way round."""
+        change = self._checked_vector("v0", v0) - self._checked_vector("v1", v1)
+        lower, upper = self.robot.joint_limits
+        turns = np.isinf(lower) & np.isinf(upper)
+        change[turns] = (change[turns] + np.pi) % (2.0 * np.pi) - np.pi
+        return change
+
+    # Inside
+
+    def _newer_than(self, time: float) -> bool:
+        state = self.read_joint_state()
+        return state is not None and state.time > time
+
+    def _refresh(self) -> None:
+        if not self.update_robot_state(wait_until_update=True):
+            raise RobotTimeoutError(f"no fresh joint state came within {STATE_TIMEOUT:g} s")
+
+    def _present(self) -> np.ndarray:
+        """Return the angles as they are now, to plan from: no time is let pass where a state is known."""
+        if not self.update_robot_state():
+            self._refresh()
+        return self.robot.angle_vector()
+
+    def _show(self, angles: np.ndarray) -> None:
+        """Let ``robot`` show angles; encoders may tell a little more than the limits, and goals may be beyond them."""
+        lower, upper = self.robot.joint_limits
+        self.robot.angle_vector(np.clip(angles, lower, upper))
+
+    def _checked_vector(self, what: str, av: Any) -> np.ndarray:
+        if not isinstance(av, Mapping):
+            return finite_array(what, av, (len(self.robot.joint_names),))
+        angles = self._present()
+        for joint, angle in av.items():
+            angles[self.robot.joint_index(joint)] = number(f"the angle of {joint!r}", angle)
+        return angles
+
+    def _checked_time(
+        self, time: Any, start: np.ndarray, end: np.ndarray, controller_type: str | None, time_scale: float
+    ) -> float:
+        scale = number("time_scale", time_scale, low=1.0)
+        needed = self.angle_vector_duration(start, end, controller_type, return_joint_names=True)
+        shortest, slowest = max(needed)
+        if time is None:
+            return scale * shortest
+        asked = number("time", time, low=0.0)
+        if asked < shortest:
+            logger.warning("%g s is stretched to %.3f s, the least that %s needs", asked, shortest, slowest)
+        return max(asked, shortest)
+
+    def _clients_of(self, controller_type: str | None) -> list[ControllerClient] | None:
+        name = self.controller_type if controller_type is None else controller_type
+        if name not in self.controller_table:
+            logger.warning("there is no controller %r; there are: %s", name, ", ".join(self.controller_table))
+            return None
+        return self.controller_table[name]
+
+    def _known_clients(self, controller_type: str | None) -> list[ControllerClient]:
+        name = controller_type or self.controller_type
+        if name not in self.controller_table:
+            raise UnknownNameError("controller", name, list(self.controller_table))
+        return self.controller_table[name]
+
+    def _interpolated(
+        self, start: np.ndarray, end: np.ndarray, duration: float, controller_type: str | None, start_time: float,
+        interpolation: str, interpolation_dt: float,
+    ) -> Any:  # fmt: skip
+        if interpolation not in INTERPOLATIONS:
+            raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {interpolation!r}")
+        count = max(1, int(duration / number("interpolation_dt", interpolation_dt, above=0.0) + 1e-9))
+        s = np.arange(1, count + 1) / count
+        if interpolation == "minjerk":
+            s = s**3 * (10.0 + s * (6.0 * s - 15.0))
+        points = start + s[:, None] * self.sub_angle_vector(end, start)
+        times = [duration / count] * count
+        return self.angle_vector_sequence(list(points), times, controller_type, start_time, time_scale=1.0)
+
+    def _slow_down(self, duration: float) -> None:
+        """Send the joints to where a steady deceleration would bring them."""
+        angles = self._present() + 0.5 * duration * self._velocities
+        lower, upper = self.robot.joint_limits
+        self.angle_vector(np.clip(angles, lower, upper), duration)
+
+    def _send(
+        self, clients: list[ControllerClient], times: np.ndarray, positions: np.ndarray, velocities: np.ndarray,
+        start_time: float,
+    ) -> None:  # fmt: skip
+        # where nothing is to move a time is 0: such a point adds nothing but the last one
+        kept = np.append(np.diff(times) > 0.0, True)
+        times, positions, velocities = times[kept], positions[kept], velocities[kept]
+        for client in clients:
+            names = tuple(client.controller["joint_names"])
+            columns = [self.robot.joint_index(name) for name in names]
+            client.send_goal(JointTrajectory(names, times, positions[:, columns], velocities[:, columns]), start_time)

@@ -1,0 +1,170 @@
+"""SimulatedJoints: controllers of all joints, and joints that follow them as far as their limits let them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.errors import InvalidInputError
+from nuno.robot.goal import Goal, Tolerances
+from nuno.robot.trajectory import JointTrajectory, Motion, evaluate
+from nuno.robot.trajectory_controller import TrajectoryController
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+
+ROUNDING = 1.0 + 1e-9
+"""Of a step at the velocity limit."""
+
+
+class SimulatedJoints:
+    """The joints of a robot, in the order of ``robot.joint_names``, and the controllers that move them.
+
+    Joints are where their controllers want them; one that is asked to be faster than its limit lags behind at that
+    velocity until it has caught up. A step is worked out first and taken after that, so that one which fails elsewhere
+    leaves all as it was.
+
+    Args:
+        robot: Whose limits and present angles count.
+        groups: Joint names by controller; joints in none hold.
+
+    Raises:
+        InvalidInputError: a joint in two groups.
+
+    Attributes:
+        controllers: By name.
+        clock: [s], how long they have been moving.
+        positions: (n,) float [rad; m for slides].
+        velocities: (n,) float.
+        accelerations: (n,) float.
+        desired: Positions, velocities and accelerations (n,) as the controllers want them.
+    """
+
+    def __init__(self, robot: Humanoid, groups: Mapping[str, Sequence[str]]) -> None:
+        self.limits, self.velocity_limits = robot.joint_limits, robot.velocity_limits
+        count = len(robot.joint_names)
+        self.clock = 0.0
+        self.positions = robot.angle_vector()
+        self.velocities, self.accelerations = np.zeros(count), np.zeros(count)
+        self.desired: Motion = (self.positions, self.velocities, self.accelerations)
+        self._polynomials = np.zeros((6, count))
+        self._polynomials[0] = self.positions
+        self._begin = np.zeros(count)
+        self.controllers: dict[str, TrajectoryController] = {}
+        self.rows: dict[str, np.ndarray] = {}
+        self._pending: tuple[float, Motion, Motion] | None = None
+        taken: set[str] = set()
+        for name, joints in groups.items():
+            if taken & set(joints):
+                raise InvalidInputError(f"{min(taken & set(joints))!r} is moved by two controllers, one is {name!r}")
+            taken |= set(joints)
+            rows = np.array([robot.joint_index(joint) for joint in joints], dtype=int)
+            limits = (self.limits[0][rows], self.limits[1][rows])
+            self.rows[name] = rows
+            self.controllers[name] = TrajectoryController(joints, self.positions[rows], limits)
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether nothing is asked of the joints, and they are where they are wanted."""
+        if any([own.is_busy for own in self.controllers.values()]):
+            return False
+        return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()
+
+    def step(self, duration: float, rows: np.ndarray | None = None, given: Motion | None = None) -> Motion:
+        """Return positions, velocities and accelerations (n,) that the joints have ``duration`` [s] later.
+
+        They take them with ``take_step``.
+
+        Args:
+            duration: [s].
+            rows: Joints that something else moves, (k,).
+            given: Their motion then, (k,) each.
+        """
+        time = self.clock + duration
+        motion = (self.positions, self.velocities, self.accelerations)
+        if duration <= 0.0 or (rows is None and self.is_resting):
+            self._pending = (time, self.desired, motion)
+            return motion
+        for name, controller in self.controllers.items():
+            if controller.advance(time):
+                self._follow(name)
+        desired = evaluate(self._polynomials, time - self._begin)
+        actual = self._limited(desired, duration)
+        if rows is not None and given is not None:
+            desired, actual = _with(desired, rows, given), _with(actual, rows, given)
+        self._pending = (time, desired, actual)
+        return self._pending[2]
+
+    def take_step(self) -> None:
+        """Take the step that was worked out last, and tell the goals of it."""
+        assert self._pending is not None
+        self.clock, self.desired, (self.positions, self.velocities, self.accelerations) = self._pending
+        self._pending = None
+        actual = (self.positions, self.velocities, self.accelerations)
+        for name, controller in self.controllers.items():
+            if controller.is_busy and controller.check(self.clock, self.desired, actual, self.rows[name]):
+                self._follow(name)
+
+    def cancel(self, name: str) -> None:
+        """Let a controller give up its goal and hold the joints where they are."""
+        self.controllers[name].cancel(self.positions[self.rows[name]])
+        self._follow(name)
+
+    def take_over(self, name: str) -> None:
+        """Let something else move a controller's joints, or give them back: it holds them where they are now."""
+        self.controllers[name].move_rest(self.positions[self.rows[name]])
+        self._follow(name)
+
+    def send(
+        self, name: str, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None
+    ) -> Goal:
+        """Send a trajectory to a controller, to start ``start_time`` [s] from now."""
+        goal = self.controllers[name].accept(trajectory, self.clock, start_time, tolerances)
+        self._follow(name)
+        return goal
+
+    def save(self) -> tuple[Any, ...]:
+        """Return all that they are, for ``load``."""
+        own = (self.clock, self.positions, self.velocities, self.accelerations, self.desired)
+        return own, {name: controller.save() for name, controller in self.controllers.items()}
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Become what they were."""
+        own, controllers = saved
+        self.clock, self.positions, self.velocities, self.accelerations, self.desired = own
+        self._pending = None
+        for name, controller in self.controllers.items():
+            controller.load(controllers[name])
+            self._follow(name)
+
+    def _follow(self, name: str) -> None:
+        rows, piece = self.rows[name], self.controllers[name].piece
+        self._polynomials[:, rows] = piece.coefficients
+        self._begin[rows] = piece.start
+
+    def _limited(self, desired: Motion, duration: float) -> Motion:
+        positions, velocities, accelerations = desired
+        far = self.velocity_limits * (duration * ROUNDING)
+        change = positions - self.positions
+        lower, upper = self.limits
+        held = (
+            (np.abs(change) > far) | (np.abs(velocities) * duration > far) | (positions < lower) | (positions > upper)
+        )
+        if not held.any():
+            return desired
+        reached = np.clip(self.positions + np.clip(change, -far, far), lower, upper)
+        speed = (reached - self.positions) / duration
+        return (
+            np.where(held, reached, positions),
+            np.where(held, speed, velocities),
+            np.where(held, (speed - self.velocities) / duration, accelerations),
+        )
+
+
+def _with(motion: Motion, rows: np.ndarray, given: Motion) -> Motion:
+    positions, velocities, accelerations = (part.copy() for part in motion)
+    for part, own in zip((positions, velocities, accelerations), given, strict=True):
+        part[rows] = own
+    return positions, velocities, accelerations

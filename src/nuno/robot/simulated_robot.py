@@ -1,0 +1,357 @@
+"""SimulatedRobot: a robot in a world, behind the interface that a real one has."""
+
+from __future__ import annotations
+
+import time as wall_clock
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.background import LATE
+from nuno.coordinates import Coordinates
+from nuno.errors import BodyStateError, InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.gait import Gait
+from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
+from nuno.robot.hands import hands_of
+from nuno.robot.interface import RobotInterface
+from nuno.robot.joint_interface import Controller
+from nuno.robot.loads import LinkLoads
+from nuno.robot.readings import ImuReading, JointState
+from nuno.robot.sensor_model import SensorModel
+from nuno.robot.sensors import Readings, Sensors
+from nuno.robot.servo import Servo, ServoCommand, external_forces
+from nuno.robot.simulated_gripper import SimulatedGripper
+from nuno.robot.simulated_joints import SimulatedJoints
+from nuno.robot.state import RobotState
+from nuno.robot.trajectory import JointTrajectory, Motion
+from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.links import Links
+    from nuno.world import World
+
+
+class SimulatedRobot(RobotInterface):
+    """A robot whose links stand in a world and move there in every frame, as its controllers want.
+
+    All waiting steps the world: at full speed, or paced by ``real_time_factor``; where the world runs in the background
+    (``world.start()``), whoever waits sleeps on its clock. Everything else also works while somebody else steps it.
+
+    Args:
+        robot: The model, which stays the program's own; the simulated one starts where it is, in its posture.
+        world: Where it stands; no batch. Worlds that are imagined from it hold the links as they are then.
+        links: Links that are in the world already; the simulated robot is theirs then. None lets it enter.
+        real_time_factor: Simulated over real time while waiting; None is as fast as possible.
+        sensors: By channel, how its sensors depart from the truth; see ``nuno.robot.sensors.Sensors``.
+        seed: Of the sensors' noise.
+        default_controller: The name of all controllers together.
+        namespace: What the names of actions and topics begin with.
+
+    Raises:
+        InvalidInputError: the links are in another world, or the world is a batch.
+        BodyStateError: a robot moves these links already.
+
+    Attributes:
+        actual: The robot that is simulated, as it truly is.
+        robot: What the program knows of it; as of a real one, it is brought up to date by ``update_robot_state``.
+        joints: Its joints and controllers.
+        hands: Its hands, by name.
+    """
+
+    def __init__(
+        self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
+        sensors: Mapping[str, SensorModel] | None = None, seed: int = 0,
+        default_controller: str = "default_controller", namespace: str | None = None,
+    ) -> None:  # fmt: skip
+        if links is not None and links.world is not world:
+            raise InvalidInputError("the links are in another world than the robot is to be in")
+        if any(isinstance(other, SimulatedRobot) and other.links is links for other in world.drivers):
+            raise BodyStateError(f"another robot moves the links of {robot.name!r} already")
+        self.pace = None if real_time_factor is None else number("real_time_factor", real_time_factor, above=0.0)
+        self.world = world
+        self._entered = links is None
+        self.links: Links = robot.copy().enter(world) if links is None else links
+        self.actual = self.links.robot
+        super().__init__(self.actual, default_controller, namespace=namespace)
+        groups = {own["controller_type"]: own["joint_names"] for own in self.default_controller()}
+        self.joints = SimulatedJoints(self.actual, groups)
+        self.hands = hands_of(self.links)
+        self.grippers = {name: SimulatedGripper(hand, self.joints) for name, hand in self.hands.items()}
+        self.gait = Gait(self.actual, self.joints)
+        self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
+        self._readings: tuple[float, Readings] | None = None
+        self.loads = LinkLoads(self.links)
+        self._servo: Servo | None = None
+        self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
+        self._due = wall_clock.perf_counter()
+        self._state = RobotState(
+            world.time, self.actual.configuration(), np.zeros(self.actual.model.nv), np.zeros(self.actual.model.nv)
+        )
+        with world.lock:
+            world.drivers.append(self)
+
+    def __repr__(self) -> str:
+        return f"<SimulatedRobot {self.actual.name!r} at t = {self.now():.3f} s>"
+
+    def leave(self) -> None:
+        """End the simulation of the robot; links that it brought along leave the world.
+
+        Raises:
+            BodyStateError: it has left already.
+        """
+        with self.world.lock:
+            if self not in self.world.drivers:
+                raise BodyStateError(f"{self.actual.name!r} has left the world already")
+            self.cancel_angle_vector()
+            self.cancel_base()
+            self.world.drivers.remove(self)
+            if self._entered:
+                self.links.leave()
+
+    # What is true, and what the sensors tell
+
+    def state(self) -> RobotState:
+        """Return where the robot truly is and how it moves, at the world's time."""
+        with self.world.lock:
+            return self._state
+
+    def read(self) -> Readings:
+        """Return what all sensors tell, read once a frame."""
+        with self.world.lock:
+            state = self._state
+            if self._readings is None or self._readings[0] != state.time:
+                self._readings = (state.time, self.sensors.read(state))
+            return self._readings[1]
+
+    # Time
+
+    def now(self) -> float:
+        """Return the world's time [s]."""
+        return float(self.world.time)
+
+    def sleep(self, seconds: float) -> None:
+        """Let the world's clock go on by ``seconds`` [s]."""
+        self._let_pass(number("seconds", seconds, low=0.0))
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Step the world until a condition holds, up to ``timeout`` [s], None or 0 for ever; return whether it does."""
+        end = None if not timeout else self.now() + timeout - 1e-9
+        while not condition():
+            if end is not None and self.now() >= end:
+                return False
+            self._let_pass(1.0 / self.world.frame_rate)
+        return True
+
+    def _let_pass(self, seconds: float) -> None:
+        if self.pace is None or self.world.is_running:
+            self.world.run(seconds)
+            return
+        end = self.now() + seconds
+        while (rest := end - self.now()) > 1e-9:
+            span = min(rest, 1.0 / self.world.frame_rate)
+            self.world.run(span)
+            now = wall_clock.perf_counter()
+            self._due = max(self._due + span / self.pace, now - LATE)
+            if self._due > now:
+                wall_clock.sleep(self._due - now)
+
+    # Joints
+
+    def read_joint_state(self) -> JointState:
+        """Return the joints as their sensors tell."""
+        told = self.read()
+        return JointState(
+            told.sampled["positions"], self.actual.joint_names, told.positions, told.velocities, told.torques
+        )
+
+    def read_reference(self) -> JointState:
+        """Return where the controllers want the joints now."""
+        with self.world.lock:
+            positions, velocities, _ = self.joints.desired
+            return JointState(self.now(), self.actual.joint_names, positions, velocities, np.zeros_like(positions))
+
+    def send_trajectory(
+        self, controller: Controller, trajectory: JointTrajectory, start_time: float, tolerances: Tolerances | None
+    ) -> Goal:
+        """Send a trajectory to a controller, to start ``start_time`` [s] from now; see ``RobotInterface``."""
+        with self.world.lock:
+            name = self._known(controller)
+            taken = "the robot walks" if self.gait.moves(name) else "its joints are under a servo command"
+            if self.gait.moves(name) or self._servo_has(name):
+                goal = Goal(trajectory)
+                goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_GOAL, f"{name} takes no goals now: {taken}")
+                return goal
+            return self.joints.send(name, trajectory, start_time, tolerances)
+
+    def cancel_trajectories(self, controller: Controller) -> None:
+        """Let a controller give up what it does, and hold the joints where they are."""
+        with self.world.lock:
+            self.joints.cancel(self._known(controller))
+
+    def is_busy(self, controller: Controller) -> bool:
+        """Return whether a controller follows a goal."""
+        with self.world.lock:
+            return self.joints.controllers[self._known(controller)].is_busy
+
+    def servo(self, command: ServoCommand | None) -> None:
+        """Put joints under a torque law, at once and until another command; see ``Servo``.
+
+        Their controllers give up what they do and take no goals meanwhile. None gives the joints back, which hold.
+
+        Raises:
+            UnknownNameError: no joint of a name.
+        """
+        with self.world.lock:
+            wanted = None if command is None else Servo(self.actual, command, self.world.gravity)
+            before = self._servo
+            if before is None or wanted is None or not np.array_equal(before.rows, wanted.rows):
+                moved = [own.rows for own in (before, wanted) if own is not None]
+                for name, rows in self.joints.rows.items():
+                    if any(np.isin(rows, own).any() for own in moved):
+                        self.joints.take_over(name)
+            self._servo = wanted
+
+    def _servo_has(self, name: str) -> bool:
+        return self._servo is not None and bool(np.isin(self.joints.rows[name], self._servo.rows).any())
+
+    def _external(self) -> Any:
+        """Return what bodies do to the links, None where there is nothing."""
+        loads = self.loads.read() if any(own.is_dynamic for own in self.world.bodies) else ()
+        return external_forces(self.links, loads) if loads else None
+
+    def _known(self, controller: Controller) -> str:
+        name = controller["controller_type"]
+        if name not in self.joints.controllers:
+            raise UnknownNameError("controller", name, list(self.joints.controllers))
+        return str(name)
+
+    # Base, hands and sensors
+
+    def read_base(self) -> Coordinates:
+        """Return where the base link is in the world."""
+        with self.world.lock:
+            return self.actual.copy_coords()
+
+    def send_base(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool) -> Goal:
+        """Let the robot walk to a place seen from where it stands; see ``RobotInterface``.
+
+        A walk always ends standing, whatever ``stop`` says; another velocity that is sent before goes on from it.
+        """
+        goal = Goal((x, y, yaw))
+        with self.world.lock:
+            if self.gait.is_walking:
+                self.gait.change(goal, x, y, yaw, seconds)
+                return goal
+            standing = self.actual.copy()
+        walk = self.gait.plan(standing, x, y, yaw, seconds)  # the world goes on meanwhile
+        with self.world.lock:
+            if self.gait.is_walking:
+                goal.finish(GoalStatus.REJECTED, text="another walk was begun meanwhile")
+            else:
+                self.gait.begin(walk, goal)
+        return goal
+
+    def cancel_base(self) -> None:
+        """Let the robot come to rest as soon as that is safe."""
+        with self.world.lock:
+            self.gait.cancel()
+
+    def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
+        """Open or close a hand; see ``RobotInterface``. The effort is not simulated: what is between them is held."""
+        with self.world.lock:
+            if hand not in self.grippers:
+                raise UnknownNameError("hand", hand, list(self.grippers))
+            return self.grippers[hand].send(position)
+
+    def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return force and torque that what lies beyond a sensor exerts on what is before it."""
+        found = self.read().wrenches.get(frame)
+        if found is None:
+            raise RobotModelError(f"{self.actual.name!r} has no force sensor in {frame!r}")
+        return found[:3].copy(), found[3:].copy()
+
+    def read_imu(self) -> ImuReading:
+        """Return what the inertial measurement unit tells."""
+        if "imu" not in self.actual.description.frames:
+            raise RobotModelError(f"{self.actual.name!r} has no inertial measurement unit")
+        told = self.read()
+        return ImuReading(told.sampled["orientation"], told.orientation, told.angular_velocity, told.specific_force)
+
+    # What the world asks of it
+
+    def begin_frame(self, start: float, end: float) -> None:
+        """Send the links to where the robot is at the end of the frame."""
+        span, before = end - start, self._state
+        robot, rows, given = self.actual, None, None
+        self._kept = (before, robot._angles, robot._position, robot._quaternion)
+        if span <= 0.0:
+            self.joints.step(0.0)
+            return
+        base = base_motion = None
+        if self.gait.is_walking:
+            walk = self.gait.at(self.joints.clock + span)
+            rows = self.gait.rows
+            given = (robot.angles_of(walk.q)[rows], walk.v[6:][rows], walk.a[6:][rows])
+            base, base_motion = walk.q[:7], (walk.v[:6], walk.a[:6])
+        if self._servo is not None:
+            others = self.joints.step(span, rows, given)
+            own = self._servo.step(before, others, base, span, self._external())
+            rows, given = _joined(rows, given, self._servo.rows, own)
+        positions, velocities, accelerations = self.joints.step(span, rows, given)
+        if positions is robot._angles and base is None:
+            self._state = RobotState(end, before.q, before.v, before.a)
+            return
+        v, a = np.zeros_like(before.v), np.zeros_like(before.a)
+        v[6:], a[6:] = velocities, accelerations
+        if base is not None and base_motion is not None:
+            v[:6], a[:6] = base_motion
+        robot.move_to(positions, base)
+        self._state = RobotState(end, robot.configuration(), v, a)
+        if not (self._state.q == before.q).all():
+            self.links.follow(span)
+
+    def end_frame(self) -> None:
+        """Take the frame's motion as done."""
+        self.joints.take_step()
+        for gripper in self.grippers.values():
+            gripper.end_frame()
+        self.gait.end_frame()
+
+    def cancel_frame(self) -> None:
+        """Go back to where the robot was when the frame began."""
+        assert self._kept is not None
+        self._state, *pose = self._kept
+        self._put(*pose)
+
+    def save(self) -> Any:
+        """Return all that it is, for a snapshot."""
+        grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
+        robot = self.actual
+        pose = (robot._angles, robot._position, robot._quaternion)
+        return self._state, pose, self.joints.save(), self.gait.save(), grippers, self._servo
+
+    def load(self, saved: Any) -> None:
+        """Become what it was when a snapshot was taken; goals that came since are given up."""
+        self._state, pose, joints, gait, grippers, self._servo = saved
+        self._put(*pose)
+        self.joints.load(joints)
+        self.gait.load(gait)
+        for name, gripper in self.grippers.items():
+            gripper.load(grippers[name])
+        self._readings = None
+
+    def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
+        self.actual._angles = angles
+        self.actual._place(position, quaternion)
+
+
+def _joined(
+    rows: np.ndarray | None, given: Motion | None, more_rows: np.ndarray, more: Motion
+) -> tuple[np.ndarray, Motion]:
+    """Return the joints of two givers and their motions; the second has those that both give."""
+    if rows is None or given is None:
+        return more_rows, more
+    a, b, c = (np.concatenate(pair) for pair in zip(given, more, strict=True))
+    return np.concatenate([rows, more_rows]), (a, b, c)

@@ -1,0 +1,223 @@
+"""TrajectoryController: what a controller of ros2_control's kind does with the trajectories that it is sent."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
+from nuno.robot.trajectory import JointTrajectory, Motion, Piece, Spline, resting_at
+
+logger = logging.getLogger(__name__)
+
+ARRIVED = 1e-3
+"""[rad; m] How near the joints must come to the last point, where a goal says nothing of it."""
+SOON = 1e-9
+"""[s] Rounding of sums of frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Feedback:
+    """How a trajectory is being followed.
+
+    Attributes:
+        time: [s] of the controller's clock.
+        names: Of the joints, m of them.
+        rows: Where they are among others, (m,).
+        all_desired: Positions, velocities and accelerations of all those as trajectories have them, (n,) each.
+        all_actual: As they are.
+    """
+
+    time: float
+    names: tuple[str, ...]
+    rows: np.ndarray
+    all_desired: Motion
+    all_actual: Motion
+
+    @property
+    def desired(self) -> Motion:
+        """Positions, velocities and accelerations as the trajectory has them, (m,) each."""
+        a, b, c = self.all_desired
+        return a[self.rows], b[self.rows], c[self.rows]
+
+    @property
+    def actual(self) -> Motion:
+        """Positions, velocities and accelerations as they are, (m,) each."""
+        a, b, c = self.all_actual
+        return a[self.rows], b[self.rows], c[self.rows]
+
+    @property
+    def error(self) -> np.ndarray:
+        """(m,) float [rad; m], desired less actual positions."""
+        return np.array(self.desired[0] - self.actual[0])
+
+
+class TrajectoryController:
+    """Some joints, and the trajectory that they follow.
+
+    A goal takes the place of the one before and starts from where that wants the joints, as they would move then.
+    One that starts later lets the motion under way go on until then. All times are of one clock that its owner keeps.
+
+    Args:
+        names: Of the joints, m of them.
+        positions: (m,) where they are [rad; m for slides].
+        limits: Lower and upper limits (m,); goals beyond them are taken to them.
+
+    Attributes:
+        goal: The last one, which may have ended.
+        piece: The polynomial that the joints follow.
+    """
+
+    def __init__(
+        self, names: Sequence[str], positions: np.ndarray, limits: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> None:
+        self.names = tuple(names)
+        self.limits = limits
+        self.goal: Goal | None = None
+        self.tolerances = Tolerances()
+        self._spline: Spline | None = None
+        self._next: tuple[float, float, JointTrajectory] | None = None  # its start, when it is joined, and it
+        self.piece = Piece(0.0, np.inf, resting_at(positions))
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a goal is under way."""
+        return self.goal is not None and not self.goal.is_done
+
+    def accept(
+        self, trajectory: JointTrajectory, now: float, start_time: float = 0.0, tolerances: Tolerances | None = None
+    ) -> Goal:
+        """Take a trajectory that starts ``start_time`` [s] from ``now`` [s]; what cannot be followed is rejected."""
+        goal = Goal(trajectory)
+        strangers = set(trajectory.names) ^ set(self.names)
+        wanted = tolerances or Tolerances()
+        if strangers:
+            what = f"a trajectory for this controller has the joints {', '.join(self.names)}"
+            goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_JOINTS, f"{what}; {sorted(strangers)[0]!r} differs")
+        elif strangers := (set(wanted.path) | set(wanted.goal)) - set(self.names):
+            what = f"there are tolerances for {sorted(strangers)[0]!r}, which this controller does not move"
+            goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_JOINTS, what)
+        elif start_time + trajectory.duration < -SOON:
+            what = f"the trajectory ended {-start_time - trajectory.duration:.3f} s ago"
+            goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_GOAL, what)
+        if goal.is_done:
+            logger.warning("a goal was rejected: %s", goal.text)
+            return goal
+        if self.goal is not None:
+            self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "another goal took its place")
+        self.goal, self.tolerances = goal, wanted
+        goal.status = GoalStatus.ACTIVE
+        start = now + start_time
+        self._next = (start, max(start, now), self._within_limits(trajectory.of(self.names)))
+        self.advance(now)
+        return goal
+
+    def cancel(self, positions: np.ndarray) -> None:
+        """Give the goal up, and hold the joints at positions (m,)."""
+        self.hold(positions, GoalStatus.PREEMPTED, None, "it was cancelled")
+
+    def hold(self, positions: np.ndarray, status: GoalStatus, code: int | None, text: str) -> None:
+        """End the goal, and hold the joints at positions (m,)."""
+        if self.goal is not None:
+            self.goal.finish(status, code, text)
+        self._spline = self._next = None
+        self.piece = Piece(0.0, np.inf, resting_at(np.array(positions)))
+
+    def move_rest(self, positions: np.ndarray) -> None:
+        """Hold the joints at positions (m,) that something else has brought them to; a goal under way is aborted."""
+        self.hold(positions, GoalStatus.ABORTED, ResultCode.INVALID_GOAL, "the joints are moved by something else")
+
+    def advance(self, time: float) -> bool:
+        """Take up the polynomial for a time [s] that does not lie before those asked for so far.
+
+        Returns:
+            Whether ``piece`` is another one now.
+        """
+        renewed = False
+        if self._next is not None and time >= self._next[1] - SOON:
+            start, joined, trajectory = self._next
+            first = (self.piece if self._spline is None else self._spline).at(joined)
+            self._spline, self._next = Spline(start, joined, first, trajectory), None
+            renewed = True
+        if self._spline is not None and (renewed or time >= self.piece.end):
+            self.piece = self._spline.piece(time)
+            renewed = True
+        return renewed
+
+    def check(self, time: float, desired: Motion, actual: Motion, rows: np.ndarray) -> bool:
+        """Compare what is wanted at a time [s] with what is, and end the goal where that is due.
+
+        Args:
+            time: [s].
+            desired: Positions, velocities and accelerations (n,) of many joints.
+            actual: As they are.
+            rows: The controller's joints among those, (m,).
+
+        Returns:
+            Whether ``piece`` is another one now: the joints hold where a tolerance was violated.
+        """
+        goal = self.goal
+        if goal is None or goal.is_done:
+            return False
+        goal.feedback = Feedback(time, self.names, rows, desired, actual)
+        if self._next is not None or self._spline is None:
+            return False
+        late = time - self._spline.end
+        if late < -SOON and not self.tolerances.path:
+            return False
+        positions = actual[0][rows]
+        error = np.abs(desired[0][rows] - positions)
+        if late < -SOON:
+            beyond = self._beyond(self.tolerances.path, error)
+            if beyond:
+                code, text = ResultCode.PATH_TOLERANCE_VIOLATED, f"on the way {beyond}"
+                self.hold(positions, GoalStatus.ABORTED, code, text)
+                logger.warning("a goal was aborted: %s", text)
+            return bool(beyond)
+        beyond = self._beyond({name: ARRIVED for name in self.names} | dict(self.tolerances.goal), error)
+        if not beyond:
+            goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
+        elif self.tolerances.goal_time > 0.0 and late > self.tolerances.goal_time:
+            code, text = ResultCode.GOAL_TOLERANCE_VIOLATED, f"at the end {beyond}"
+            self.hold(positions, GoalStatus.ABORTED, code, text)
+            logger.warning("a goal was aborted: %s", text)
+            return True
+        return False
+
+    def save(self) -> tuple[Any, ...]:
+        """Return all that it is, for ``load``."""
+        goal = self.goal
+        told = None if goal is None else (goal.status, goal.code, goal.text, goal.feedback)
+        return self.piece, self._spline, self._next, self.tolerances, goal, told
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Become what it was; a goal that came since is given up."""
+        piece, spline, after, tolerances, goal, told = saved
+        if self.goal is not None and self.goal is not goal:
+            self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "the world was restored")
+        self.piece, self._spline, self._next, self.tolerances, self.goal = piece, spline, after, tolerances, goal
+        if goal is not None:
+            goal.status, goal.code, goal.text, goal.feedback = told
+
+    def _within_limits(self, trajectory: JointTrajectory) -> JointTrajectory:
+        if self.limits is None:
+            return trajectory
+        lower, upper = self.limits
+        kept = np.clip(trajectory.positions, lower, upper)
+        beyond = np.abs(kept - trajectory.positions).max(axis=0)
+        if (beyond <= 1e-6).all():
+            return trajectory
+        k = int(beyond.argmax())
+        logger.warning("a goal is beyond the limits and is taken to them: %s by %.4f", self.names[k], beyond[k])
+        return JointTrajectory(self.names, trajectory.times, kept, trajectory.velocities, trajectory.accelerations)
+
+    def _beyond(self, tolerances: Any, error: np.ndarray) -> str:
+        for k, name in enumerate(self.names):
+            allowed = tolerances.get(name, 0.0)
+            if allowed > 0.0 and error[k] > allowed:
+                return f"{name} is {error[k]:.4f} from where it should be, more than {allowed:g}"
+        return ""

@@ -1,0 +1,1 @@
+"""Robots on the wire: the rosbridge protocol over websockets, as a client and as a server."""

@@ -1,0 +1,136 @@
+"""Broadcast: what a robot's server publishes of the robot."""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from nuno.errors import RobotModelError
+from nuno.robot.interface import WRENCHES, RobotInterface
+from nuno.robot.joint_interface import Controller
+from nuno.robot.readings import JointState
+from nuno.robot.wire import messages as ros
+from nuno.robot.wire.bridge import Bridge
+from nuno.robot.wire.names import Names
+from nuno.robot.wire.protocol import EXECUTING
+
+logger = logging.getLogger(__name__)
+
+Fields = dict[str, Any]
+
+
+class Broadcast:
+    """The topics of a robot: clock, joints, controllers, base, forces.
+
+    What nobody has subscribed to is not read from the robot.
+
+    Args:
+        robot: The robot.
+        bridge: Where it is published.
+        names: Of the topics.
+        controllers: Of the robot.
+    """
+
+    def __init__(self, robot: RobotInterface, bridge: Bridge, names: Names, controllers: list[Controller]) -> None:
+        self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
+        self._busy: dict[str, bool] = {}
+        self._wrenches = [frame for frame in WRENCHES.values() if self._has(robot.read_wrench, frame)]
+        self._has_imu = self._has(robot.read_imu)
+        self._base_link = robot.robot.model.frames[2].name  # after the universe and the free joint
+        urdf = robot.robot.description.urdf.read_text(encoding="utf-8")
+        bridge.publish(names.full(names.description), {"data": urdf}, latched=True)
+
+    @property
+    def topics(self) -> dict[str, str]:
+        """The types of all topics, by name."""
+        own = self.names
+        found = {
+            own.full(own.clock): ros.CLOCK, own.full(own.joint_states): ros.JOINT_STATE,
+            own.full(own.odometry): ros.ODOMETRY, own.full(own.description): ros.STRING,
+        }  # fmt: skip
+        for controller in self.controllers:
+            found[own.state_of(controller)] = ros.CONTROLLER_STATE
+            found[own.status_of(controller)] = ros.STATUS
+        found |= {own.full(own.wrench, frame=frame): ros.WRENCH for frame in self._wrenches}
+        return found | ({own.full(own.imu): ros.IMU} if self._has_imu else {})
+
+    def publish(self) -> None:
+        """Publish everything as it is now."""
+        own, time = self.names, self.robot.now()
+        self._send(own.clock, lambda: {"clock": ros.time_fields(time)})
+        state = self.robot.read_joint_state()
+        if state is not None:
+            self._send(own.joint_states, lambda: ros.joint_state_fields(state))
+        self._send(own.odometry, lambda: self._odometry(time))
+        asked = [c for c in self.controllers if self.bridge.has_subscribers(own.state_of(c))]
+        reference = self.robot.read_reference() if asked else None
+        for controller in asked:
+            fields = motion_fields(controller["joint_names"], reference, state, time)
+            self.bridge.publish(own.state_of(controller), fields)
+        for frame in self._wrenches:
+            self._send(own.wrench.format(frame=frame), partial(self._wrench, time, frame))
+        if self._has_imu:
+            self._send(own.imu, lambda: ros.imu_fields(self.robot.read_imu(), "imu"))
+
+    def publish_status(self) -> None:
+        """Publish which controllers follow goals, where that has changed."""
+        for controller in self.controllers:
+            name, busy = controller["controller_type"], self.robot.is_busy(controller)
+            if busy != self._busy.get(name):
+                self._busy[name] = busy
+                info = {"goal_id": {"uuid": list(uuid.uuid4().bytes)}, "stamp": ros.time_fields(self.robot.now())}
+                goals = [{"goal_info": info, "status": EXECUTING}] if busy else []
+                self.bridge.publish(self.names.status_of(controller), {"status_list": goals}, latched=True)
+
+    def _send(self, name: str, fields: Callable[[], Fields]) -> None:
+        topic = self.names.full(name)
+        if self.bridge.has_subscribers(topic):
+            self.bridge.publish(topic, fields())
+
+    def _wrench(self, time: float, frame: str) -> Fields:
+        return ros.wrench_fields(time, self.robot.read_wrench(frame), frame)
+
+    def _odometry(self, time: float) -> Fields:
+        base = self.robot.read_base()
+        pose = {"position": ros.vector_fields(base.position), "orientation": ros.quaternion_fields(base.quaternion)}
+        still = {"linear": ros.vector_fields((0, 0, 0)), "angular": ros.vector_fields((0, 0, 0))}
+        return {
+            "header": ros.header_fields(time, "odom"), "child_frame_id": self._base_link, "pose": {"pose": pose},
+            "twist": {"twist": still},
+        }  # fmt: skip
+
+    def _has(self, read: Any, *arguments: Any) -> bool:
+        try:
+            read(*arguments)
+        except RobotModelError as error:
+            logger.info("not published: %s", error)
+            return False
+        return True
+
+
+def motion_fields(joints: list[str], reference: JointState | None, state: JointState | None, time: float) -> Fields:
+    """Return what a controller tells of its joints: where they are to be, where they are, and the difference.
+
+    Args:
+        joints: The controller's.
+        reference: Where joints are to be, None where that is not known.
+        state: Where they are, likewise.
+        time: [s].
+    """
+    wanted, actual = _positions(joints, reference), _positions(joints, state)
+    error = [a - b for a, b in zip(wanted, actual, strict=True)] if wanted and actual else []
+    return {
+        "header": ros.header_fields(time), "joint_names": list(joints),
+        "reference": {"positions": wanted}, "feedback": {"positions": actual}, "error": {"positions": error},
+        "desired": {"positions": wanted}, "actual": {"positions": actual},
+    }  # fmt: skip
+
+
+def _positions(joints: list[str], state: JointState | None) -> list[float]:
+    if state is None:
+        return []
+    known = dict(zip(state.names, state.positions.tolist(), strict=True))
+    return [known[joint] for joint in joints] if all(joint in known for joint in joints) else []

@@ -1,0 +1,526 @@
+"""The server: what it offers, and that no client can harm it, the robot or other clients."""
+
+import json
+import math
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+from wire_with import PATIENCE, until
+
+from nuno.errors import ConnectionLostError, InvalidInputError, NotConnectedError, SimulationDiverged
+from nuno.robot.goal import GoalStatus
+from nuno.robot.wire.server import LATE, RobotServer
+
+
+def advance(client, duration=0.1, heard=None):
+    """Let time pass, and return the answer: proof that the simulation goes on. What comes before it goes to a list."""
+    nanosec = round(1e9 * duration)
+    client.say({
+        "op": "call_service", "id": "go on", "service": "/simulation/advance",
+        "args": {"duration": {"sec": nanosec // 10**9, "nanosec": nanosec % 10**9}},
+    })  # fmt: skip
+    while (message := client.hear()).get("id") != "go on":
+        if heard is not None:
+            heard.append(message)
+    return message
+
+
+def goal(robot, controller="larm_controller", seconds=1, change=0.2, **message):
+    """A goal of one point, as a client sends it."""
+    joints = robot.controller_param_table[controller][0]["joint_names"]
+    positions = [robot.angles[joint] + change for joint in joints]
+    point = {"positions": positions, "time_from_start": {"sec": seconds, "nanosec": 0}}
+    return {
+        "op": "send_action_goal", "id": "g", "action": f"/{controller}/follow_joint_trajectory",
+        "action_type": "control_msgs/action/FollowJointTrajectory", "feedback": True,
+        "args": {"trajectory": {"joint_names": joints, "points": [point]}},
+    } | message  # fmt: skip
+
+
+def angles(robot, controller="larm_controller"):
+    """Where a controller's joints are."""
+    return np.array([robot.angles[joint] for joint in robot.controller_param_table[controller][0]["joint_names"]])
+
+
+# What it offers
+
+
+def test_goal_feedback_and_result(serve, raw, plain):
+    """A goal is acknowledged by feedback, followed while time passes, and its result comes at the end."""
+    client = raw(serve())
+    before = angles(plain)
+    client.say(goal(plain))
+    feedback = client.hear(op="action_feedback", id="g")["values"]
+    assert feedback["joint_names"] == plain.controller_param_table["larm_controller"][0]["joint_names"]
+    np.testing.assert_array_equal(feedback["actual"]["positions"], before)
+    assert advance(client, 0.5)["values"]["time"] == {"sec": 0, "nanosec": 500000000}
+    np.testing.assert_allclose(angles(plain), before + 0.1, atol=1e-12)  # half way, up to rounding
+    advance(client, 0.6)
+    client.say(goal(plain, id="h", change=0.0))
+    client.hear(op="action_feedback", id="h")
+    np.testing.assert_allclose(angles(plain), before + 0.2, atol=1e-12)
+
+
+def test_result_has_the_fields_of_ros(serve, raw, plain):
+    """Status 4 is success, as action_msgs has it; the result says error code 0."""
+    client = raw(serve())
+    client.say(goal(plain))
+    client.say({"op": "call_service", "service": "/simulation/advance", "args": {"duration": {"sec": 2}}})
+    result = client.hear(op="action_result", id="g")
+    assert result == {
+        "op": "action_result", "id": "g", "action": "/larm_controller/follow_joint_trajectory", "status": 4,
+        "result": True, "values": {"error_code": 0, "error_string": ""},
+    }  # fmt: skip
+
+
+def test_topics(serve, raw, plain):
+    """Every topic that is listed is published when it is subscribed to, with what the robot tells."""
+    client = raw(serve())
+    client.say({"op": "call_service", "service": "/rosapi/topics"})
+    listed = client.hear(op="service_response")["values"]["topics"]
+    assert {"/clock", "/joint_states", "/odom", "/left_wrist/wrench", "/robot_description"} <= set(listed)
+    assert "/imu/data" not in listed  # this robot has none
+    for topic in listed:
+        client.say({"op": "subscribe", "topic": topic})
+        assert client.hear(op="publish", topic=topic)["msg"]
+    client.say({"op": "unsubscribe", "topic": "/joint_states"})
+    advance(client, 0.1)  # with all that was under way
+    advance(client, 0.1, heard := [])
+    topics = {message.get("topic") for message in heard}
+    assert "/clock" in topics
+    assert "/joint_states" not in topics
+
+
+def test_joint_states_say_where_the_robot_is(serve, raw, plain):
+    """Names, positions and efforts are the robot's."""
+    client = raw(serve())
+    client.say({"op": "subscribe", "topic": "/joint_states", "type": "sensor_msgs/msg/JointState"})
+    message = client.hear(topic="/joint_states")["msg"]
+    assert dict(zip(message["name"], message["position"], strict=True)) == plain.angles
+    assert set(message["effort"]) == {1.5}
+
+
+def test_services_and_actions_are_listed(serve, raw):
+    """What rosapi and the controller manager of a real robot tell."""
+    client = raw(serve())
+    for service, field, expected in (
+        ("/rosapi/action_servers", "action_servers", "/larm_controller/follow_joint_trajectory"),
+        ("/rosapi/services", "services", "/rosapi/get_time"),
+    ):
+        client.say({"op": "call_service", "service": service})
+        assert expected in client.hear(op="service_response", service=service)["values"][field]
+    client.say({"op": "call_service", "service": "/controller_manager/list_controllers"})
+    found = client.hear(op="service_response")["values"]["controller"]
+    assert {"larm_controller", "torso_controller"} <= {own["name"] for own in found}
+
+
+def test_throttled_subscription(serve, raw):
+    """A client that asks for at most ten messages a second of real time gets no more."""
+    client = raw(serve(real_time_factor=1.0))
+    client.say({"op": "subscribe", "topic": "/clock", "throttle_rate": 100})
+    client.hear(topic="/clock")
+    begin = time.monotonic()
+    for _ in range(3):
+        client.hear(topic="/clock")
+    assert time.monotonic() - begin > 0.19  # three intervals, the first of which may have begun before
+
+
+def test_real_time_and_faster(serve, raw, plain):
+    """Time passes by itself: as real time does, or as many times faster."""
+    for factor in (1.0, 20.0):
+        server = serve(real_time_factor=factor)
+        begin, wall = plain.now(), time.monotonic()
+        time.sleep(0.3)
+        with server.lock:
+            passed, wall = plain.now() - begin, time.monotonic() - wall
+        server.close()
+        # what the server may have been late by before, and a tick; on a busy machine it gives time up
+        assert passed <= factor * (wall + LATE) + server.tick
+        assert passed >= 0.2 * factor * wall
+
+
+def test_time_stands_still_unless_awaited(serve, raw, plain):
+    """A stepped server lets no time pass by itself, and no more than was asked for."""
+    client = raw(serve())
+    time.sleep(0.05)
+    assert plain.now() == 0.0
+    advance(client, 0.123)
+    assert plain.now() == pytest.approx(0.123, abs=1e-9)  # nanoseconds on the wire
+
+
+def test_base_by_velocity(serve, raw, plain):
+    """A twist moves the base until one of zero stops it, or for a second when no other comes."""
+    client = raw(serve())
+    twist = {"linear": {"x": 0.2, "y": 0.1}, "angular": {"z": -0.3}}
+    client.say({"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"})
+    for _ in range(3):
+        client.say({"op": "publish", "topic": "/cmd_vel", "msg": twist})
+        advance(client, 0.4)
+    np.testing.assert_allclose(plain.place, np.array([0.2, 0.1, -0.3]) * 1.2, atol=1e-9)  # nanoseconds on the wire
+    client.say({"op": "publish", "topic": "/cmd_vel", "msg": {}})
+    advance(client, 1.0)
+    np.testing.assert_allclose(plain.place, np.array([0.2, 0.1, -0.3]) * 1.2, atol=1e-9)
+    client.say({"op": "publish", "topic": "/cmd_vel", "msg": twist})
+    advance(client, 5.0)
+    np.testing.assert_allclose(plain.place, np.array([0.2, 0.1, -0.3]) * 2.2, atol=1e-9)
+
+
+def test_navigation_in_both_frames(serve, raw, plain):
+    """A place seen from the robot, or in the frame of its odometry."""
+    client = raw(serve())
+    plain.place = np.array([1.0, 2.0, 0.5 * math.pi])
+    there = {"position": {"x": 0.5}, "orientation": {"w": 1.0}}
+    for frame in ("base_footprint", "odom"):
+        plain.going = None
+        client.say({
+            "op": "send_action_goal", "id": frame, "action": "/navigate_to_pose", "feedback": True,
+            "action_type": "nav2_msgs/action/NavigateToPose",
+            "args": {"pose": {"header": {"frame_id": frame}, "pose": there}},
+        })  # fmt: skip
+        client.hear(op="action_feedback", id=frame)
+        asked = np.array(plain.going[0].asked)
+        if frame == "odom":  # from between the soles, which face y, to a place that faces x
+            assert asked[2] == pytest.approx(-0.5 * math.pi)
+            asked[:2] = plain.footprint().to_world(np.append(asked[:2], 0.0)[None])[0, :2]
+            asked[2] = 0.0
+        np.testing.assert_allclose(asked, (0.5, 0.0, 0.0), atol=1e-12)  # rounding of the turn
+
+
+def test_grippers_take_metres(serve, raw, still_talos):
+    """As in ROS, a gripper's position is how far its fingers are apart; 0 to 1 is this library's own."""
+    from plain_robot import PlainRobot
+
+    robot = PlainRobot(still_talos)
+    width = still_talos.description.hands["left_hand"].width
+    client = raw(serve(robot))
+    client.say({
+        "op": "send_action_goal", "id": "h", "action": "/left_hand/gripper_cmd",
+        "action_type": "control_msgs/action/GripperCommand",
+        "args": {"command": {"position": 0.25 * width, "max_effort": 12.0}},
+    })  # fmt: skip
+    result = client.hear(op="action_result", id="h")
+    assert (result["status"], result["values"]["reached_goal"]) == (4, True)
+    assert robot.grips == [("left_hand", pytest.approx(0.25), 12.0)]
+
+
+# Clients that go
+
+
+def test_client_lost_in_a_motion(serve, raw, plain):
+    """The robot holds where it was when the client's connection dropped, and serves others."""
+    server = serve()
+    client, other = raw(server), raw(server)
+    client.say(goal(plain))
+    client.hear(op="action_feedback")
+    advance(client, 0.5)
+    before = angles(plain)
+    running = plain.goals["larm_controller"][0]
+    client.socket.socket.shutdown(socket.SHUT_RDWR)  # as if the cable were cut: no closing handshake
+    until(lambda: running.is_done)
+    assert running.status == GoalStatus.PREEMPTED
+    advance(other, 1.0)
+    np.testing.assert_array_equal(angles(plain), before)
+
+
+def test_base_of_a_lost_client_stops(serve, raw, plain):
+    """Velocities and places that a lost client asked for end too."""
+    server = serve()
+    for message in (
+        {"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.2}}},
+        {"op": "send_action_goal", "action": "/navigate_to_pose", "action_type": "nav2_msgs/action/NavigateToPose",
+         "args": {"pose": {"pose": {"position": {"x": 1.0}}}}},
+    ):  # fmt: skip
+        client, other = raw(server), raw(server)
+        client.say(message)
+        advance(client, 0.1)
+        assert not plain.going[0].is_done
+        client.socket.close()
+        until(lambda: plain.going[0].is_done)
+        before = plain.place
+        advance(other, 0.5)
+        np.testing.assert_array_equal(plain.place, before)
+
+
+def test_what_others_asked_for_goes_on(serve, raw, plain):
+    """A client that goes ends its own motions only."""
+    server = serve()
+    left, right = raw(server), raw(server)
+    left.say(goal(plain, "larm_controller"))
+    right.say(goal(plain, "rarm_controller"))
+    left.hear(op="action_feedback")
+    right.hear(op="action_feedback")
+    left.socket.close()
+    until(lambda: plain.goals["larm_controller"][0].is_done)
+    right.say({"op": "call_service", "service": "/simulation/advance", "args": {"duration": {"sec": 2}}})
+    assert right.hear(op="action_result")["status"] == 4
+
+
+def test_later_goal_takes_the_place_of_an_earlier(serve, raw, plain):
+    """Two clients that want the same joints: the first learns that its goal was cancelled, the second is served."""
+    server = serve()
+    first, second = raw(server), raw(server)
+    first.say(goal(plain))
+    first.hear(op="action_feedback")
+    second.say(goal(plain, change=-0.1))
+    result = first.hear(op="action_result")
+    assert (result["status"], result["result"]) == (5, True)
+    assert "another" in result["values"]["error_string"]
+    second.say({"op": "call_service", "service": "/simulation/advance", "args": {"duration": {"sec": 2}}})
+    assert second.hear(op="action_result")["status"] == 4
+
+
+def test_going_client_does_not_end_the_goal_that_took_its_place(serve, raw, plain):
+    """The loss of a client whose goal was pre-empted leaves the other's alone."""
+    server = serve()
+    first, second = raw(server), raw(server)
+    first.say(goal(plain))
+    first.hear(op="action_feedback")
+    second.say(goal(plain, change=-0.1))
+    first.hear(op="action_result")
+    first.socket.close()
+    second.say({"op": "call_service", "service": "/simulation/advance", "args": {"duration": {"sec": 2}}})
+    assert second.hear(op="action_result")["status"] == 4
+
+
+def test_cancelling(serve, raw, plain):
+    """A client cancels its own goal by id, or whatever a controller does by the service of ROS 2."""
+    server = serve()
+    client, other = raw(server), raw(server)
+    client.say(goal(plain))
+    client.hear(op="action_feedback")
+    action = "/larm_controller/follow_joint_trajectory"
+    other.say({"op": "cancel_action_goal", "id": "g", "action": action})  # the same id, but another's
+    advance(other, 0.1)
+    assert not plain.goals["larm_controller"][0].is_done
+    client.say({"op": "cancel_action_goal", "id": "g", "action": action})
+    assert client.hear(op="action_result")["status"] == 5
+    client.say(goal(plain))
+    client.hear(op="action_feedback")
+    other.say({"op": "call_service", "service": f"{action}/_action/cancel_goal", "args": {}})
+    assert client.hear(op="action_result")["status"] == 5
+
+
+# Clients that send what they should not
+
+
+def test_garbage_is_answered_and_harms_nothing(serve, raw, plain):
+    """Each message that is wrong is answered by a complaint; the client stays connected, and time goes on."""
+    client = raw(serve())
+    for message, said in (
+        ("hello", "must be JSON"), (b"\x00\xff", "must be JSON"), ("[" * 5000, "must be JSON"), ([], "JSON object"),
+        ({"op": "explode"}, "op must be one of"), ({"op": "subscribe"}, "needs the field"),
+        ({"op": "subscribe", "topic": "/clock", "compression": "png"}, "compression must be none"),
+        ({"op": "unsubscribe", "topic": "/never"}, "not subscribed"),
+        ({"op": "publish", "topic": "/nobody", "msg": {}}, "nobody listens"),
+        ({"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": "fast"}}}, "must be a number"),
+        ({"op": "advertise", "topic": "/cmd_vel", "type": "std_msgs/msg/String"}, "takes geometry_msgs"),
+    ):  # fmt: skip
+        client.say(message)
+        answer = client.hear(op="status")
+        assert answer["level"] == "error"
+        assert said in answer["msg"]
+    assert advance(client)["result"]
+
+
+def test_bad_calls_are_refused(serve, raw):
+    """A service that is not there, or that is asked for nonsense, answers that it failed."""
+    client = raw(serve())
+    for service, args, said in (
+        ("/nothing", {}, "no service '/nothing'; there are:"),
+        ("/simulation/advance", {}, "'duration' is missing"),
+        ("/simulation/advance", {"duration": {"sec": -1}}, "must lie in"),
+        ("/simulation/advance", {"duration": {"sec": 1e300}}, "must lie in"),
+        ("/simulation/advance", {"duration": {"sec": float("nan")}}, "finite"),
+        ("/simulation/advance", "soon", "must lie in messages"),
+    ):
+        client.say({"op": "call_service", "id": "c", "service": service, "args": args})
+        answer = client.hear(op="service_response", id="c")
+        assert answer["result"] is False
+        assert said in answer["values"]
+    assert advance(client)["result"]
+
+
+def test_bad_goals_are_refused(serve, raw, plain):
+    """A goal that cannot be followed is refused with a result code, and what is under way goes on."""
+    client = raw(serve())
+    client.say(goal(plain))
+    client.hear(op="action_feedback")
+    names = plain.controller_param_table["larm_controller"][0]["joint_names"]
+    nan = {"joint_names": names, "points": [{"positions": [float("nan")] * len(names)}]}
+    for change, code in (
+        ({"action": "/nowhere"}, -1), ({"args": {}}, -1), ({"args": {"trajectory": nan}}, -1), ({"args": []}, -1),
+        ({"args": {"trajectory": {"joint_names": ["x"], "points": [{"positions": [1.0]}]}}}, -2),
+        ({"id": "g"}, -1),  # which is under way
+    ):  # fmt: skip
+        client.say(goal(plain, id="bad") | change)
+        answer = client.hear(op="action_result")
+        assert answer["result"] is False
+        assert answer["values"]["error_code"] == code
+        assert answer["values"]["error_string"]
+    assert not plain.goals["larm_controller"][0].is_done
+    assert advance(client)["result"]
+
+
+def test_too_long_a_message(serve, raw, plain):
+    """Who sends more than is read is disconnected, and what it asked for stops; others notice nothing."""
+    server = serve(max_message=10**4)
+    client, other = raw(server), raw(server)
+    client.say(goal(plain))
+    client.hear(op="action_feedback")
+    client.say({"op": "publish", "topic": "/t", "msg": {"data": "x" * 10**5}})
+    until(lambda: plain.goals["larm_controller"][0].is_done)
+    assert advance(other)["result"]
+
+
+def test_a_flood_of_messages(serve, raw, plain):
+    """A client that sends without end slows itself down, not the time of others."""
+    server = serve(real_time_factor=1.0)
+    flooding, other = raw(server), raw(server)
+    stop = threading.Event()
+
+    def flood():
+        try:
+            while not stop.is_set():
+                flooding.say({"op": "call_service", "service": "/rosapi/topics"})
+        except Exception:  # given up, as it reads none of the answers: that is what may happen
+            pass
+
+    thread = threading.Thread(target=flood, daemon=True)
+    thread.start()
+    begin = plain.now()
+    for _ in range(5):
+        other.say({"op": "call_service", "id": "t", "service": "/rosapi/get_time"})
+        assert other.hear(op="service_response", id="t")["result"]
+        time.sleep(0.05)
+    assert plain.now() > begin
+    stop.set()
+    flooding.socket.socket.shutdown(socket.SHUT_RDWR)
+    thread.join(PATIENCE)
+    assert not thread.is_alive()
+
+
+def test_a_client_that_does_not_read(serve, raw, plain):
+    """Publications for one that does not read are dropped: the simulation and others wait for nothing."""
+    server = serve(real_time_factor=math.inf)
+    # a small window, so that what is sent soon stays with the server
+    slow = socket.create_connection(("127.0.0.1", server.port))
+    slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deaf = raw(server, sock=slow, max_queue=1)
+    for topic in ("/joint_states", "/clock", "/odom"):
+        deaf.say({"op": "subscribe", "topic": topic})
+    other = raw(server)
+    for _ in range(20):
+        other.say({"op": "call_service", "id": "t", "service": "/rosapi/get_time"})
+        begin = time.monotonic()
+        assert other.hear(op="service_response", id="t")["result"]
+        assert time.monotonic() - begin < 1.0  # milliseconds, where the machine is not busy
+        time.sleep(0.02)
+    client = next(own for own in server._bridge._clients if own.subscriptions)
+    assert len(client.outbox._waiting) <= 3 * 16 + 1
+
+
+def test_clients_that_come_and_go(serve, raw, plain):
+    """Connections that open and close, with and without goals, leave nothing behind."""
+    server = serve()
+    for k in range(10):
+        client = raw(server)
+        client.say({"op": "subscribe", "topic": "/joint_states"})
+        client.say(goal(plain))
+        client.hear(op="action_feedback")
+        if k % 2:
+            client.socket.close()
+        else:
+            client.socket.socket.close()
+    until(lambda: not server._bridge._clients)
+    until(lambda: plain.goals["larm_controller"][0].is_done)
+    assert not server._bridge.has_subscribers("/joint_states")
+    assert advance(raw(server))["result"]
+
+
+def test_web_pages_may_not_connect(serve, raw):
+    """A page in a browser, which says where it is from, is turned away unless it was allowed."""
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus, match="403"):
+        raw(serve(), origin="http://elsewhere.example")
+    assert advance(raw(serve(origins=("http://here.example",)), origin="http://here.example"))["result"]
+
+
+# The server itself
+
+
+def test_port_in_use(serve, plain):
+    """A port that is taken is named, and the robot is free for another server."""
+    server = serve()
+    with pytest.raises(NotConnectedError, match=f"cannot listen at 127.0.0.1 port {server.port}"):
+        RobotServer(plain, port=server.port)
+
+
+@pytest.mark.parametrize(
+    "options", [{"port": -1}, {"port": 70000}, {"port": "9090"}, {"real_time_factor": 0.0}, {"alive": 0.0},
+                {"real_time_factor": float("nan")}, {"tick": 0.0}, {"real_time_factor": -1.0}],
+)  # fmt: skip
+def test_bad_options(plain, options):
+    """What makes no server is named."""
+    with pytest.raises(InvalidInputError):
+        RobotServer(plain, **({"port": 0} | options))
+
+
+def test_loopback_by_default(serve):
+    """Only programs of this machine can connect unless asked otherwise."""
+    server = serve()
+    assert server.url == f"ws://127.0.0.1:{server.port}"
+    assert {own.getsockname()[0] for own in server._bridge.sockets} == {"127.0.0.1"}
+
+
+def test_closing(serve, join, plain):
+    """A server that closes stops what clients asked for and disconnects them; closing twice does nothing."""
+    server = serve(real_time_factor=1.0)
+    robot = join(server)
+    robot.angle_vector(robot.angle_vector() * 0.5, 30.0)
+    raised = []
+
+    def wait():
+        try:
+            robot.wait_interpolation()
+        except ConnectionLostError as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    time.sleep(0.1)
+    server.close()
+    thread.join(PATIENCE)
+    assert "code 1001" in str(raised[0])
+    assert all(own[0].status == GoalStatus.PREEMPTED for own in plain.goals.values())
+    server.close()
+    assert not server.alive
+
+
+@pytest.mark.parametrize("factor", [None, 1.0])
+def test_simulation_that_fails(serve, join, plain, factor):
+    """When the simulation fails clients learn why, and whoever holds the server finds the error."""
+    server = serve(real_time_factor=factor)
+    robot = join(server)
+    plain.failure = SimulationDiverged("towel", 1.0)
+    with pytest.raises(ConnectionLostError, match=r"SimulationDiverged: the state of 'towel'"):
+        robot.sleep(5.0)
+    until(lambda: not server.alive)
+    with pytest.raises(SimulationDiverged):
+        server.join()
+
+
+def test_json_is_strict(serve, raw, plain):
+    """What is sent is JSON for every language: no NaN in it, even where the robot tells one."""
+    plain.angles[next(iter(plain.angles))] = math.nan
+    client = raw(serve())
+    client.say({"op": "subscribe", "topic": "/joint_states"})
+    text = client.socket.recv(timeout=PATIENCE)
+
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    assert None in json.loads(text, parse_constant=refuse)["msg"]["position"]
