@@ -41,12 +41,15 @@ from nuno.errors import (
     NotConnectedError,
     NunoError,
     RefusedError,
+    ResultsInUseError,
+    ResultsMismatchError,
     RobotModelError,
     RobotTimeoutError,
     SimulationDiverged,
     UnknownNameError,
     ViewerError,
     WalkError,
+    WorkerLostError,
 )
 from nuno.export import export_body
 from nuno.grip import Grip
@@ -65,9 +68,11 @@ if TYPE_CHECKING:
     from nuno.contact_points import ContactPoints
     from nuno.elements import ElementState, elements
     from nuno.estimate.case import PickCase, read_case
+    from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
     from nuno.estimate.fold_case import FoldCase, read_fold_case
     from nuno.estimate.fold_result import FoldResult
+    from nuno.estimate.footage import Footage
     from nuno.estimate.hand_path import HandPath
     from nuno.estimate.hand_tracking import HandTrack, track_hands
     from nuno.estimate.layers import Layers, find_layers
@@ -93,6 +98,10 @@ if TYPE_CHECKING:
     from nuno.robot.walking import continue_walk, plan_walk, plan_walk_footsteps, plan_walk_velocity, stop_walk
     from nuno.robot.wire.client import WireRobot
     from nuno.robot.wire.server import RobotServer
+    from nuno.search.minimise import Minimum, minimise
+    from nuno.search.sampler import Uniform
+    from nuno.search.sweep import SweepResult, read_sweep, sweep
+    from nuno.search.trial import Trial, each
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
 
@@ -120,6 +129,7 @@ __all__ = [
     "Film",
     "FoldCase",
     "FoldResult",
+    "Footage",
     "Footstep",
     "Goal",
     "Grip",
@@ -135,8 +145,10 @@ __all__ = [
     "Layers",
     "Links",
     "Material",
+    "MaterialFit",
     "MeshError",
     "MessageError",
+    "Minimum",
     "MissingPackageError",
     "NotConnectedError",
     "NunoError",
@@ -149,6 +161,8 @@ __all__ = [
     "Readings",
     "Recording",
     "RefusedError",
+    "ResultsInUseError",
+    "ResultsMismatchError",
     "Rigid",
     "RobotInterface",
     "RobotModelError",
@@ -173,15 +187,19 @@ __all__ = [
     "StereoTrack",
     "Stride",
     "SurfacePoints",
+    "SweepResult",
     "Table",
     "Tolerances",
+    "Trial",
     "TriangleMesh",
+    "Uniform",
     "UnknownNameError",
     "Viewer",
     "ViewerError",
     "Walk",
     "WalkError",
     "WireRobot",
+    "WorkerLostError",
     "World",
     "box",
     "capsule",
@@ -190,18 +208,22 @@ __all__ = [
     "continue_walk",
     "cylinder",
     "draw",
+    "each",
     "elements",
     "estimate_pick",
     "export_body",
     "find_layers",
+    "fit_material",
     "locate_marker",
     "mesh",
+    "minimise",
     "plan_walk",
     "plan_walk_footsteps",
     "plan_walk_velocity",
     "plane",
     "read_case",
     "read_fold_case",
+    "read_sweep",
     "replay_fold",
     "sheet",
     "similarity",
@@ -213,6 +235,7 @@ __all__ = [
     "soft_tetrahedra",
     "sphere",
     "stop_walk",
+    "sweep",
     "take_picture",
     "track_hands",
     "track_hands_in_stereo",
@@ -274,6 +297,17 @@ _LAZY = {
     "ServoCommand": "nuno.robot.servo",
     "Tolerances": "nuno.robot.goal",
     "Goal": "nuno.robot.goal",
+    "sweep": "nuno.search.sweep",
+    "read_sweep": "nuno.search.sweep",
+    "SweepResult": "nuno.search.sweep",
+    "each": "nuno.search.trial",
+    "Trial": "nuno.search.trial",
+    "minimise": "nuno.search.minimise",
+    "Minimum": "nuno.search.minimise",
+    "Uniform": "nuno.search.sampler",
+    "Footage": "nuno.estimate.footage",
+    "fit_material": "nuno.estimate.fit_material",
+    "MaterialFit": "nuno.estimate.fit_material",
 }
 
 
