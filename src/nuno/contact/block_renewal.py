@@ -2,11 +2,12 @@
 
 import warp as wp
 
+from nuno.contact.batches import find_in_batches
 from nuno.contact.block_lists import GONE, WIDTH, closed_in, list_blocks, measure_blocks
 from nuno.contact.flat_blocks import forget_flat, mark_flat, mark_uncreased
+from nuno.contact.helping import find_with_help
 from nuno.contact.nearness import bound_blocks, middles
 from nuno.contact.pair_lists import FORGET, find_creases, pick_touching, swept
-from nuno.contact.rounds import find_in_rounds
 from nuno.solver.lanes import barrier
 from nuno.solver.state import LISTINGS, THICKNESS, TRAVEL, Settings, StateFloat, Topology
 from nuno.solver.warps import anyone, leads_warp, most_of_warp
@@ -62,7 +63,10 @@ def find_together(t: StateFloat, topo: Topology, run: Settings, thread: int, thr
             if again:
                 list_blocks(t, topo, run.margin, thread, threads)
             find_creases(t, topo, far * far, thread, threads)
-            find_in_rounds(t, topo, far, thread, threads)
+            if t.helpers > 0:
+                find_with_help(t, topo, far, thread, threads)
+            else:
+                find_in_batches(t, topo, far, thread, threads)
             barrier(threads)
             forget_flat(t, topo, thread, threads)
         else:

@@ -16,15 +16,22 @@ from nuno.solver.frame import run_lanes, run_worlds
 from nuno.solver.groups import run_groups
 from nuno.solver.large import CELLS, LINES, PATCHES, TRIANGLES, TWISTS, YARNS, LargePlan
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.shared import FEW_THREADS, MANY_THREADS, SHARED_PARTICLES, run_blocks, run_blocks_shared
-from nuno.solver.state import ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
+from nuno.solver.shared import FEW_THREADS, MANY_THREADS, run_blocks, run_blocks_partly, run_blocks_shared
+from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES
+from nuno.solver.state import HELP, ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
 from nuno.solver.substeps import default_substeps
 from nuno.solver.upload import upload
+from nuno.solver.warps import WARP
 from nuno.solver.wide import run_wide, widen_topology
 
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
+SUSPECTS = 512
+"""Pairs of elements that a warp that lists pairs can note at least: more than any two blocks of neighbouring vertices
+have."""
+MOST_HELPERS = 7
+"""Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
 
@@ -136,6 +143,10 @@ class ClothSolver(ParticleSolver):
         size.middle = room if self.self_contact else 1
         # candidates seen in crumpled cloths: under 3 a vertex (vertex-triangle) and 8 a vertex (edge-edge)
         size.vertex_triangle, size.edge_edge = 6 * n + 64, 16 * n + 128
+        if size.near_blocks > 1:
+            # the room in which a list is made: a queue of pairs of blocks, and each warp's suspects
+            size.vertex_triangle = max(size.vertex_triangle, -(-size.near_blocks // 4))
+            size.edge_edge = max(size.edge_edge, SUSPECTS * FEW_THREADS // WARP // 2)
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
         size.moved = 4 * n if self._cuda or self.plan == "large" else 1
@@ -159,6 +170,17 @@ class ClothSolver(ParticleSolver):
             state.touch_count = empty(2, self._integer)
         state.near_blocks = empty(size.near_blocks, self._integer)
         state.moved = empty(size.moved, int)
+        self._allocate_help()
+
+    def _allocate_help(self) -> None:
+        """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
+        state, worlds, cores = self._state, self.world_count, 0
+        if self._cuda and self.plan != "large" and self.self_contact:
+            cores = wp.get_device(self.device).sm_count
+        state.helpers = max(0, min(cores - worlds, MOST_HELPERS * worlds))
+        room = state.helpers * 4 * self._size.edge_edge
+        state.help = wp.zeros(self.group_count * HELP, dtype=int, device=self.device)
+        state.help_room = wp.zeros(max(1, room), dtype=int, device=self.device)
 
     @property
     def pair_counts(self) -> np.ndarray:
@@ -173,11 +195,17 @@ class ClothSolver(ParticleSolver):
             return
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
-            fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
+            kernel = run_blocks
+            if self.shared_memory and self.particle_count <= SHARED_PARTICLES:
+                kernel = run_blocks_shared if self.particle_count <= WHOLE_PARTICLES else run_blocks_partly
+            blocks = self.world_count
+            if self._state.helpers and substeps > 1:
+                blocks += self._state.helpers
+                self._state.help.zero_()
             threads = FEW_THREADS if self.world_count <= wp.get_device(self.device).sm_count else MANY_THREADS
             wp.launch(
-                run_blocks_shared if fits else run_blocks, dim=self.group_count * threads,
-                inputs=[*common, substeps, threads], device=self.device, block_dim=threads,
+                kernel, dim=blocks * threads, inputs=[*common, substeps, threads],
+                device=self.device, block_dim=threads,
             )  # fmt: skip
         elif self.plan == "vector":
             if self._wide is None:

@@ -9,10 +9,12 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.renewal import renew_lists
+from nuno.contact.renewal import renew_lists, shares_work
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
+from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
+from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
@@ -34,7 +36,7 @@ from nuno.solver.state import (
 )
 from nuno.solver.vector import at, corner, scaled, spread
 from nuno.solver.warps import WARP, in_warps
-from nuno.solver.yarns import WARP_EDGES, stretch_yarn_together
+from nuno.solver.yarns import PAIR_EDGES, WARP_EDGES, stretch_yarn_together
 
 
 @wp.func
@@ -116,9 +118,18 @@ def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, las
     """The yarns of one direction: on CUDA each by a warp, else by a thread."""
     rate = 1.0 / (run.dt * run.dt)
     if in_warps(threads):
-        for k in range(first + thread / WARP, last, threads / WARP):
+        warps = threads / WARP
+        k = int(first + thread / WARP)
+        while k < last:
             start = table.yarn[k]
             stop = table.yarn[k + 1]
+            other = int(0)
+            end = int(0)
+            if k + warps < last:
+                other = table.yarn[k + warps]
+                end = table.yarn[k + warps + 1]
+            if wp.max(stop - start, end - other) > PAIR_EDGES:
+                end = other
             if stop - start <= WARP_EDGES:
                 stretch_yarn_together(
                     t.x,
@@ -132,10 +143,13 @@ def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, las
                     table.edge_soft,
                     start,
                     stop,
+                    other,
+                    end,
                     rate,
                 )
             elif thread % WARP == 0:
                 stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
+            k += wp.where(end > other, 2 * warps, warps)
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
@@ -151,11 +165,8 @@ def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thre
 
 
 @wp.func
-def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
-    """One pass over the elastic constraints, the stiffest last."""
-    for c in range(topo.patch_colour.shape[0] - 1):
-        bend_patches(t, topo, run, topo.patch_colour[c], topo.patch_colour[c + 1], thread, threads)
-        barrier(threads)
+def bend_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
+    """A sheet's twists, bends and shears."""
     for c in range(topo.twist_colour.shape[0] - 1):
         bend_twists(t, topo, run, topo.twist_colour[c], topo.twist_colour[c + 1], thread, threads)
         barrier(threads)
@@ -165,12 +176,50 @@ def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
     for c in range(topo.cell_colour.shape[0] - 1):
         shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], thread, threads)
         barrier(threads)
+
+
+@wp.func
+def bend_sheet(t: StateFloat, topo: Topology, run: Settings, thread: int, threads: int):
+    if shares_work(threads):
+        bend_twists_ahead(t, topo, run, thread, threads)
+        bend_lines_ahead(t, topo, run, thread, threads)
+        shear_cells_ahead(t, topo, run, thread, threads)
+    else:
+        for c in range(topo.twist_colour.shape[0] - 1):
+            bend_twists(t, topo, run, topo.twist_colour[c], topo.twist_colour[c + 1], 0, 1)
+        for c in range(topo.line_colour.shape[0] - 1):
+            bend_lines(t, topo, run, topo.line_colour[c], topo.line_colour[c + 1], 0, 1)
+        for c in range(topo.cell_colour.shape[0] - 1):
+            shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], 0, 1)
+
+
+@wp.func
+def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
+    """One pass over the elastic constraints, the stiffest last."""
+    for c in range(topo.patch_colour.shape[0] - 1):
+        bend_patches(t, topo, run, topo.patch_colour[c], topo.patch_colour[c + 1], thread, threads)
+        barrier(threads)
+    bend_sheet(t, topo, run, thread, threads)
     for c in range(topo.triangle_colour.shape[0] - 1):
         strain_triangles(t, topo, run, topo.triangle_colour[c], topo.triangle_colour[c + 1], thread, threads)
         barrier(threads)
     for c in range(topo.yarn_kind.shape[0] - 1):
         stretch_yarns(t, topo, run, topo.yarn_kind[c], topo.yarn_kind[c + 1], thread, threads)
         barrier(threads)
+
+
+@wp.func
+def meet_shapes(t: Any, n: int, shapes: Shapes, dt: float, thread: int, threads: int):
+    """All particles against the shapes nearby."""
+    touch_shapes(t, n, shapes, dt, thread, threads)
+
+
+@wp.func
+def meet_shapes(t: StateFloat, n: int, shapes: Shapes, dt: float, thread: int, threads: int):
+    if shares_work(threads):
+        touch_shapes_together(t, n, shapes, dt, thread, threads)
+    else:
+        touch_shapes(t, n, shapes, dt, thread, threads)
 
 
 @wp.func
@@ -206,7 +255,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
             hold_vertices(t, run, thread, threads)
             barrier(threads)
             elastic(t, topo, run, thread, threads)
-        if run.parts & PULLS != 0:
+        if run.pulled != 0 and run.parts & PULLS != 0:
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
@@ -219,7 +268,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         if run.parts & SHAPES != 0:
             read_loads(t, run, thread, threads)
             barrier(threads)
-            touch_shapes(t, n, shapes, run.dt, thread, threads)
+            meet_shapes(t, n, shapes, run.dt, thread, threads)
             barrier(threads)
         if run.parts & VELOCITIES != 0:
             reset_speed(t, thread)

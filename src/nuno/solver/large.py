@@ -14,9 +14,17 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
-from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
+from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.solver.broad import PairFinder
-from nuno.solver.frame import bend_lines, bend_patches, bend_twists, shear_cells, strain_triangles, stretch_yarns
+from nuno.solver.frame import (
+    bend_lines,
+    bend_patches,
+    bend_twists,
+    meet_shapes,
+    shear_cells,
+    strain_triangles,
+    stretch_yarns,
+)
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.state import (
@@ -147,7 +155,7 @@ def finish(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Sh
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     if run.parts & SHAPES != 0:
-        touch_shapes(t, topo.particles, shapes, run.dt, tid % threads, threads)
+        meet_shapes(t, topo.particles, shapes, run.dt, tid % threads, threads)
     if run.parts & VELOCITIES != 0:
         read_velocities(t, topo.particles, run, tid % threads, threads)
 
@@ -202,6 +210,7 @@ class LargePlan:
             run.frame,
             run.parts,
             run.grips,
+            run.pulled,
             run.keys,
             run.grip_ease.ptr,
             run.grip_fixed.ptr,
@@ -244,7 +253,7 @@ class LargePlan:
                 # a yarn is a warp's work
                 count = (last - first) * (WARP if kind == YARNS and self._cuda else 1)
                 self._launch(project, count, run, kind, first, last)
-        if run.parts & PULLS and run.grips:
+        if run.parts & PULLS and run.pulled:
             wp.launch(pull, dim=self._worlds, inputs=common, device=self._device)
         if run.parts & LAYERS:
             if run.touching:

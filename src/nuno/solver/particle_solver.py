@@ -318,6 +318,7 @@ class ParticleSolver:
         s.grip_ghost, s.grip_load = self._put(ghost), self._put(np.zeros((worlds, LOADS * count)))
         wp.copy(s.w, self._put(mass))
         self._grip_count, self._grip_keys = len(entries), keys
+        self._grip_pulls = int(any(not e["fixed"] for e in entries))
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
             return wp.array(values, dtype=dtype, device=self.device)
@@ -446,7 +447,7 @@ class ParticleSolver:
         run.margin = 0.35 * self._cell_size
         run.reach = 0.25 * self._cell_size
         run.frame, run.first, run.parts = frame, 0, ALL_PARTS
-        run.grips, run.keys = self._grip_count, self._grip_keys
+        run.grips, run.keys, run.pulled = self._grip_count, self._grip_keys, self._grip_pulls
         run.grip_start = wp.array([time], dtype=wp.float64, device=self.device)
         run.grip_time, run.step = self._grip_time, wp.float64(dt)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed

@@ -8,47 +8,18 @@ from __future__ import annotations
 
 import warp as wp
 
+from nuno.contact.helping import help_out, send_home
 from nuno.solver.frame import advance
 from nuno.solver.lanes import barrier
+from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES, column, counts, figures
 from nuno.solver.state import Settings, Shapes, Sizes, StateFloat, Topology, view
 
-SHARED_FLOATS = 11500
-"""Floats in the static buffer: 48 KB less the 2 KB that Warp takes for itself at 512 threads, the counts and the
-figures."""
-SHARED_PARTICLES = SHARED_FLOATS // 4
-"""Particles whose coordinates and inverse masses fit; of `SHARED_FLOATS` / 10 all that changes in a substep does."""
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
 for one, and nothing runs while that waits."""
 FEW_THREADS, MANY_THREADS = 512, 256
 """Threads of a block where every world has a multiprocessor to itself, and where worlds queue up for them: two blocks
 then share one, so that another world runs while one waits. The kernel is the same for both, and so are the bits."""
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-__shared__ float buffer[11500];
-return (wp::uint64)buffer;
-#else
-return 0;
-#endif
-""")
-def shared_buffer() -> wp.uint64:
-    """Address of the block's own memory."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-__shared__ int figures[20];
-return (wp::uint64)figures;
-#else
-return 0;
-#endif
-""")
-def shared_figures() -> wp.uint64:
-    """Address of twenty numbers in the block's own memory: four counts, and the world's scalars and notes."""
-    ...
 
 
 @wp.func
@@ -60,11 +31,10 @@ def advance_block(
     picked = t.touch_count
     scalars = t.scalars
     notes = t.notes
-    figures = shared_figures()
-    t.pair_count = wp.array(ptr=figures, shape=(2,), dtype=int)
-    t.touch_count = wp.array(ptr=figures + wp.uint64(8), shape=(2,), dtype=int)
-    t.scalars = wp.array(ptr=figures + wp.uint64(16), shape=(7,), dtype=float)
-    t.notes = wp.array(ptr=figures + wp.uint64(48), shape=(6,), dtype=float)
+    t.pair_count = counts(0)
+    t.touch_count = counts(2)
+    t.scalars = figures(0)
+    t.notes = figures(8)
     if thread == 0:
         for k in range(2):
             t.pair_count[k] = listed[k]
@@ -82,72 +52,123 @@ def advance_block(
             picked[k] = t.touch_count[k]
         for k in range(6):
             notes[k] = t.notes[k]
-
-
-@wp.func
-def place_in(buffer: wp.uint64, k: int, n: int):
-    """The k-th array of n floats in the block's own memory."""
-    return wp.array(ptr=buffer + wp.uint64(4 * k * n), shape=(n,), dtype=float)
+        if t.helpers > 0:
+            send_home(t.help)
 
 
 # A module each, so that only the kind that is run is compiled. Quotients and roots as the processor has them, which
 # may be off by two in the last place: a tenth of the time, and the same bits for the same input all the same.
-for _name in ("run_blocks", "run_blocks_shared"):
+for _name in ("run_blocks", "run_blocks_partly", "run_blocks_shared"):
     wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True
+
+
+@wp.func
+def advance_blocks(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """Every world by a block of ``threads`` threads."""
+    t = view(s, block, topo.particles, size)
+    advance_block(t, topo, run, shapes, substeps, thread, threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks")
 def run_blocks(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int):
     """Every world by a block of ``threads`` threads."""
     tid = wp.tid()
-    t = view(s, tid / threads, topo.particles, size)
-    advance_block(t, topo, run, shapes, substeps, tid % threads, threads)
+    if tid / threads < s.worlds:
+        advance_blocks(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+    else:
+        help_out(s, topo, size, run, tid / threads - s.worlds, tid % threads, threads)
+
+
+@wp.func
+def advance_blocks_partly(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """The same with x, y, z and w in shared memory for as long as the launch takes."""
+    n = topo.particles
+    t = view(s, block, n, size)
+    outside = view(s, block, n, size)
+    t.x = column(0)
+    t.y = column(SHARED_PARTICLES)
+    t.z = column(2 * SHARED_PARTICLES)
+    t.w = column(3 * SHARED_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks_partly")
+def run_blocks_partly(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """The same with x, y, z and w in shared memory for as long as the launch takes."""
+    tid = wp.tid()
+    if tid / threads < s.worlds:
+        advance_blocks_partly(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+    else:
+        help_out(s, topo, size, run, tid / threads - s.worlds, tid % threads, threads)
+
+
+@wp.func
+def advance_blocks_shared(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """The same with all that changes in a substep in shared memory: x, y, z, w, p and v."""
+    n = topo.particles
+    t = view(s, block, n, size)
+    outside = view(s, block, n, size)
+    t.x = column(0)
+    t.y = column(WHOLE_PARTICLES)
+    t.z = column(2 * WHOLE_PARTICLES)
+    t.w = column(3 * WHOLE_PARTICLES)
+    t.px = column(4 * WHOLE_PARTICLES)
+    t.py = column(5 * WHOLE_PARTICLES)
+    t.pz = column(6 * WHOLE_PARTICLES)
+    t.vx = column(7 * WHOLE_PARTICLES)
+    t.vy = column(8 * WHOLE_PARTICLES)
+    t.vz = column(9 * WHOLE_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+        t.px[i] = outside.px[i]
+        t.py[i] = outside.py[i]
+        t.pz[i] = outside.pz[i]
+        t.vx[i] = outside.vx[i]
+        t.vy[i] = outside.vy[i]
+        t.vz[i] = outside.vz[i]
+    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+        outside.px[i] = t.px[i]
+        outside.py[i] = t.py[i]
+        outside.pz[i] = t.pz[i]
+        outside.vx[i] = t.vx[i]
+        outside.vy[i] = t.vy[i]
+        outside.vz[i] = t.vz[i]
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks_shared")
 def run_blocks_shared(
     s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):
-    """The same with x, y, z and w, and if they fit p and v, in shared memory for as long as the launch takes."""
+    """The same with all that changes in a substep in shared memory: x, y, z, w, p and v."""
     tid = wp.tid()
-    n = topo.particles
-    thread = tid % threads
-    t = view(s, tid / threads, n, size)
-    outside = view(s, tid / threads, n, size)
-    buffer = shared_buffer()
-    whole = 10 * n <= SHARED_FLOATS
-    t.x = place_in(buffer, 0, n)
-    t.y = place_in(buffer, 1, n)
-    t.z = place_in(buffer, 2, n)
-    t.w = place_in(buffer, 3, n)
-    if whole:
-        t.px = place_in(buffer, 4, n)
-        t.py = place_in(buffer, 5, n)
-        t.pz = place_in(buffer, 6, n)
-        t.vx = place_in(buffer, 7, n)
-        t.vy = place_in(buffer, 8, n)
-        t.vz = place_in(buffer, 9, n)
-    for i in range(thread, n, threads):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
-        t.w[i] = outside.w[i]
-        if whole:
-            t.px[i] = outside.px[i]
-            t.py[i] = outside.py[i]
-            t.pz[i] = outside.pz[i]
-            t.vx[i] = outside.vx[i]
-            t.vy[i] = outside.vy[i]
-            t.vz[i] = outside.vz[i]
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
-    for i in range(thread, n, threads):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
-        if whole:
-            outside.px[i] = t.px[i]
-            outside.py[i] = t.py[i]
-            outside.pz[i] = t.pz[i]
-            outside.vx[i] = t.vx[i]
-            outside.vy[i] = t.vy[i]
-            outside.vz[i] = t.vz[i]
+    if tid / threads < s.worlds:
+        advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+    else:
+        help_out(s, topo, size, run, tid / threads - s.worlds, tid % threads, threads)

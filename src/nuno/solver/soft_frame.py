@@ -14,7 +14,8 @@ from nuno.solver.frame import near_shapes
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
-from nuno.solver.shared import BLOCKS_AT_ONCE, SHARED_FLOATS, place_in, shared_buffer
+from nuno.solver.shared import BLOCKS_AT_ONCE
+from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES, column, figures
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
 from nuno.solver.soft_state import CRUMPLED, SEEN, SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra, view
 from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SCALARS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
@@ -131,7 +132,7 @@ def advance(t: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: i
             hold_vertices(t, run, thread, threads)
             barrier(threads)
             elastic(t, topo, run, thread, threads)
-        if run.parts & PULLS != 0:
+        if run.pulled != 0 and run.parts & PULLS != 0:
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.parts & SHAPES != 0:
@@ -234,8 +235,8 @@ def run_soft_wide(
 
 
 # quotients and roots as the processor has them: see `nuno.solver.shared`
-for _name in ("run_soft_blocks", "run_soft_blocks_shared", "run_soft_few_shared"):
-    wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True
+for _name in ("blocks", "blocks_partly", "few_partly", "blocks_shared", "few_shared"):
+    wp.get_module(f"nuno.solver.run_soft_{_name}").options["fast_math"] = True
 
 
 @wp.kernel(
@@ -251,50 +252,102 @@ def run_soft_blocks(
 
 
 @wp.func
-def run_shared(
-    s: SoftFloat,
-    topo: Tetrahedra,
-    size: SoftSizes,
-    run: Settings,
-    shapes: Shapes,
-    substeps: int,
-    tid: int,
-    threads: int,
+def advance_block(
+    t: SoftFloat, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
 ):
-    """A world by a block with x, y, z and w, and v if it fits, in shared memory for as long as the launch takes."""
+    """`advance` with the world's scalars and notes in shared memory for as long as the launch takes."""
+    scalars = t.scalars
+    notes = t.notes
+    t.scalars = figures(0)
+    t.notes = figures(8)
+    if thread == 0:
+        for k in range(7):
+            t.scalars[k] = scalars[k]
+        for k in range(6):
+            t.notes[k] = notes[k]
+    barrier(threads)
+    advance(t, topo, run, shapes, substeps, thread, threads)
+    barrier(threads)
+    if thread == 0:
+        for k in range(6):
+            notes[k] = t.notes[k]
+
+
+@wp.func
+def run_partly(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, tid: int,
+    threads: int,
+):  # fmt: skip
+    """A world by a block with x, y, z and w in shared memory for as long as the launch takes."""
     n = topo.particles
     thread = tid % threads
     t = view(s, tid / threads, n, size)
     outside = view(s, tid / threads, n, size)
-    buffer = shared_buffer()
-    roomy = 7 * n <= SHARED_FLOATS
-    t.x = place_in(buffer, 0, n)
-    t.y = place_in(buffer, 1, n)
-    t.z = place_in(buffer, 2, n)
-    t.w = place_in(buffer, 3, n)
-    if roomy:
-        t.vx = place_in(buffer, 4, n)
-        t.vy = place_in(buffer, 5, n)
-        t.vz = place_in(buffer, 6, n)
+    t.x = column(0)
+    t.y = column(SHARED_PARTICLES)
+    t.z = column(2 * SHARED_PARTICLES)
+    t.w = column(3 * SHARED_PARTICLES)
     for i in range(thread, n, threads):
         t.x[i] = outside.x[i]
         t.y[i] = outside.y[i]
         t.z[i] = outside.z[i]
         t.w[i] = outside.w[i]
-        if roomy:
-            t.vx[i] = outside.vx[i]
-            t.vy[i] = outside.vy[i]
-            t.vz[i] = outside.vz[i]
-    barrier(threads)
-    advance(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
         outside.z[i] = t.z[i]
-        if roomy:
-            outside.vx[i] = t.vx[i]
-            outside.vy[i] = t.vy[i]
-            outside.vz[i] = t.vz[i]
+
+
+@wp.func
+def run_shared(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, tid: int,
+    threads: int,
+):  # fmt: skip
+    """A world by a block with x, y, z, w and v in shared memory."""
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    t.x = column(0)
+    t.y = column(ROOMY_PARTICLES)
+    t.z = column(2 * ROOMY_PARTICLES)
+    t.w = column(3 * ROOMY_PARTICLES)
+    t.vx = column(4 * ROOMY_PARTICLES)
+    t.vy = column(5 * ROOMY_PARTICLES)
+    t.vz = column(6 * ROOMY_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+        t.vx[i] = outside.vx[i]
+        t.vy[i] = outside.vy[i]
+        t.vz[i] = outside.vz[i]
+    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+        outside.vx[i] = t.vx[i]
+        outside.vy[i] = t.vy[i]
+        outside.vz[i] = t.vz[i]
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_partly")
+def run_soft_blocks_partly(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """Worlds that queue up for multiprocessors, and of which not all fits."""
+    run_partly(s, topo, size, run, shapes, substeps, wp.tid(), threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_soft_few_partly")
+def run_soft_few_partly(
+    s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """Worlds that have a multiprocessor each, and so all of its registers, and of which not all fits."""
+    run_partly(s, topo, size, run, shapes, substeps, wp.tid(), threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_shared")

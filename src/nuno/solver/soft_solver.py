@@ -13,10 +13,12 @@ from nuno.scene.soft import SoftTopology, moduli, shape_gradients
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.shared import SHARED_PARTICLES
+from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.solver.soft_frame import (
     run_soft_blocks,
+    run_soft_blocks_partly,
     run_soft_blocks_shared,
+    run_soft_few_partly,
     run_soft_few_shared,
     run_soft_lanes,
     run_soft_wide,
@@ -173,11 +175,8 @@ class SoftSolver(ParticleSolver):
     def _advance(self, run: Settings, substeps: int) -> None:
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
-            fits = self.shared_memory and self.particle_count <= SHARED_PARTICLES
-            few = self.group_count <= wp.get_device(self.device).sm_count
-            shared = run_soft_few_shared if few else run_soft_blocks_shared
             wp.launch(
-                shared if fits else run_soft_blocks, dim=self.group_count * BLOCK_THREADS,
+                self._block_kernel(), dim=self.group_count * BLOCK_THREADS,
                 inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
             )  # fmt: skip
         elif self.plan == "vector":
@@ -193,6 +192,15 @@ class SoftSolver(ParticleSolver):
                 wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count], device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
+
+    def _block_kernel(self) -> Any:
+        """The kernel that has as much of a world in shared memory as fits, and of registers as there are."""
+        if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
+            return run_soft_blocks
+        few = self.group_count <= wp.get_device(self.device).sm_count
+        if self.particle_count > ROOMY_PARTICLES:
+            return run_soft_few_partly if few else run_soft_blocks_partly
+        return run_soft_few_shared if few else run_soft_blocks_shared
 
 
 def viscous_reply(topology: SoftTopology, viscosity: np.ndarray, inverse_mass: np.ndarray) -> float:

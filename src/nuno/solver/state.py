@@ -17,6 +17,9 @@ TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
 PICKED, PICK_REACH = 4, 5
 NOTES = 6
 
+HELP = 8
+"""Numbers in `State.help`: see `nuno.contact.helping`."""
+
 LOADS = 4
 """Numbers in `State.grip_load` for each grip: what it bore in the frame's substeps [kg m], and how many these were."""
 
@@ -47,7 +50,8 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
     )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
-    return fields | {"moved": wp.array(dtype=int), "near": wp.array(dtype=int), "group": int, "worlds": int}
+    fields |= {name: wp.array(dtype=int) for name in ("moved", "near", "help", "help_room")}
+    return fields | {"group": int, "worlds": int, "helpers": int}
 
 
 def _make(name: str, number: type, integer: type) -> Any:
@@ -138,7 +142,10 @@ class Sizes:
 
 @wp.struct
 class Settings:
-    """What holds for the whole run, or while it goes by parts: ``first`` is the first substep's number."""
+    """What holds for the whole run, or while it goes by parts: ``first`` is the first substep's number.
+
+    ``pulled`` says whether there are grips other than stiff ones on vertices.
+    """
 
     dt: float
     gravity: wp.vec3
@@ -151,6 +158,7 @@ class Settings:
     first: int
     parts: int
     grips: int
+    pulled: int
     keys: int
     # of the world's clock: keys, and where the run starts; of a step [s]. A float has too few digits for them
     grip_time: wp.array(dtype=wp.float64)
@@ -227,5 +235,6 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.pair_count = window(s.pair_count, group * 2, 2)
     t.moved = window(s.moved, group * size.moved, size.moved)
     t.near = window(s.near, group * size.near, size.near)
+    t.help = window(s.help, group * HELP, HELP)
     t.near_blocks = window(s.near_blocks, group * size.near_blocks, size.near_blocks)
     return t

@@ -7,6 +7,8 @@ each step a row is freed of its neighbours and linked to those twice as far.
 
 import warp as wp
 
+PAIR_EDGES = wp.constant(32)
+"""Edges of the longest yarns of which a warp takes two side by side: each waits less for the other than for itself."""
 WARP_EDGES = wp.constant(256)
 """Edges of the longest yarn that a warp takes together: eight rows a thread."""
 
@@ -15,13 +17,18 @@ WARP_EDGES = wp.constant(256)
 #if defined(__CUDA_ARCH__)
 const unsigned all = 0xffffffffu;
 const int lane = threadIdx.x % 32;
-const int count = last - first;
-struct One { enum { rows = 1 }; };
-struct Two { enum { rows = 2 }; };
-struct Eight { enum { rows = 8 }; };
+const int count = last - first, more = stop - start;
+struct One { enum { rows = 1, apart = 0 }; };
+struct Pair { enum { rows = 2, apart = 1 }; };
+struct Two { enum { rows = 2, apart = 0 }; };
+struct Eight { enum { rows = 8, apart = 0 }; };
 auto solve = [&](auto kind) {
-    // row k of the system is in thread k % 32
+    // row k of the system is in thread k % 32; of two yarns apart each thread has a row of either
     constexpr int ROWS = decltype(kind)::rows;
+    constexpr bool APART = decltype(kind)::apart;
+    constexpr int REACH = APART ? 32 : 32 * ROWS;
+    auto place = [&](int j) { return APART ? lane : 32 * j + lane; };
+    auto length_of = [&](int j) { return APART && j > 0 ? more : count; };
     int end[ROWS];
     float ex[ROWS], ey[ROWS], ez[ROWS], inverse[ROWS], low[ROWS], high[ROWS], pull[ROWS];
     // what row k - shift, or k + shift, has
@@ -29,7 +36,8 @@ auto solve = [&](auto kind) {
         if (shift < 32) {
             float s[ROWS];
             for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane - shift) & 31);
-            for (int j = ROWS - 1; j >= 0; --j) r[j] = lane >= shift ? s[j] : (j > 0 ? s[j > 0 ? j - 1 : 0] : 0.f);
+            for (int j = ROWS - 1; j >= 0; --j)
+                r[j] = lane >= shift ? s[j] : (j > 0 && !APART ? s[j > 0 ? j - 1 : 0] : 0.f);
         } else {
             #pragma unroll
             for (int j = 0; j < ROWS; ++j) {
@@ -44,7 +52,7 @@ auto solve = [&](auto kind) {
             float s[ROWS];
             for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane + shift) & 31);
             for (int j = 0; j < ROWS; ++j)
-                r[j] = lane + shift < 32 ? s[j] : (j < ROWS - 1 ? s[j < ROWS - 1 ? j + 1 : j] : 0.f);
+                r[j] = lane + shift < 32 ? s[j] : (j < ROWS - 1 && !APART ? s[j < ROWS - 1 ? j + 1 : j] : 0.f);
         } else {
             #pragma unroll
             for (int j = 0; j < ROWS; ++j) {
@@ -57,9 +65,8 @@ auto solve = [&](auto kind) {
     float wa[ROWS], wb[ROWS], px[ROWS], py[ROWS], pz[ROWS];
     #pragma unroll
     for (int j = 0; j < ROWS; ++j) {
-        const int k = first + 32 * j + lane;
-        const bool own = k < last;
-        const int e = own ? k : first;
+        const bool own = place(j) < length_of(j);
+        const int e = own ? (APART && j > 0 ? start : first) + place(j) : first;
         const int a = edge.data[e][0], b = edge.data[e][1];
         px[j] = x.data[b]; py[j] = y.data[b]; pz[j] = z.data[b];
         wa[j] = w.data[a]; wb[j] = w.data[b];
@@ -76,8 +83,8 @@ auto solve = [&](auto kind) {
         before(ex, 1, bx); before(ey, 1, by); before(ez, 1, bz);
         #pragma unroll
         for (int j = 0; j < ROWS; ++j) {
-            const int k = 32 * j + lane;
-            beside[j] = k > 0 && k < count ? -wa[j] * (bx[j] * ex[j] + by[j] * ey[j] + bz[j] * ez[j]) : 0.f;
+            const int k = place(j);
+            beside[j] = k > 0 && k < length_of(j) ? -wa[j] * (bx[j] * ex[j] + by[j] * ey[j] + bz[j] * ez[j]) : 0.f;
         }
         after(beside, 1, high);
         #pragma unroll
@@ -88,7 +95,7 @@ auto solve = [&](auto kind) {
     }
     // unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
     #pragma unroll
-    for (int shift = 1; shift < 32 * ROWS; shift *= 2) {
+    for (int shift = 1; shift < REACH; shift *= 2) {
         float lb[ROWS], hb[ROWS], pb[ROWS], la[ROWS], ha[ROWS], pa[ROWS];
         before(low, shift, lb); before(high, shift, hb); before(pull, shift, pb);
         after(low, shift, la); after(high, shift, ha); after(pull, shift, pa);
@@ -107,22 +114,23 @@ auto solve = [&](auto kind) {
     #pragma unroll
     for (int j = 0; j < ROWS; ++j) {
         // all have read their ends in the first shuffles, so that nothing is overwritten too soon
-        const int k = 32 * j + lane;
+        const int k = place(j);
         if (end[j] >= 0) {
-            const bool more = k + 1 < count;
-            x.data[end[j]] = px[j] + wb[j] * ((more ? nx[j] : 0.f) - ex[j]);
-            y.data[end[j]] = py[j] + wb[j] * ((more ? ny[j] : 0.f) - ey[j]);
-            z.data[end[j]] = pz[j] + wb[j] * ((more ? nz[j] : 0.f) - ez[j]);
+            const bool on = k + 1 < length_of(j);
+            x.data[end[j]] = px[j] + wb[j] * ((on ? nx[j] : 0.f) - ex[j]);
+            y.data[end[j]] = py[j] + wb[j] * ((on ? ny[j] : 0.f) - ey[j]);
+            z.data[end[j]] = pz[j] + wb[j] * ((on ? nz[j] : 0.f) - ez[j]);
         }
-        if (k == 0) {
-            const int head = edge.data[first][0];
+        if (k == 0 && length_of(j) > 0) {
+            const int head = edge.data[APART && j > 0 ? start : first][0];
             x.data[head] += wa[j] * ex[j];
             y.data[head] += wa[j] * ey[j];
             z.data[head] += wa[j] * ez[j];
         }
     }
 };
-if (count <= 32) solve(One());
+if (more > 0) solve(Pair());
+else if (count <= 32) solve(One());
 else if (count <= 64) solve(Two());
 else solve(Eight());
 #endif
@@ -139,9 +147,11 @@ def stretch_yarn_together(
     which: wp.array(dtype=int),
     first: int,
     last: int,
+    start: int,
+    stop: int,
     rate: float,
 ):
-    """Solve the edges first to last, a yarn's, at once and move its vertices.
+    """Solve the edges first to last, a yarn's, at once and move its vertices; those of two short yarns side by side.
 
     Args:
         x: Coordinates; so are ``y`` and ``z`` [m].
@@ -155,6 +165,8 @@ def stretch_yarn_together(
         which: The place of each in ``soft``.
         first: The yarn's first edge.
         last: One past its last.
+        start: The same of another yarn of at most 32 edges, which shares no vertex with the first, as short a one.
+        stop: See ``start``, and the same where there is no other.
         rate: 1 / dt^2 [1/s2].
     """
     ...

@@ -1,4 +1,4 @@
-"""The listing by a CUDA block in rounds, against a search of all pairs and against the CPU's list."""
+"""The listing by a CUDA block in batches, against a search of all pairs and against the CPU's list."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def listed(cloth, positions, device):
 @pytest.mark.parametrize("scale", [0.004, 0.02])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_a_block_lists_all_that_is_near(kind, scale):
-    """Exact: every pair nearer than thickness and margin; at 20 mm the suspects do not fit their room at once."""
+    """Exact: every pair nearer than thickness and margin; at 20 mm nearly all blocks are near each other."""
     cloth = ClothTopology.sheet((14, 11), (0.28, 0.22))
     if kind == "mesh":
         cloth = ClothTopology.mesh(cloth.rest[:, :2], cloth.faces)

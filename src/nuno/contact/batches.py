@@ -1,19 +1,24 @@
 """The listing of self-contact pairs by the many threads of a CUDA block.
 
-They list in two rounds: the pairs of elements whose spheres meet, and those that are near. In the first a warp's 32
-threads look at a pair of blocks together: what they read lies side by side, nothing is read twice, and all pay for one
-atomic. The first round's list stands in the room of the picked pairs, which are picked anew once the list is made;
-where that is too small, the rounds take fewer blocks at a time.
+The pairs of blocks that may have near elements are queued. A warp takes a few of them at a time, and looks at one after
+the other with its 32 threads together: what they read lies side by side, and nothing is read twice. It notes the
+pairs of elements whose spheres meet, its suspects, and where these are enough for all its threads it lists those that
+are near. No warp waits for another. The queue and the suspects stand in the room of the picked pairs, which are picked
+anew once the list is made.
 """
 
 import warp as wp
 
 from nuno.contact.flat_blocks import in_flat
 from nuno.contact.nearness import append, near_edges, near_triangle
-from nuno.solver.lanes import barrier
+from nuno.solver.lanes import barrier, window
 from nuno.solver.state import StateFloat, Topology
-from nuno.solver.warps import WARP, claim, lowest, size_of_set, told, vote
+from nuno.solver.warps import WARP, before_me, claim, lowest, size_of_set, sync_warp, told
 
+BATCH = wp.constant(4)
+"""Pairs of blocks that a warp takes from the queue at a time."""
+ENOUGH = wp.constant(64)
+"""Suspects from which on a warp examines them."""
 COLUMNS = wp.constant(16)
 """Elements of one block that a warp looks at side by side, its two halves at different ones of the other block."""
 
@@ -130,12 +135,15 @@ def edges_near(
 
 
 @wp.func
-def suspect_of(t: StateFloat, topo: Topology, a: int, b: int, far: float, thread: int):
-    """Note the elements of two blocks whose spheres meet: a warp's work.
+def suspect(
+    t: StateFloat, topo: Topology, a: int, b: int, far: float, room: wp.array(dtype=int), before: int, thread: int
+):
+    """Note the elements of two blocks whose spheres meet, behind ``before`` others; how many are noted then.
 
     A suspect is two numbers: the place of a vertex in the blocks and that of a triangle, or the number of particles
     plus the place of an edge and that of another.
     """
+    count = int(before)
     v = thread % COLUMNS
     offset = topo.block_face.shape[0]
     va = topo.block_vertex_start[a]
@@ -166,44 +174,24 @@ def suspect_of(t: StateFloat, topo: Topology, a: int, b: int, far: float, thread
                     below = wp.max(eb + step + v - begin, 0)
                     if below < 32:
                         bits = bits & ((1 << below) - 1)
-            k = claim(t.touch_count, 1, size_of_set(ab) + size_of_set(ba) + size_of_set(bits))
-            k = note(t.touch_edge, k, ab, va, fb + step + v)
-            k = note(t.touch_edge, k, ba, vb, fa + step + v)
-            note(t.touch_edge, k, bits, topo.particles + begin, eb + step + v)
+            own = size_of_set(ab) + size_of_set(ba) + size_of_set(bits)
+            k = count + before_me(own)
+            count = told(k + own, WARP - 1)
+            k = note(room, k, ab, va, fb + step + v)
+            k = note(room, k, ba, vb, fa + step + v)
+            note(room, k, bits, topo.particles + begin, eb + step + v)
             ab = int(0)
             ba = int(0)
+    return count
 
 
 @wp.func
-def suspect(t: StateFloat, topo: Topology, far: float, first: int, last: int, thread: int, threads: int):
-    """Note the suspects of the listed pairs of blocks first to last, where boxes meet and the cloth is not flat."""
-    for start in range(first + thread - thread % WARP, last, threads):
-        k = start + thread % WARP
-        pair = int(0)
-        on = bool(False)
-        if k < last:
-            pair = t.near_blocks[1 + k]
-            a = 6 * (pair >> 16)
-            b = 6 * (pair & 0xFFFF)
-            gx = wp.min(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
-            gy = wp.min(t.bounds[a + 4] - t.bounds[b + 1], t.bounds[b + 4] - t.bounds[a + 1])
-            gz = wp.min(t.bounds[a + 5] - t.bounds[b + 2], t.bounds[b + 5] - t.bounds[a + 2])
-            on = wp.min(gx, wp.min(gy, gz)) + far > 0.0
-            if on:
-                on = not in_flat(t, topo, pair >> 16, pair & 0xFFFF)
-        left = vote(on)
-        while left != 0:
-            chosen = told(pair, lowest(left))
-            suspect_of(t, topo, chosen >> 16, chosen & 0xFFFF, far, thread)
-            left = left & (left - 1)
-
-
-@wp.func
-def examine(t: StateFloat, topo: Topology, far2: float, count: int, thread: int, threads: int):
-    """List those suspects that are near."""
-    for k in range(thread, count, threads):
-        u = t.touch_edge[2 * k]
-        v = t.touch_edge[2 * k + 1]
+def examine(t: StateFloat, topo: Topology, far2: float, room: wp.array(dtype=int), count: int, thread: int):
+    """List those of a warp's suspects that are near; what did not fit its room is passed over."""
+    sync_warp()
+    for k in range(thread % WARP, wp.min(count, room.shape[0] / 2), WARP):
+        u = room[2 * k]
+        v = room[2 * k + 1]
         if u < topo.particles:
             f = topo.block_face[v]
             i = topo.block_vertex[u]
@@ -214,27 +202,73 @@ def examine(t: StateFloat, topo: Topology, far2: float, count: int, thread: int,
             g = topo.block_edge[v]
             near = near_edges(t, e[0], e[1], g[0], g[1], far2)
             append(near, t.pair_count, 1, t.edge_edge, e[0], e[1], g[0], g[1])
+    sync_warp()
 
 
 @wp.func
-def find_in_rounds(t: StateFloat, topo: Topology, far: float, thread: int, threads: int):
-    """List the elements of listed blocks that are nearer than ``far``; the threads are whole warps."""
+def queue_blocks(t: StateFloat, topo: Topology, far: float, thread: int, threads: int):
+    """Queue the listed pairs of blocks whose boxes meet and where the cloth is not flat; how many these are."""
     pairs = t.near_blocks[0]
-    room = t.touch_edge.shape[0] / 2
-    rows = int(pairs)
+    room = t.touch_triangle.shape[0]
+    barrier(threads)
+    if thread == 0:
+        t.touch_count[0] = 0
+    barrier(threads)
+    for start in range(thread - thread % WARP, pairs, threads):
+        k = start + thread % WARP
+        pair = int(0)
+        on = int(0)
+        if k < pairs:
+            pair = t.near_blocks[1 + k]
+            a = 6 * (pair >> 16)
+            b = 6 * (pair & 0xFFFF)
+            gx = wp.min(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
+            gy = wp.min(t.bounds[a + 4] - t.bounds[b + 1], t.bounds[b + 4] - t.bounds[a + 1])
+            gz = wp.min(t.bounds[a + 5] - t.bounds[b + 2], t.bounds[b + 5] - t.bounds[a + 2])
+            if wp.min(gx, wp.min(gy, gz)) + far > 0.0:
+                if not in_flat(t, topo, pair >> 16, pair & 0xFFFF):
+                    on = 1
+        place = claim(t.touch_count, 0, on)
+        if on != 0 and place < room:
+            t.touch_triangle[place] = pair
+    barrier(threads)
+    return wp.min(t.touch_count[0], room)
+
+
+@wp.func
+def search_batch(t: StateFloat, topo: Topology, far: float, first: int, last: int, thread: int, threads: int):
+    """List the near elements of the queued pairs first to last: a warp's work."""
+    size = t.touch_edge.shape[0] / (threads / WARP)
+    room = window(t.touch_edge, thread / WARP * size, size)
+    count = int(0)
+    k = int(first)
+    while k < last:
+        pair = t.touch_triangle[k]
+        noted = suspect(t, topo, pair >> 16, pair & 0xFFFF, far, room, count, thread)
+        # what has no room behind others is noted once more when they are out of the way
+        fits = count == 0 or noted <= size / 2
+        if fits:
+            count = noted
+            k += 1
+        if not fits or count >= ENOUGH or k == last:
+            examine(t, topo, far * far, room, count, thread)
+            count = 0
+
+
+@wp.func
+def find_in_batches(t: StateFloat, topo: Topology, far: float, thread: int, threads: int):
+    """List the elements of listed blocks that are nearer than ``far``; the threads are whole warps."""
+    queued = queue_blocks(t, topo, far, thread, threads)
+    barrier(threads)
+    if thread == 0:
+        t.touch_count[0] = 0
+    barrier(threads)
     first = int(0)
-    while first < pairs:
-        barrier(threads)
-        if thread == 0:
-            t.touch_count[1] = 0
-        barrier(threads)
-        last = wp.min(first + rows, pairs)
-        suspect(t, topo, far, first, last, thread, threads)
-        barrier(threads)
-        count = t.touch_count[1]
-        # what two blocks have is taken as far as there is room: the lists themselves have no more
-        if rows > 1 and count > room:
-            rows = wp.max(rows / 4, 1)
-        else:
-            examine(t, topo, far * far, wp.min(count, room), thread, threads)
-            first = last
+    while first < queued:
+        place = int(0)
+        if thread % WARP == 0:
+            place = wp.atomic_add(t.touch_count, 0, BATCH)
+        first = told(place, 0)
+        if first < queued:
+            search_batch(t, topo, far, first, wp.min(first + BATCH, queued), thread, threads)
+    barrier(threads)

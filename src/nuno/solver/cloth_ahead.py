@@ -1,0 +1,153 @@
+"""A sheet's bends and shears by the threads of a CUDA block: each thread reads its next element while it works on one.
+
+As `nuno.solver.soft_ahead` does for tetrahedra. What an element has in tables comes from far away; read only when it is
+due, after all threads have waited for each other, it would take longer than the arithmetic.
+"""
+
+import warp as wp
+
+from nuno.solver.bending import bend_line, bend_twist
+from nuno.solver.lanes import barrier
+from nuno.solver.membrane import shear_cell
+from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
+
+
+@wp.struct
+class Element:
+    """What the tables have of one element: its vertices, what its compliance is multiplied with, and whose it is."""
+
+    a: int
+    b: int
+    c: int
+    d: int
+    scale: float
+    soft: int
+
+
+@wp.func
+def read_line(table: Topology, k: int, last: int):
+    """Line bend k, or an empty one from ``last`` on."""
+    e = Element()
+    if k < last:
+        q = table.line[k]
+        e.a = q[0]
+        e.b = q[1]
+        e.c = q[2]
+        e.scale = table.line_scale[k]
+        e.soft = table.line_soft[k]
+    return e
+
+
+@wp.func
+def read_twist(table: Topology, k: int, last: int):
+    """Cell twist k, or an empty one from ``last`` on."""
+    e = Element()
+    if k < last:
+        q = table.twist[k]
+        e.a = q[0]
+        e.b = q[1]
+        e.c = q[2]
+        e.d = q[3]
+        e.scale = table.twist_scale[k]
+        e.soft = table.twist_soft[k]
+    return e
+
+
+@wp.func
+def read_cell(table: Topology, k: int, last: int):
+    """Cell shear k, or an empty one from ``last`` on."""
+    e = Element()
+    if k < last:
+        q = table.cell[k]
+        e.a = q[0]
+        e.b = q[1]
+        e.c = q[2]
+        e.d = q[3]
+        e.scale = table.cell_scale[k]
+        e.soft = table.cell_soft[k]
+    return e
+
+
+@wp.func
+def bend_lines_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+    """All line bends, as `nuno.solver.frame.bend_lines` colour by colour."""
+    rate = 1.0 / (run.dt * run.dt)
+    damping = t.scalars[DAMPING] * (1.0 / run.dt)
+    colours = table.line_colour.shape[0] - 1
+    if colours > 0:
+        first = table.line_colour[0]
+        last = table.line_colour[1]
+        ready = read_line(table, first + thread, last)
+        soft = t.bend_soft[ready.soft]
+        for c in range(colours):
+            now = ready
+            alpha = soft * (now.scale * rate)
+            start = last
+            stop = table.line_colour[wp.min(c + 2, colours)]
+            ready = read_line(table, start + thread, stop)
+            if first + thread < last:
+                bend_line(t, now.a, now.b, now.c, alpha, run.damped, damping)
+            for k in range(first + thread + threads, last, threads):
+                e = read_line(table, k, last)
+                alpha = t.bend_soft[e.soft] * (e.scale * rate)
+                bend_line(t, e.a, e.b, e.c, alpha, run.damped, damping)
+            soft = t.bend_soft[ready.soft]
+            first = start
+            last = stop
+            barrier(threads)
+
+
+@wp.func
+def bend_twists_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+    """All cell twists, as `nuno.solver.frame.bend_twists` colour by colour."""
+    rate = 1.0 / (run.dt * run.dt)
+    damping = t.scalars[DAMPING] * (1.0 / run.dt)
+    colours = table.twist_colour.shape[0] - 1
+    if colours > 0:
+        first = table.twist_colour[0]
+        last = table.twist_colour[1]
+        ready = read_twist(table, first + thread, last)
+        soft = t.bend_soft[ready.soft]
+        for c in range(colours):
+            now = ready
+            alpha = soft * (now.scale * rate)
+            start = last
+            stop = table.twist_colour[wp.min(c + 2, colours)]
+            ready = read_twist(table, start + thread, stop)
+            if first + thread < last:
+                bend_twist(t, now.a, now.b, now.c, now.d, alpha, run.damped, damping)
+            for k in range(first + thread + threads, last, threads):
+                e = read_twist(table, k, last)
+                alpha = t.bend_soft[e.soft] * (e.scale * rate)
+                bend_twist(t, e.a, e.b, e.c, e.d, alpha, run.damped, damping)
+            soft = t.bend_soft[ready.soft]
+            first = start
+            last = stop
+            barrier(threads)
+
+
+@wp.func
+def shear_cells_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+    """All cell shears, as `nuno.solver.frame.shear_cells` colour by colour."""
+    rate = 1.0 / (run.dt * run.dt)
+    colours = table.cell_colour.shape[0] - 1
+    if colours > 0:
+        first = table.cell_colour[0]
+        last = table.cell_colour[1]
+        ready = read_cell(table, first + thread, last)
+        soft = t.shear_soft[ready.soft]
+        for c in range(colours):
+            now = ready
+            alpha = soft * (now.scale * 4.0 * rate)
+            start = last
+            stop = table.cell_colour[wp.min(c + 2, colours)]
+            ready = read_cell(table, start + thread, stop)
+            if first + thread < last:
+                shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha)
+            for k in range(first + thread + threads, last, threads):
+                e = read_cell(table, k, last)
+                shear_cell(t, e.a, e.b, e.c, e.d, e.scale, t.shear_soft[e.soft] * (e.scale * 4.0 * rate))
+            soft = t.shear_soft[ready.soft]
+            first = start
+            last = stop
+            barrier(threads)
