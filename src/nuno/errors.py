@@ -104,6 +104,19 @@ class WalkError(NunoError, RuntimeError):
         super().__init__(message)
 
 
+class ReachError(NunoError, RuntimeError):
+    """A motion that a robot's arms cannot do: out of reach, or something is in the way.
+
+    Args:
+        message: What is in the way.
+        position_errors: By frame [m], how near the search came; empty where that was not what kept it.
+    """
+
+    def __init__(self, message: str, position_errors: dict[str, float] | None = None) -> None:
+        self.position_errors = position_errors or {}
+        super().__init__(message)
+
+
 class NotConnectedError(NunoError, ConnectionError):
     """A connection that cannot be made: nobody listens there, or the port is taken."""
 
