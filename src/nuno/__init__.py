@@ -40,6 +40,7 @@ from nuno.errors import (
     MissingPackageError,
     NotConnectedError,
     NunoError,
+    ReachError,
     RefusedError,
     ResultsInUseError,
     ResultsMismatchError,
@@ -102,6 +103,9 @@ if TYPE_CHECKING:
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
+    from nuno.tasks.carry_mat import carry_mat
+    from nuno.tasks.carry_result import CarryResult, CarryTrial
+    from nuno.tasks.lift import LiftResult, lift_soft_cube
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
 
@@ -113,6 +117,8 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "CarryResult",
+    "CarryTrial",
     "Chequer",
     "Cloth",
     "ClothMesh",
@@ -143,6 +149,7 @@ __all__ = [
     "JointTrajectory",
     "Lamp",
     "Layers",
+    "LiftResult",
     "Links",
     "Material",
     "MaterialFit",
@@ -158,6 +165,7 @@ __all__ = [
     "Picture",
     "Plane",
     "Reach",
+    "ReachError",
     "Readings",
     "Recording",
     "RefusedError",
@@ -203,6 +211,7 @@ __all__ = [
     "World",
     "box",
     "capsule",
+    "carry_mat",
     "cloth_mesh",
     "compound",
     "continue_walk",
@@ -214,6 +223,7 @@ __all__ = [
     "export_body",
     "find_layers",
     "fit_material",
+    "lift_soft_cube",
     "locate_marker",
     "mesh",
     "minimise",
@@ -308,6 +318,11 @@ _LAZY = {
     "Footage": "nuno.estimate.footage",
     "fit_material": "nuno.estimate.fit_material",
     "MaterialFit": "nuno.estimate.fit_material",
+    "carry_mat": "nuno.tasks.carry_mat",
+    "CarryResult": "nuno.tasks.carry_result",
+    "CarryTrial": "nuno.tasks.carry_result",
+    "lift_soft_cube": "nuno.tasks.lift",
+    "LiftResult": "nuno.tasks.lift",
 }
 
 

@@ -1,0 +1,218 @@
+"""What came of carrying a mat in many ways: a table, files, and pictures."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.errors import InvalidInputError
+from nuno.tasks.carry_trials import FRAME_RATE, CarryPlan, carry, make_room
+from nuno.whole_file import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nuno.robot.humanoid import Humanoid
+
+
+@dataclass(frozen=True)
+class CarryTrial:
+    """One way of holding the mat, and what came of it.
+
+    Attributes:
+        arm_distance: Between the hands [m].
+        offset_x: From the mat's centre of gravity to the middle between the hands, ahead [m].
+        offset_y: Likewise to the left [m].
+        value: F [m s], the less the steadier; None where the mat fell.
+        failed_at: When it fell [s], from the start of the walk (negative: before it); None where it did not.
+        reason: How it fell, or the error that ended the trial; "" where it was carried to the end.
+    """
+
+    arm_distance: float
+    offset_x: float
+    offset_y: float
+    value: float | None
+    failed_at: float | None
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class CarryResult:
+    """What came of carrying a mat in many ways.
+
+    Attributes:
+        trials: By arm distance, then offset in x, then in y.
+        plan: What all trials had in common.
+        robot: The robot.
+        walk_of: (trials,) int, the walk that each took, which those of one arm distance share.
+        substeps: Substeps a frame that were asked for, None for the solver's own choice.
+        device: Where they ran.
+        seconds: Wall time by stage [s].
+    """
+
+    trials: tuple[CarryTrial, ...]
+    plan: CarryPlan = field(repr=False)
+    robot: Humanoid = field(repr=False)
+    walk_of: np.ndarray = field(repr=False)
+    substeps: int | None
+    device: str
+    seconds: dict[str, float]
+
+    @property
+    def values(self) -> np.ndarray:
+        """(trials,) float [m s], F of each; NaN where the mat fell."""
+        return np.array([np.nan if trial.value is None else trial.value for trial in self.trials])
+
+    @property
+    def failed(self) -> np.ndarray:
+        """(trials,) bool, where the mat fell."""
+        return np.array([trial.value is None for trial in self.trials])
+
+    @property
+    def best(self) -> int:
+        """The number of the steadiest trial.
+
+        Raises:
+            InvalidInputError: the mat fell in all of them.
+        """
+        if self.failed.all():
+            raise InvalidInputError(f"the mat fell in all {len(self.trials)} trials; none is the best")
+        return int(np.nanargmin(self.values))
+
+    def offsets(self) -> np.ndarray:
+        """Return the offsets of each trial, (trials, 2) [m]."""
+        return np.array([(trial.offset_x, trial.offset_y) for trial in self.trials])
+
+    def table(self) -> str:
+        """Return F [mm s] by arm distance (rows) and offsets (columns) as text; where the mat fell, when [s]."""
+        distances = sorted({trial.arm_distance for trial in self.trials})
+        columns = sorted({(trial.offset_x, trial.offset_y) for trial in self.trials})
+        found = {(t.arm_distance, t.offset_x, t.offset_y): t for t in self.trials}
+        lines = ["arms [m]  " + "".join(f"{1000 * x:+5.0f},{1000 * y:+4.0f}" for x, y in columns)]
+        for distance in distances:
+            cells = []
+            for x, y in columns:
+                trial = found.get((distance, x, y))
+                shown = "" if trial is None else _shown(trial)
+                cells.append(f"{shown:>10}")
+            lines.append(f"{distance:8.3f}  " + "".join(cells))
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything that is written to result.json, as plain data."""
+        best = None if self.failed.all() else self.best
+        return {
+            "format": 1,
+            "robot": self.robot.name,
+            "hold": self.plan.hold,
+            "mat": {"kind": self.plan.mat.kind, "material": _values(self.plan.material)},
+            "arm_friction": self.plan.friction,
+            "settle_s": self.plan.settle,
+            "walk_s": self.plan.seconds,
+            "unit_of_value": "m s",
+            "best": best,
+            "failed": int(self.failed.sum()),
+            "trials": [asdict(trial) for trial in self.trials],
+            "seconds": {name: round(value, 3) for name, value in self.seconds.items()},
+        }
+
+    def replay(self, trial: int, times: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return the mat's vertices at some times of a trial, which is run once more by itself.
+
+        Args:
+            trial: Its number.
+            times: (k,) [s] from the start of the walk, increasing; down to -``settle``.
+
+        Returns:
+            (k, n, 3) float [m].
+        """
+        self._check(trial)
+        frames = [round((time + self.plan.settle) * FRAME_RATE) for time in times]
+        if not frames or min(frames) < 0 or max(frames) > self.plan.frames:
+            raise InvalidInputError(
+                f"times must lie in [{-self.plan.settle:g}, {self.plan.seconds:g}], got {list(times)!r}"
+            )
+        found: dict[int, np.ndarray] = {}
+
+        def watch(mat: Any, time: float) -> None:
+            frame = round(time * FRAME_RATE)
+            if frame in frames:
+                found[frame] = mat.vertices
+
+        chosen = slice(trial, trial + 1)
+        room = make_room(self.plan, self.device, self.substeps).imagine(1)
+        carry(room, self.plan, self.walk_of[chosen], self.offsets()[chosen], watch)
+        return np.array([found[frame] for frame in frames])
+
+    def strip(self, trial: int, count: int = 6) -> Figure:
+        """Return a picture of a trial at ``count`` times, of a failed one around its fall."""
+        from nuno.tasks.carry_figures import carry_strip
+
+        self._check(trial)
+        return carry_strip(self, trial, count)
+
+    def figure(self) -> Figure:
+        """Return F over the three parameters; crosses are trials in which the mat fell."""
+        from nuno.tasks.carry_figures import carry_plot
+
+        return carry_plot(self)
+
+    def save(self, folder: str | os.PathLike[str], *, pictures: bool = True) -> None:
+        """Write the answer into a folder that is made if need be.
+
+        result.json, trials.csv, table.txt; where ``pictures`` is set, plot.png, best.png and failed.png (the first
+        failing trial of the walk, where there is one).
+
+        Args:
+            folder: Where.
+            pictures: Whether to draw pictures, which runs two trials once more.
+        """
+        folder = FilePath(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        with replacing(folder / "result.json") as partial:
+            partial.write_text(text + "\n", encoding="utf-8")
+        with replacing(folder / "trials.csv") as partial, open(partial, "w", newline="", encoding="utf-8") as stream:
+            writer = csv.DictWriter(stream, list(asdict(self.trials[0])))
+            writer.writeheader()
+            writer.writerows(asdict(trial) for trial in self.trials)
+        with replacing(folder / "table.txt") as partial:
+            partial.write_text(self.table() + "\n", encoding="utf-8")
+        if not pictures:
+            return
+        self.figure().savefig(folder / "plot.png", dpi=110)
+        if not self.failed.all():
+            self.strip(self.best).savefig(folder / "best.png", dpi=110)
+        if self.failed.any():
+            self.strip(self.telling_failure).savefig(folder / "failed.png", dpi=110)
+
+    @property
+    def telling_failure(self) -> int:
+        """The number of the trial in which the mat fell last: the one that the walk itself brought down, if any."""
+        times = [-np.inf if trial.failed_at is None else trial.failed_at for trial in self.trials]
+        if not self.failed.any():
+            raise InvalidInputError("the mat fell in no trial")
+        return int(np.argmax(times))
+
+    def _check(self, trial: int) -> None:
+        if isinstance(trial, bool) or not 0 <= trial < len(self.trials):
+            raise InvalidInputError(f"trial must lie in [0, {len(self.trials) - 1}], got {trial!r}")
+
+
+def _shown(trial: CarryTrial) -> str:
+    if trial.value is None and trial.failed_at is None:
+        return "error"
+    if trial.value is None:
+        return f"x {trial.failed_at:.1f} s"
+    return f"{1000.0 * trial.value:.1f}"
+
+
+def _values(material: Any) -> dict[str, Any]:
+    return {name: np.asarray(value).tolist() for name, value in vars(material).items()}
