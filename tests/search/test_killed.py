@@ -21,10 +21,17 @@ PROGRAM = Path(__file__).with_name("sweep_program.py")
 PATIENCE = 60.0  # [s] for a process to start on a busy machine
 
 
+def heed_interrupts():
+    """Undo what a shell does to programs that it runs in the background: they ignore Ctrl-C, and all they start too."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def begin(results, marks, trials, seconds, way):
     """Start the program that sweeps, as the head of a group of processes."""
     command = [sys.executable, str(PROGRAM), str(results), str(marks), str(trials), str(seconds), way]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    return subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts
+    )
 
 
 def wait_for_lines(path, count):

@@ -11,10 +11,17 @@ from nuno.__main__ import main
 from nuno.robot.wire.client import WireRobot
 
 
+def heed_interrupts():
+    """Undo what a shell does to programs that it runs in the background: they ignore Ctrl-C, and all they start too."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_serve(still_g1):
     """It says where it is, a robot is there, and an interrupt ends it."""
     command = [sys.executable, "-m", "nuno", "serve", "g1", "--port", "0", "--stepped", "--device", "cpu"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
+    ) as process:
         try:
             said = process.stdout.readline()
             url = re.search(r"g1 at (ws://127\.0\.0\.1:\d+)", said)

@@ -70,6 +70,7 @@ class WireRobot(RobotInterface):
         self._news = threading.Condition()
         self._count = 0  # of all that came
         self._state: JointState | None = None
+        self._told: dict[str, float] = {}  # by joint, when a state last told of it [s]
         self._latest: dict[str, Any] = {}  # by topic
         self._status: dict[str, bool] = {}  # by controller
         self._sent: dict[str, tuple[Goal, SentGoal]] = {}  # by controller, and "base"
@@ -288,14 +289,17 @@ class WireRobot(RobotInterface):
 
     def _take_state(self, fields: Fields) -> None:
         state = ros.read_joint_state(fields)
+        self._clock.hear(state.time)
         before = self._state
+        self._told.update(dict.fromkeys(state.names, state.time))
         if before is not None and not set(before.names) <= set(state.names):  # several topics' worth in one
             kept = [k for k, name in enumerate(before.names) if name not in state.names]
             joined = [np.append(getattr(state, what), getattr(before, what)[kept])
                       for what in ("positions", "velocities", "efforts")]  # fmt: skip
-            state = JointState(state.time, (*state.names, *(before.names[k] for k in kept)), *joined)
+            names = (*state.names, *(before.names[k] for k in kept))
+            # as old as the oldest joint in it: who waits for a fresh state waits for all topics
+            state = JointState(min(self._told[name] for name in names), names, *joined)
         self._state = state
-        self._clock.hear(state.time)
         self._tell()
 
     def _tell(self) -> None:
