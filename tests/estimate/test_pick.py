@@ -1,13 +1,18 @@
 """Estimating a pick from masks: a cloth picked by the engine itself, on another mesh than the estimator's."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import nuno
 from nuno import ImageError, InvalidInputError
+from nuno.camera import raster
+from nuno.camera.table import Table
+from nuno.estimate.futures import draw_futures, masks_of_turned
 from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.turns import turn
 
 TOP = 0.72  # [m] height of the table top
 REST_HEIGHT = 0.0025  # [m]
@@ -15,6 +20,7 @@ SIZE = np.array((0.5, 0.35))  # [m]
 CENTRE, YAW = np.array((0.05, 0.02, TOP + REST_HEIGHT)), 0.35  # [m], [rad]
 UV = (0.8, 0.2)  # the picked point on the sheet: a grid point of 6 x 6
 HALF = (0.45, 0.6)  # [m] of the table top
+TURN = float(np.radians(20))  # [rad] of the cloth about the hand's vertical, in `turned`
 FINE = Discretisation(15, 12, SPREAD[::2])  # tells neighbouring points of a 6 x 6 grid apart
 QUICK = Discretisation(10, 10, SPREAD[::3])  # and this one does not
 
@@ -29,7 +35,7 @@ def make_camera():
 
 @pytest.fixture(scope="module")
 def seen():
-    """The masks before and after, the hand, and what the label rule says of the picked point."""
+    """The masks before and after, the hand, what the label rule says of the picked point, and the mask after a turn."""
     camera = make_camera()
     world = nuno.World(device="cpu", substeps=18)
     world.add(nuno.box((2 * HALF[0], 2 * HALF[1], 0.04), name="table", position=(0, 0, TOP - 0.02)))
@@ -43,12 +49,15 @@ def seen():
     world.grip(cloth, point, to=nuno.Path([0.0, 1.5], [start, hand], interpolation="minimum_jerk"))
     world.run(3.5)
     after = world.masks(camera, cloth).numpy()
+    cloth.rotate(TURN, "z", wrt="world")
+    cloth.translate(hand - point.positions(cloth.vertices, cloth.faces)[0], wrt="world")
+    turned = world.masks(camera, cloth).numpy()
     # C00 is the corner nearest to pixel (0, 0); the sheet's x is the longer side, so u runs from or to C00
     first = int(np.linalg.norm(camera.project(corners), axis=1).argmin())
     from_end = ((0, 1, 1, 0)[first], (0, 0, 1, 1)[first])
     u, v = (1 - a if end else a for a, end in zip(UV, from_end, strict=True))
     true = (round(u * 5), round(v * 5))
-    return {"before_mask": before, "after_mask": after, "hand": hand}, true, (u, v), corners[first]
+    return {"before_mask": before, "after_mask": after, "hand": hand}, true, (u, v), corners[first], turned
 
 
 def options(seen, **changes):
@@ -109,16 +118,57 @@ def test_adopt_gives_the_best_future(small, seen):
     """The single world becomes what the best future is, and can be run on."""
     result = small
     futures = result.futures.world
-    expected = futures.find("cloth").vertices[result.best_index]
+    future = futures.find("cloth").vertices[result.best_index]
     world = result.adopt()
     cloth = world.find("cloth")
-    np.testing.assert_array_equal(cloth.vertices, expected)
+    # float32 positions of about 1 m, turned and moved: three roundings of 6e-8
+    np.testing.assert_allclose(cloth.vertices, turn(future, result.hand, result.turn), atol=3e-7)
     assert world.world_count == 1 and cloth.is_dynamic and world.time == futures.time
     assert result.best_index % 6 == result.order[0]
     highest = cloth.vertices[:, 2].argmax()
     np.testing.assert_allclose(cloth.vertices[highest], seen[0]["hand"], atol=5e-3)  # it hangs in the hand
     world.run(0.1)
     assert np.isfinite(cloth.vertices).all()
+
+
+def test_a_cloth_that_turned_is_recognised(result, seen):
+    """A cloth that turned by 20 degrees in the hand: the point and the turn are found, and adopted."""
+    given = options(seen, after_mask=seen[4], discretisations=[FINE], rectangle=result.rectangle)
+    found = nuno.estimate_pick(None, None, **given)
+    assert found.best == seen[1] and found.turn == pytest.approx(TURN)
+    assert abs(result.turn) < TURN / 2 + 1e-9  # the one that did not turn is not taken for turned
+    true = found.order[0]
+    still = nuno.estimate_pick(None, None, **given, turns=[0.0])
+    assert still.turn == 0.0 and still.scores[true] < found.scores[true]
+    future = found.futures.world.find("cloth").vertices[found.best_index]
+    cloth = found.adopt().find("cloth")
+    np.testing.assert_allclose(cloth.vertices, turn(future, found.hand, TURN), atol=3e-7)
+    camera = make_camera().scaled(0.5)
+    drawn = found.world.masks(camera, cloth).numpy()
+    assert (drawn != found.masks[true]).mean() < 0.01  # a mask is drawn as thick as the cloth is, a body is not
+
+
+@pytest.mark.parametrize("raised", [0.0, 0.1])
+def test_a_cloth_is_not_turned_into_the_table(raised, small):
+    """Where a turned vertex would be inside the table the future is adopted as it is."""
+    small.futures.world.find("table").translate((0.0, 0.0, raised))
+    future = small.futures.world.find("cloth").vertices[small.best_index]
+    expected = future if raised else turn(future, small.hand, TURN)
+    world = replace(small, turn=TURN).adopt()
+    np.testing.assert_allclose(world.find("cloth").vertices, expected, atol=3e-7)
+
+
+def test_a_turned_future_is_drawn_as_its_turned_mesh(small, seen):
+    """The turned view of a cloth before a table that stays, against turned vertices in the true view."""
+    camera, hand, table = make_camera(), seen[0]["hand"], Table(TOP, HALF, (0.0, 0.0))
+    worlds = np.arange(small.futures.world.world_count)
+    keys, region = draw_futures(small.futures, camera, table, TURN, hand)
+    part = raster.masks_of(keys).numpy()
+    drawn = np.zeros((len(worlds), camera.height, camera.width), dtype=bool)
+    drawn[:, region.y0 : region.y0 + region.height, region.x0 : region.x0 + region.width] = part
+    turned = masks_of_turned(small.futures, worlds, np.full(len(worlds), TURN), camera, table, hand)
+    # vertices are snapped to 1/256 px, a few in a thousand of them to the other side: a pixel may change with one
+    assert np.count_nonzero(drawn != turned) <= len(worlds) and drawn.any(axis=(1, 2)).all()
 
 
 def test_another_grid(seen):
@@ -203,6 +253,7 @@ BAD = {
     "points of three": (dict(candidates=[(0, 0, 0)]), InvalidInputError, "candidates"),
     "an unknown score": (dict(score="best"), InvalidInputError, "chamfer"),
     "no mesh": (dict(discretisations=[]), InvalidInputError, "discretisation"),
+    "no turn of 0": (dict(turns=(0.1,)), InvalidInputError, "turns"),
     "no such device": (dict(device="gpu"), InvalidInputError, "device"),
     "a camera without entries": (dict(camera={}), InvalidInputError, "width"),
     "a table of nan": (dict(table_height=np.nan), InvalidInputError, "table_height"),

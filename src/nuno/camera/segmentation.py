@@ -48,7 +48,7 @@ def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: Arra
 
 def segment_after(
     image: ArrayLike, camera: Camera, table: Table, before_image: ArrayLike, before_mask: ArrayLike,
-    hand_position: ArrayLike, *, hand_radius: float = 0.014,
+    hand_position: ArrayLike, *, hand_radius: float = 0.014, hidden: ArrayLike | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Find the cloth that the hand has lifted, as far as the hand does not occlude it.
 
@@ -65,6 +65,7 @@ def segment_after(
         before_mask: (h, w) bool, the cloth there.
         hand_position: (3,) float, the point of the cloth in the hand [m].
         hand_radius: Radius of the hand around it [m].
+        hidden: (h, w) bool, pixels that show something before the cloth, such as the robot's own arm.
 
     Returns:
         (h, w) bool.
@@ -89,7 +90,11 @@ def segment_after(
     reach = _sphere(camera, hand, _largest_length(mask, camera, table.height), step=4)
     if not reach.any():
         raise ClothNotFoundError(f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image")
-    background = compare(before, rgb, mask, _table_top(camera, table), reach)
+    covered = None if hidden is None else check_mask(hidden, camera, "hidden")
+    top, elsewhere = _table_top(camera, table), reach
+    if covered is not None:
+        top, elsewhere = top & ~covered, reach | covered
+    background = compare(before, rgb, mask, top, elsewhere)
     inside = shrink(mask, 3)
     colours, shares = palette(before[inside if inside.any() else mask].astype(np.float32), 6)
     cloth = sum(
@@ -98,6 +103,8 @@ def segment_after(
     )
     ratio = np.log((cloth + np.float32(0.02 / COLOUR_VOLUME)) / background.density())
     grip = _sphere(camera, hand, hand_radius)
+    if covered is not None:
+        grip |= covered
     ratio = np.clip(ratio, -_CERTAIN, _CERTAIN)
     ratio[grip | ~reach] = -_CERTAIN
     likely, unlikely = (ratio > 2.0) & reach, (ratio < -2.0) & reach

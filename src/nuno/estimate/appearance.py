@@ -220,6 +220,11 @@ def _sum_rows(
     totals_out[world, row] = totals
 
 
+def load(device: str | wp.Device) -> None:
+    """Compile or load the kernel for a device now, as is needed before several threads launch it."""
+    wp.load_module(__name__, device=device)
+
+
 def compare_pattern(
     keys: wp.array, positions: wp.array, faces: wp.array, uv: np.ndarray, pattern: Pattern
 ) -> np.ndarray:

@@ -48,7 +48,8 @@ def contact_sheet(result: PickResult) -> Figure:
     i, j = result.best
     figure.suptitle(
         f"picked at ({i}, {j}), confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
-        f"{result.rectangle.short_m * 100:.1f} cm\nbelow: real outline orange, imagined blue, both pale;  "
+        f"{result.rectangle.short_m * 100:.1f} cm; best future turned by "
+        f"{np.degrees(result.turn):.0f} degrees\nbelow: real outline orange, imagined blue, both pale;  "
         f"rank: (i, j)  {result.score_name} | eq. (1)",
         fontsize=9,
     )

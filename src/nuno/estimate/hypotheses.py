@@ -68,7 +68,7 @@ SPREAD = spread(1000.0, 300.0)
 
 DISCRETISATIONS = (
     Discretisation(20, 14, spread(1000.0, 40.0)),
-    Discretisation(25, 20, spread(3000.0, 1200.0), best=12),
+    Discretisation(25, 20, spread(3000.0, 1200.0), best=8),
 )
 """A coarse cloth that shears easily tells for every candidate, then a finer and stiffer weave for the best of them. How
 a lifted cloth buckles depends on how it shears and on the mesh: two that differ in both had more right answers than

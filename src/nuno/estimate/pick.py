@@ -22,11 +22,13 @@ from nuno.camera.table import Table
 from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, ImageError, InvalidInputError
 from nuno.estimate.appearance import find_pattern
-from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, score_futures
+from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, masks_of_turned, score_futures
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
+from nuno.estimate.kernels import compile_ahead
 from nuno.estimate.pick_result import PickResult
-from nuno.estimate.ranking import RANKINGS, Comparison, rank
+from nuno.estimate.ranking import EVIDENCE, RANKINGS, Comparison, rank
 from nuno.estimate.similarity import Silhouette
+from nuno.estimate.turns import TURNS, checked_turns
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ log = logging.getLogger(__name__)
 
 IMAGE_SCALE = 0.5
 """Silhouettes are compared at half the image's resolution: edges are known to no better than a pixel or two."""
+TURNED_SCALE = 0.25
+"""Turned futures are compared at a quarter: they are right to a few degrees only, and it takes a third of the time."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as cloth nor as background."""
 
@@ -56,9 +60,11 @@ def estimate_pick(
     lift_seconds: float = LIFT_SECONDS,
     before_mask: ArrayLike | None = None,
     after_mask: ArrayLike | None = None,
+    hidden: ArrayLike | None = None,
     hint: ArrayLike | None = None,
     rectangle: ClothRectangle | None = None,
     discretisations: Sequence[Discretisation] = DISCRETISATIONS,
+    turns: Sequence[float] = TURNS,
     score: str = "evidence",
     device: str = "auto",
     progress: bool | None = None,
@@ -68,7 +74,8 @@ def estimate_pick(
     The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
     guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it
     and compared with the real silhouette. Where both images are given, the cloth's pattern is carried along and
-    compared too. What counts is how likely all this is, averaged over all guesses.
+    compared too, each at several turns about the hand's vertical. What counts is how likely all this is, averaged over
+    all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -87,10 +94,14 @@ def estimate_pick(
         lift_seconds: Duration of the hand's straight motion with minimum jerk [s].
         before_mask: (h, w) the cloth before, instead of looking for it.
         after_mask: (h, w) the cloth after, hand left out, instead of looking for it.
+        hidden: (h, w) pixels of the image after that show something before the cloth, such as the robot's own arm; they
+            count neither as cloth nor as background.
         hint: A pixel (u, v) on the cloth before, or a box (u0, v0, u1, v1) around it.
         rectangle: The cloth before, instead of measuring it.
         discretisations: Meshes, steps and guesses at the material, in the order in which they are run; the first
             one must look at all candidates.
+        turns: Angles [rad] about the hand's vertical by which every future is turned to be compared, 0 among them;
+            "chamfer", "iou" and "eq1" look at 0 only.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -120,9 +131,14 @@ def estimate_pick(
         raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
     if not discretisations or discretisations[0].best is not None:
         raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
+    angles = checked_turns(turns)
+    if score not in EVIDENCE:
+        angles = np.zeros(1)
     device = found_device(checked_device(device))
 
+    covered = None if hidden is None else check_mask(hidden, camera, "hidden")
     image_before, image_after = _image(before, camera, "before"), _image(after, camera, "after")
+    wait_for_kernels = compile_ahead(device)
     seconds["read"] = time.perf_counter() - started
     clock = time.perf_counter()
     mask_before = None if before_mask is None else check_mask(before_mask, camera, "before_mask")
@@ -137,21 +153,24 @@ def estimate_pick(
         if image_after is None or image_before is None or mask_before is None:
             raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
         mask_after = segment_after(
-            image_after, camera, table, image_before, mask_before, hand_at, hand_radius=hand_radius
+            image_after, camera, table, image_before, mask_before, hand_at, hand_radius=hand_radius, hidden=covered
         )
     else:
         mask_after = check_mask(after_mask, camera, "after_mask")
-    hidden = _hidden(camera, hand_at, hand_radius)
-    small, real = _silhouette(mask_after, camera, hidden)
+    ignored = _hidden(camera, hand_at, hand_radius)
+    if covered is not None:
+        ignored |= covered
+    small, real = _silhouette(mask_after, camera, ignored, IMAGE_SCALE)
+    coarse = _silhouette(mask_after, camera, ignored, TURNED_SCALE)
     pattern = None
     if score == "evidence" and image_before is not None and image_after is not None:
-        pattern = find_pattern(image_before, image_after, mask_after & ~hidden, rectangle, camera, hand_at)
+        pattern = find_pattern(image_before, image_after, mask_after & ~ignored, rectangle, camera, hand_at)
     seconds["see"] = time.perf_counter() - clock
+    wait_for_kernels()
 
     seconds["imagine"] = seconds["compare"] = 0.0
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
-    masks = np.zeros((len(uv), small.height, small.width), dtype=bool)
     for discretisation in _bar(discretisations, progress):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
@@ -163,45 +182,57 @@ def estimate_pick(
         )  # fmt: skip
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
-        values, drawn = score_futures(futures, small, real, table, pattern=pattern, keep_masks=not comparisons)
-        comparison = Comparison(
-            chosen, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
+        values = score_futures(futures, small, real, table, pattern=pattern, turns=angles, hand=hand_at, coarse=coarse)
+        comparisons.append(Comparison(
+            chosen, angles, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
             None if pattern is None else values["pattern"],
-        )  # fmt: skip
-        if drawn is not None:
-            masks = drawn[comparison.error(score).argmin(axis=0), np.arange(len(uv))]
-        comparisons.append(comparison)
+        ))  # fmt: skip
         batches.append(futures)
         seconds["compare"] += time.perf_counter() - clock
     ranked = rank(comparisons, score, len(uv))
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    best, best_index = _best_world(comparisons, batches, int(ranked.order[0]), score)
+    clock = time.perf_counter()
+    chosen_batch, best_index, best_turn = _most_alike(comparisons, score, int(ranked.order[0]))
+    masks = _masks(comparisons, batches, score, small, table, hand_at)
+    seconds["compare"] += time.perf_counter() - clock
     seconds["total"] = time.perf_counter() - started
     result = PickResult(
         labels=labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name,
-        eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds, futures=best,
-        best_index=best_index, masks=masks, real=real, image_before=image_before, image_after=image_after,
-        mask_before=mask_before, mask_after=mask_after,
+        eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds,
+        futures=batches[chosen_batch], best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
+        real=real, image_before=image_before, image_after=image_after, mask_before=mask_before, mask_after=mask_after,
     )  # fmt: skip
     for warning in result.warnings:
         log.warning("%s", warning)
     return result
 
 
-def _best_world(
-    comparisons: Sequence[Comparison], batches: Sequence[Futures], candidate: int, score: str
-) -> tuple[Futures, int]:
-    """The batch, and the world in it, in which a candidate looks most like the image."""
-    found: list[tuple[float, int, int]] = []
+def _most_alike(comparisons: Sequence[Comparison], score: str, candidate: int) -> tuple[int, int, float]:
+    """The batch, the world in it, and its turn [rad], in which a candidate looks most like the image."""
+    found: list[tuple[float, int, int, float]] = []
     for k, comparison in enumerate(comparisons):
         at = np.nonzero(comparison.candidates == candidate)[0]
         if len(at):
-            error = comparison.error(score)[:, at[0]]
-            guess = int(error.argmin())
-            found.append((float(error[guess]), k, guess * len(comparison.candidates) + int(at[0])))
-    _, k, world = min(found)
-    return batches[k], world
+            error = comparison.error(score)[..., at[0]]
+            turn, guess = np.unravel_index(int(error.argmin()), error.shape)
+            world = int(guess) * len(comparison.candidates) + int(at[0])
+            found.append((float(error[turn, guess]), k, world, float(comparison.turns[turn])))
+    return min(found)[1:]
+
+
+def _masks(
+    comparisons: Sequence[Comparison], batches: Sequence[Futures], score: str, small: Camera, table: Table,
+    hand: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(k, h, w) bool, every candidate's silhouette where it looks most like the image."""
+    count = len(comparisons[0].candidates)
+    batch, world, turn = map(np.array, zip(*(_most_alike(comparisons, score, c) for c in range(count)), strict=True))
+    masks = np.zeros((count, small.height, small.width), dtype=bool)
+    for k in np.unique(batch):
+        of = batch == k
+        masks[of] = masks_of_turned(batches[k], world[of], turn[of], small, table, hand)
+    return masks
 
 
 def _image(image: Any, camera: Camera, name: str) -> np.ndarray | None:
@@ -251,11 +282,11 @@ def _hidden(camera: Camera, hand: np.ndarray, radius: float) -> np.ndarray:
     return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
 
 
-def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray) -> tuple[Camera, Silhouette]:
-    """The real silhouette at the resolution of comparison, without the hand's pixels."""
+def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray, scale: float) -> tuple[Camera, Silhouette]:
+    """The camera and the real silhouette, without the hand's pixels, at a share of the image's resolution."""
     import cv2
 
-    small = camera.scaled(IMAGE_SCALE)
+    small = camera.scaled(scale)
 
     def shrink(image: np.ndarray) -> np.ndarray:
         return cv2.resize(image.astype(np.float32), (small.width, small.height), interpolation=cv2.INTER_AREA)

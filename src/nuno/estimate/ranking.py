@@ -1,9 +1,10 @@
 """From many comparisons of silhouettes to one ranking of the candidates.
 
-A candidate is imagined under several guesses at the material on several meshes. Which of them is right is not known,
-so the default ranking asks for the evidence of a candidate: the likelihood of the images averaged over all guesses,
-with -log likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a constant. The first term is the tail
-of a heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
+A candidate is imagined under several guesses at the material on several meshes, and each future compared at several
+turns about the hand's vertical. Which of them is right is not known, so the default ranking asks for the evidence of a
+candidate: the likelihood of the images averaged over all guesses, and over the turns by their prior, with -log
+likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a constant. The first term is the tail of a
+heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
 independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
 (docs/performance.md).
@@ -16,27 +17,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.estimate.turns import log_prior
+
 RANKINGS = ("evidence", "silhouette", "chamfer", "iou", "eq1")
 CONTOUR_WEIGHT = 5.0
 OVERLAP_WEIGHT = 10.0
 PATTERN_WEIGHT = 25.0
-_EVIDENCE = ("evidence", "silhouette")
+EVIDENCE = ("evidence", "silhouette")
+"""The rankings that average over guesses and turns."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What one mesh's futures look like beside the real silhouette, (guesses, c) each.
+    """What one mesh's futures look like beside the real silhouette, (turns, guesses, c) each.
 
     Attributes:
         candidates: (c,) int, which candidates were looked at.
+        turns: (turns,) float, how far the futures were turned about the hand's vertical [rad]; 0 is among them.
         chamfer: Symmetric mean contour distance [px of the full image].
         iou: Intersection over union.
         eq1: The paper's eq. (1).
-        finite: Whether the future's state is a number.
+        finite: Whether the future's state is a number, (guesses, c).
         pattern: How badly the cloth's pattern fits, see `nuno.estimate.appearance`; None where only masks are known.
     """
 
     candidates: np.ndarray
+    turns: np.ndarray
     chamfer: np.ndarray
     iou: np.ndarray
     eq1: np.ndarray
@@ -44,13 +50,18 @@ class Comparison:
     pattern: np.ndarray | None = None
 
     def error(self, score: str) -> np.ndarray:
-        """(guesses, c) float, lower is better; infinite where the future is not finite."""
-        if score in _EVIDENCE:
+        """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
+
+        Of the evidence it is -log(likelihood x prior of the turn); the other scores know no turns but 0.
+        """
+        if score in EVIDENCE:
             error = CONTOUR_WEIGHT * np.log1p(self.chamfer) + OVERLAP_WEIGHT * (1.0 - self.iou)
             if score == "evidence" and self.pattern is not None:
                 error = error + PATTERN_WEIGHT * self.pattern
+            error = error - log_prior(self.turns)[:, None, None]
         else:
             error = self.chamfer if score == "chamfer" else 1.0 - getattr(self, score)
+            error = np.where(self.turns[:, None, None] == 0.0, error, np.inf)
         return np.where(self.finite, error, np.inf)
 
 
@@ -62,7 +73,7 @@ class Ranked:
         name: What the scores are: "log_evidence" (of silhouettes), "log_evidence_with_pattern", "negative_chamfer_px",
             "iou" or "eq1".
         scores: (k,) float, higher is better; -inf where no future stayed finite.
-        eq1: (k,) float, the paper's similarity: the best guess of each mesh, averaged over meshes.
+        eq1: (k,) float, the paper's similarity, without a turn: the best guess of each mesh, averaged over meshes.
     """
 
     name: str
@@ -91,18 +102,18 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
     total, guesses = np.zeros(count), 0
     errors = np.zeros(count)
     # scaled by the best of all, for exp would underflow far from it
-    kind = score if score in _EVIDENCE else "evidence"
+    kind = score if score in EVIDENCE else "evidence"
     offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(kind) for c in comparisons)), default=0.0)
     offset = offset if np.isfinite(offset) else 0.0
     for comparison in comparisons:
         at = comparison.candidates
         looked[at] += 1
-        similar[at] += np.where(comparison.finite, comparison.eq1, 0.0).max(axis=0)
-        guesses += len(comparison.chamfer)
-        total[at] += np.exp(offset - comparison.error(kind)).sum(axis=0)
-        errors[at] += comparison.error(score).min(axis=0)
+        similar[at] += 1.0 - np.minimum(comparison.error("eq1").min(axis=(0, 1)), 1.0)
+        guesses += len(comparison.finite)
+        total[at] += np.exp(offset - comparison.error(kind)).sum(axis=(0, 1))
+        errors[at] += comparison.error(score).min(axis=(0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        if score in _EVIDENCE:
+        if score in EVIDENCE:
             looks = score == "evidence" and any(c.pattern is not None for c in comparisons)
             name = "log_evidence_with_pattern" if looks else "log_evidence"
             return Ranked(name, np.log(total / guesses) - offset, similar / looked)
