@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     from nuno.robot.walk import Walk
     from nuno.robot.walking import continue_walk, plan_walk, plan_walk_footsteps, plan_walk_velocity, stop_walk
     from nuno.robot.wire.client import WireRobot
+    from nuno.robot.wire.names import Names
     from nuno.robot.wire.server import RobotServer
     from nuno.search.minimise import Minimum, minimise
     from nuno.search.sampler import Uniform
@@ -157,6 +158,7 @@ __all__ = [
     "MessageError",
     "Minimum",
     "MissingPackageError",
+    "Names",
     "NotConnectedError",
     "NunoError",
     "Path",
@@ -323,6 +325,7 @@ _LAZY = {
     "CarryTrial": "nuno.tasks.carry_result",
     "lift_soft_cube": "nuno.tasks.lift",
     "LiftResult": "nuno.tasks.lift",
+    "Names": "nuno.robot.wire.names",
 }
 
 

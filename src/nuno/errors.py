@@ -125,7 +125,7 @@ class ConnectionLostError(NotConnectedError):
     """A connection that was there and has ended."""
 
 
-class RobotTimeoutError(NunoError, TimeoutError):
+class RobotTimeoutError(NunoError, TimeoutError, RuntimeError):
     """A robot that does not answer, or tell what is asked, in time."""
 
 

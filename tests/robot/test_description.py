@@ -70,6 +70,51 @@ def test_a_joint_that_turns_freely_has_no_limits(tmp_path):
     assert robot.joint_limits[1][0] == np.inf
 
 
+@pytest.mark.parametrize(("entry", "told"), [
+    ('frame.hand = { link = "arm" }', "has 'frame'; it may have urdf, srdf, posture, frames, feet, cameras, hands"),
+    ('feet.foot = { link = "base" }', "the foot 'foot' of 'stick' needs the size of its sole"),
+])  # fmt: skip
+def test_slips_in_a_table_are_told(tmp_path, entry, told):
+    """What would be passed over in silence, or be missed much later."""
+    stick(tmp_path)
+    (tmp_path / "mine.toml").write_text(f'[stick]\nurdf = "stick.urdf"\n{entry}\n')
+    with pytest.raises(FileFormatError, match=told):
+        nuno.Humanoid("stick", robots=tmp_path / "mine.toml")
+
+
+def test_a_table_may_say_nothing_of_hands_legs_and_sensors(tmp_path):
+    """A robot with one hand closes "arms"; what the others ask for is refused by name."""
+    stick(tmp_path)
+    (tmp_path / "mine.toml").write_text("""
+        [stick]
+        urdf = "stick.urdf"
+        frames.right_hand = { link = "arm" }
+        hands.right_hand = { low = [-0.1, -0.1, -0.1], high = [0.1, 0.1, 0.1] }
+    """)
+    robot = nuno.SimulatedRobot(nuno.Humanoid("stick", robots=tmp_path / "mine.toml"), nuno.World(device="cpu"))
+    assert robot.start_grasp() == [True] and robot.stop_grasp("rarm") == [True]
+    with pytest.raises(UnknownNameError, match="left_hand"):
+        robot.start_grasp("larm")
+    with pytest.raises(RobotModelError, match="no force sensors in its legs"):
+        robot.zmp_vector()
+    with pytest.raises(RobotModelError, match="no inertial measurement unit"):
+        robot.gyro_vector()
+    with pytest.raises(RobotModelError, match="no legs"):
+        robot.robot.reach({"right_hand": (0.1, 0.0, 0.5)})
+    assert robot.go_pos(0.1) is False
+    assert robot.force_vector() == {}
+
+
+def test_a_robot_without_joints(tmp_path):
+    """Stands there; nothing is asked of it, and nothing fails."""
+    path = tmp_path / "post.urdf"
+    path.write_text("<robot name='post'><link name='post'/></robot>")
+    robot = nuno.SimulatedRobot(nuno.Humanoid(path), nuno.World(device="cpu"))
+    assert robot.angle_vector([], 1.0).shape == (0,)
+    assert robot.wait_interpolation() == []
+    assert robot.angle_vector().shape == (0,)
+
+
 def test_bad_robots_raise_named_errors(tmp_path):
     """What was received and what is valid."""
     with pytest.raises(UnknownNameError, match="no robot named 'hal'; there are: g1, talos"):

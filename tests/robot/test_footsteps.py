@@ -2,11 +2,12 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.footsteps import (
     LEFT,
     RIGHT,
@@ -84,6 +85,14 @@ def test_a_screw_is_a_velocity_that_is_kept():
     np.testing.assert_allclose(screw(np.array([0.5 * np.pi, 0, 0.5 * np.pi])), [1, 1, 0.5 * np.pi], atol=1e-12)
 
 
+def test_feet_that_stand_apart_are_put_side_by_side():
+    """Also where the robot is to stay."""
+    feet = FEET + np.array([[0.1, 0, 0], [0, 0, 0]])
+    *_, last = stances(footsteps_to(middle_of(feet), feet, STRIDE, SIZES), feet)
+    np.testing.assert_allclose(last, FEET + np.array([0.05, 0, 0]), atol=1e-9)
+    assert footsteps_to(middle_of(FEET), FEET, STRIDE, SIZES) == ()
+
+
 def test_steps_of_a_velocity():
     """1 s a step; the way is the velocity times the time."""
     assert steps_of_velocity(np.array([0.1, 0, 0]), 5.0, STRIDE) == 5
@@ -107,3 +116,11 @@ def test_bad_footsteps_are_refused(bad):
     """Named errors: another foot, not finite."""
     with pytest.raises(InvalidInputError):
         Footstep(*bad)
+
+
+def test_a_place_that_is_too_far_is_refused():
+    """At once, and not where another way takes fewer: 12 m aside by turning first."""
+    stride = replace(STRIDE, side_step=0.1)
+    assert len(footsteps_to(np.array([0.0, 12.0, 0.0]), FEET, stride, SIZES)) <= 100
+    with pytest.raises(WalkError, match=r"at most 100 steps, and 1000000\.0 m take more: go there in several walks"):
+        footsteps_to(np.array([1e6, 0, 0]), FEET, STRIDE, SIZES)

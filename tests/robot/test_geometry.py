@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import nuno
 from nuno.mesh.closed import enclosed_volume
+from nuno.robot.description import robot_data
 from nuno.shape import Cylinder, TriangleMesh
 
 
@@ -53,3 +55,29 @@ def test_without_an_srdf_neighbours_may_overlap(g1):
     assert g1.self_collisions() == []
     g1.angle_vector({"left_shoulder_roll_joint": -0.5, "left_elbow_joint": 1.4})
     assert g1.self_collisions()
+
+
+@pytest.mark.parametrize("name", ["talos", "g1"])
+def test_pairs_that_are_checked(name, request):
+    """None of one joint; without an SRDF none of neighbours, and all others: as many as counting them says."""
+    robot = request.getfixturevalue(f"still_{name}")
+    model, _ = robot.geometry._collision_model
+    joints = [part.parentJoint for part in model.geometryObjects]
+    pairs = {frozenset((pair.first, pair.second)) for pair in model.collisionPairs}
+    assert all(joints[a] != joints[b] for a, b in pairs)
+    if name == "g1":
+        near = {frozenset((j, parent)) for j, parent in enumerate(robot.model.parents)}
+        every = [(a, b) for a in range(len(joints)) for b in range(a) if joints[a] != joints[b]]
+        far = {frozenset((a, b)) for a, b in every if frozenset((joints[a], joints[b])) not in near}
+        assert pairs == far  # in its posture nothing overlaps
+
+
+def test_what_overlaps_in_the_posture_is_not_checked():
+    """Romeo's SRDF leaves pairs out that always overlap; else it could never reach anywhere."""
+    romeo = nuno.Humanoid(
+        robot_data() / "romeo_description/urdf/romeo_small.urdf",
+        srdf=robot_data() / "romeo_description/srdf/romeo_small.srdf",
+    )
+    assert romeo.self_collisions() == []
+    romeo.angle_vector({"LShoulderPitch": 1.2, "LShoulderYaw": -0.3, "LElbowRoll": -1.0})
+    assert romeo.self_collisions()

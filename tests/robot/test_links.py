@@ -5,6 +5,8 @@ import pytest
 
 import nuno
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.hands import Hand
+from nuno.robot.sensors import Sensors
 
 
 @pytest.fixture
@@ -153,3 +155,15 @@ def test_bad_entries_raise_and_change_nothing(talos):
     world.remove("talos/head_1_link")
     with pytest.raises(BodyStateError, match="no longer in the world, the first is 'talos/head_1_link'"):
         links.follow(0.1)
+
+
+def test_two_robots_of_one_name(still_talos):
+    """Bodies of the second get numbers; its hands and wrists are its own all the same."""
+    world = nuno.World(device="cpu")
+    first, second = still_talos.copy().enter(world), still_talos.copy().enter(world)
+    assert first.names == second.names
+    index = second.names.index("gripper_left_base_link")
+    assert Hand(second, "left_hand").body is second.bodies[index]
+    sensors = Sensors(second.robot, second)
+    assert sensors._feels == Sensors(first.robot, first)._feels
+    assert sensors._feels["left_wrist"][index]

@@ -170,6 +170,8 @@ def test_bad_input(tmp_path):
             film.save(tmp_path / "film.mp4")
         with pytest.raises(nuno.InvalidInputError, match="rate"):
             viewer.record(rate=0)
+        with pytest.raises(nuno.InvalidInputError, match=r"\.html"):
+            viewer.record(tmp_path / "film.mp4")  # before anything is recorded in vain
     with pytest.raises(nuno.InvalidInputError, match="empty"):
         Film.of(nuno.Recording(world))
     assert list(tmp_path.iterdir()) == []

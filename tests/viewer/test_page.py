@@ -154,6 +154,8 @@ def test_a_film_asks_for_nothing_and_complains_of_nothing(browser, lifted):
     browser.call("Page.navigate", url="about:blank")
     browser.open(lifted[2].as_uri() + "#t=0.7")
     assert browser.evaluate("document.getElementById('clock').textContent") == "t = 0.70 s"
+    browser.evaluate("location.hash = 't=0.3'")  # as when another link into the film is followed
+    browser.wait_for("document.getElementById('clock').textContent == 't = 0.30 s'")
     assert [url for url in browser.requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert browser.complaints == []
 

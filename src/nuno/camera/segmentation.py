@@ -117,7 +117,8 @@ def segment_after(
     if found.sum() < 20:
         raise ClothNotFoundError("no cloth: nothing near the hand has the colours of the cloth before")
     found = fill_doubtful_holes(found, ratio, area=12, doubt=1.0)
-    return sharpen(found, background.view, background.noise) & reach
+    found = sharpen(found, background.view, background.noise) & reach
+    return found if covered is None else found & ~covered
 
 
 def _check_hint(hint: ArrayLike | None, camera: Camera) -> np.ndarray | None:

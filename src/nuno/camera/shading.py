@@ -42,7 +42,6 @@ class Looks:
     color: wp.array[wp.vec3]
     other: wp.array[wp.vec3]  # of a chequered body's other fields
     tile: wp.array[float]  # [m], side of its fields, 0 without
-    sides: wp.array[wp.int32]  # 1 where only the outside is seen
     index: wp.array[wp.int32]  # in world.bodies
 
 

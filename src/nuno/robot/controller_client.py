@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.trajectory import JointTrajectory
+from nuno.validation import number
 
 if TYPE_CHECKING:
     from nuno.robot.joint_interface import JointInterface
@@ -30,8 +31,13 @@ class ControllerClient:
     def send_goal(
         self, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None
     ) -> Goal:
-        """Send a trajectory that starts in ``start_time`` [s], in place of the one under way."""
-        self.goal = self.interface.send_trajectory(self.controller, trajectory, start_time, tolerances)
+        """Send a trajectory that starts in ``start_time`` [s], in place of the one under way.
+
+        Raises:
+            InvalidInputError: a time that is not finite.
+        """
+        start = number("start_time", start_time)
+        self.goal = self.interface.send_trajectory(self.controller, trajectory, start, tolerances)
         return self.goal
 
     def is_interpolating(self) -> bool:

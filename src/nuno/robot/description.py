@@ -19,6 +19,8 @@ from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotMode
 from nuno.validation import count, finite_array, number
 
 KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
+ENTRY = ("urdf", "srdf", "posture", "frames", "feet", "cameras", "hands")
+"""What a table says of a robot; ``robots.toml`` explains it."""
 FileName = str | os.PathLike[str]
 
 
@@ -118,7 +120,10 @@ def find_description(
         RobotModelError: a file that is not there.
         FileFormatError: a table that cannot be read.
         MeshError: the URDF names a mesh that is not there.
+        InvalidInputError: a name that is no text or path, or a number in the table that cannot be used.
     """
+    if not isinstance(name, str | os.PathLike):
+        raise InvalidInputError(f"a robot's name must be a text or a path, got {type(name).__name__}")
     given = tuple(Path(folder) for folder in package_dirs or ())
     if Path(name).suffix.lower() in (".urdf", ".xml"):
         urdf = Path(name).resolve()
@@ -161,6 +166,9 @@ def _in_table(name: str, table: Path, package_dirs: tuple[Path, ...]) -> RobotDe
 
 
 def _description(name: str, entry: dict[str, Any], folder: Path, package_dirs: tuple[Path, ...]) -> RobotDescription:
+    strangers = set(entry) - set(ENTRY)
+    if strangers:
+        raise FileFormatError(f"the entry {name!r} has {min(strangers)!r}; it may have {', '.join(ENTRY)}")
     feet = {role: _frame(role, given) for role, given in entry.get("feet", {}).items()}
     frames = {role: _frame(role, given) for role, given in entry.get("frames", {}).items()}
     cameras = {
@@ -172,6 +180,9 @@ def _description(name: str, entry: dict[str, Any], folder: Path, package_dirs: t
         for role, given in entry.get("cameras", {}).items()
     }  # fmt: skip
     hands = {role: _hand(role, given) for role, given in entry.get("hands", {}).items()}
+    for role in feet:
+        if feet[role].size is None:
+            raise FileFormatError(f"the foot {role!r} of {name!r} needs the size of its sole")
     urdf, srdf = _placed(entry["urdf"], folder), entry.get("srdf")
     return RobotDescription(
         name, urdf, None if srdf is None else _placed(srdf, folder), package_dirs or tuple(urdf.parents[:5]),

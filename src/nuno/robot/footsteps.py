@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.stride import Stride
 from nuno.validation import number
 
@@ -21,6 +21,8 @@ NEAR = 1e-4
 """[m, rad] Feet so near to their places make no step."""
 SOLE_GAP = 0.01
 """[m] Least distance between soles."""
+MOST_STEPS = 100
+"""Of one walk: each takes some 50 ms to plan, and much can happen in the minutes that it takes."""
 SLACK = 1e-9
 """By which rounding may make a step longer than its limit."""
 
@@ -69,6 +71,9 @@ def footsteps_to(
         feet: (2, 3) where the feet stand, left and right.
         stride: How the robot walks.
         soles: Sizes (2,) of left and right [m]; steps are made shorter where soles would come near each other.
+
+    Raises:
+        WalkError: it is too far for one walk.
     """
     x, y, yaw = relative(middle_of(feet), goal)
     yaw = math.remainder(yaw, math.tau)
@@ -81,20 +86,33 @@ def footsteps_to(
         [_turn(heading), np.array([distance, 0.0, 0.0]), _turn(yaw - heading)],
         [_turn(back), np.array([-distance, 0.0, 0.0]), _turn(yaw - back)],
     ]
-    plans: list[list[Footstep]] = []
-    for way in ways:
-        steps: list[Footstep] = []
-        now = feet.copy()
-        for twist in way:
-            if np.abs(twist).max() > NEAR or (not plans and _not_in_stance(now, stride)):
-                # after a leg of the way, the foot that stood longer goes first
-                own = None if not steps else 1 - steps[-1].foot
+    plans = [plan for way in ways if (plan := _steps_of(way, feet, stride, soles)) is not None]
+    if not plans:
+        far = f"{distance:.1f} m take more"
+        raise WalkError(f"a walk has at most {MOST_STEPS} steps, and {far}: go there in several walks")
+    fewest = min(plans, key=lambda plan: len(plan))
+    return tuple(fewest)
+
+
+def _steps_of(
+    way: Sequence[np.ndarray], feet: np.ndarray, stride: Stride, soles: Sequence[np.ndarray] | None
+) -> list[Footstep] | None:
+    """Return the steps of a way of several velocities, one after the other; None where that does not lead there."""
+    steps: list[Footstep] = []
+    now = feet.copy()
+    for twist in way:
+        if np.abs(twist).max() > NEAR or (len(way) == 1 and _not_in_stance(now, stride)):
+            # after a leg of the way, the foot that stood longer goes first
+            own = None if not steps else 1 - steps[-1].foot
+            try:
                 steps += footsteps_along(twist, now, stride, first=own, soles=soles)
-                for step in steps:
-                    now[step.foot] = step.pose
-        plans.append(steps)
-    fewest = min(range(len(plans)), key=lambda k: len(plans[k]))
-    return tuple(plans[fewest])
+            except WalkError:
+                return None
+            for step in steps:
+                now[step.foot] = step.pose
+    if not steps and _not_in_stance(now, stride):
+        return None
+    return steps if len(steps) <= MOST_STEPS else None
 
 
 def footsteps_along(
@@ -110,11 +128,16 @@ def footsteps_along(
         count: At least so many steps, without the last, which closes the stance.
         first: The foot of the first step; None is the one that opens the stance.
         soles: As in ``footsteps_to``.
+
+    Raises:
+        WalkError: more than ``MOST_STEPS`` steps.
     """
     opening = twist[1] / stride.side_step + twist[2] / stride.turn_step
     leading = LEFT if opening >= 0.0 else RIGHT
     first = leading if first is None else first
     count = max(count, _fewest(twist, stride, first == leading))
+    if count > MOST_STEPS:
+        raise WalkError(f"a walk has at most {MOST_STEPS} steps, and that takes more: go there in several walks")
     most = 3 * count + 3  # soles that are near each other from the start do not come apart by shorter steps
     while True:
         steps = _steps(twist, feet, stride, count, first, leading)
@@ -227,7 +250,7 @@ def _leads(count: int, starts: bool) -> int:
 
 def _fewest(twist: np.ndarray, stride: Stride, starts: bool) -> int:
     count = 1 if starts or not np.any(twist[1:]) else 2
-    while _share(twist, stride, count, max(_leads(count, starts), 1)) > 1.0 + SLACK:
+    while count <= MOST_STEPS and _share(twist, stride, count, max(_leads(count, starts), 1)) > 1.0 + SLACK:
         count += 1
     return count
 

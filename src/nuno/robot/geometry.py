@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,8 @@ from nuno.shape import Box, Capsule, Cylinder, Shape, Sphere, TriangleMesh
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +76,23 @@ class Geometry:
         robot = self._robot
         made = self._read(pin.GeometryType.COLLISION)
         made.addAllCollisionPairs()
+        parents = robot.model.parents
         if robot.description.srdf is not None:
             pin.removeCollisionPairs(robot.model, made, str(robot.description.srdf), False)
-            return made, made.createData()
-        parents = robot.model.parents
-        for pair in list(made.collisionPairs):
-            a, b = (made.geometryObjects[k].parentJoint for k in (pair.first, pair.second))
-            if a == b or parents[a] == b or parents[b] == a:
-                made.removeCollisionPair(pair)
+        joint = [part.parentJoint for part in made.geometryObjects]
+        # numbers, as the pairs themselves change when one before them is removed
+        pairs = [(pair.first, pair.second) for pair in made.collisionPairs]
+        kept = [(m, n) for m, n in pairs if joint[m] != joint[n]]
+        if robot.description.srdf is None:
+            kept = [(m, n) for m, n in kept if parents[joint[m]] != joint[n] and parents[joint[n]] != joint[m]]
+        _set_pairs(made, kept)
         data = made.createData()
         pin.computeCollisions(robot.model, self._data, made, data, robot.posture_configuration(), False)
-        for pair, found in zip(list(made.collisionPairs), list(data.collisionResults), strict=True):
-            if found.isCollision():
-                made.removeCollisionPair(pair)
+        overlapping = [found.isCollision() for found in data.collisionResults]
+        if any(overlapping):
+            named = ", ".join(" and ".join(pair) for pair in self._colliding(made, data))
+            logger.info("%s overlap in the posture of %r and are not checked: %s", sum(overlapping), robot.name, named)
+            _set_pairs(made, [pair for pair, over in zip(kept, overlapping, strict=True) if not over])
         return made, made.createData()
 
     def _read(self, kind: Any) -> Any:
@@ -115,6 +123,12 @@ class Geometry:
             self._link_of(part), int(part.parentJoint), shape, position, np.array([w, x, y, z]),
             color,  # type: ignore[arg-type]
         )  # fmt: skip
+
+
+def _set_pairs(model: Any, pairs: Sequence[tuple[int, int]]) -> None:
+    model.removeAllCollisionPairs()
+    for m, n in pairs:
+        model.addCollisionPair(pin.CollisionPair(m, n))
 
 
 def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
+FINGERS = 1
+"""The axis of a hand's frame along which its fingers close."""
 
 
 class Hand:
@@ -90,17 +92,25 @@ class Hand:
             return {}
         return {own.joint: own.closed + (own.open - own.closed) * wanted / own.width}
 
-    def volume(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners (3,) and (3,) [m] of the closing volume, in the frame of the hand."""
-        return self.description.low.copy(), self.description.high.copy()
+    def volume(self, width: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corners (3,) and (3,) [m] of the closing volume, in the frame of the hand.
 
-    def close(self, bodies: Sequence[Body | str] | None = None) -> tuple[Body, ...]:
+        Args:
+            width: How far apart the fingers are [m] when they begin to close; None is as far as they go.
+        """
+        low, high = self.description.low.copy(), self.description.high.copy()
+        if width is not None and self.description.joint is not None:
+            low[FINGERS], high[FINGERS] = max(low[FINGERS], -0.5 * width), min(high[FINGERS], 0.5 * width)
+        return low, high
+
+    def close(self, bodies: Sequence[Body | str] | None = None, *, width: float | None = None) -> tuple[Body, ...]:
         """Grip what is in the closing volume, and return the bodies that are held: none where it is empty.
 
         What the hand held before it lets go first.
 
         Args:
             bodies: Dynamic bodies that it may take; None are all.
+            width: How far apart the fingers are [m] when they begin to close; None is as far as they go.
 
         Raises:
             BodyStateError: a body that is static or in another world, or links that have left theirs.
@@ -111,7 +121,7 @@ class Hand:
             frame = Coordinates(*compose(self.body._pose(), self._offset))  # where the body is, not where it is sent
             chosen = [b for b in world.bodies if b.is_dynamic] if bodies is None else [world._own(b) for b in bodies]
             for body in chosen:
-                where = self._inside(body, frame)
+                where = self._inside(body, frame, width)
                 if where is not False:
                     self._grips.append(world.grip(body, where, to=self.body))
         return self.held
@@ -134,9 +144,9 @@ class Hand:
             self.links.robot.angle_vector(angles)
         return angles
 
-    def _inside(self, body: Body, frame: Coordinates) -> np.ndarray | SurfacePoints | bool | None:
+    def _inside(self, body: Body, frame: Coordinates, width: float | None) -> np.ndarray | SurfacePoints | bool | None:
         """Return the points of a body that are in the closing volume, None for a rigid body in it, else False."""
-        low, high = self.volume()
+        low, high = self.volume(width)
         local = frame.to_local(body.vertices)
         if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
             return False
@@ -173,11 +183,11 @@ def carrier(links: Links, frame: str) -> tuple[Body, Pose]:
     robot = links.robot
     own = robot.model.frames[robot.frame_index(frame)]
     role = robot.description.frames.get(frame)
-    name = f"{robot.name}/{frame if role is None else role.link}"
+    name = frame if role is None else role.link
     fixed = np.flatnonzero(links._joints == own.parentJoint)
     if not len(fixed):
         raise InvalidInputError(f"no link that is fixed to {frame!r} of {robot.name!r} has a shape in the world")
-    k = next((k for k in fixed if links.bodies[k].name == name), fixed[0])
+    k = next((k for k in fixed if links.names[k] == name), fixed[0])
     x, y, z, w = pin.Quaternion(own.placement.rotation).coeffs()
     placed = (np.array(own.placement.translation), quat.unit("quaternion", (w, x, y, z), (4,)))
     return links.bodies[k], compose(invert((links._offsets[k], links._turns[k])), placed)

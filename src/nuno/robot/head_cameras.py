@@ -12,9 +12,10 @@ import numpy as np
 from nuno.body import Body
 from nuno.camera.camera import Camera
 from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
-from nuno.coordinates import compose, invert
+from nuno.coordinates import Coordinates, compose
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.hands import carrier
+from nuno.robot.looks import looks_of
 from nuno.robot.sensor_model import EARLY
 from nuno.validation import number
 
@@ -109,37 +110,33 @@ class HeadCameras:
         assert self._told is not None
         return self._told[1]
 
+    def look_from(self, camera: Camera) -> Picture:
+        """Return a picture from a camera anywhere, with the same light, patterns and looks, taken now."""
+        with self.links.world.lock:
+            return self._picture(camera)
+
     def _take(self) -> dict[str, Picture]:
+        return {name: self._picture(self.camera(name)) for name in self.names}
+
+    def _picture(self, camera: Camera) -> Picture:
         for body, others in self._instead.items():
             for each, offset in others:
                 each._position, each._quaternion = compose(body._pose(), offset)
         instead = {body: [each for each, _ in others] for body, others in self._instead.items()}
-        pictures = {}
-        for name in self.names:
-            self._taken += 1
-            pictures[name] = take_picture(
-                self.links.world, self.camera(name), instead=instead, seed=self._seed * 1_000_003 + self._taken,
-                **self._options,
-            )  # fmt: skip
-        return pictures
+        self._taken += 1
+        seed = self._seed * 1_000_003 + self._taken
+        return take_picture(self.links.world, camera, instead=instead, seed=seed, **self._options)
 
 
 def _visual_bodies(links: Links) -> dict[Body, list[tuple[Body, Any]]]:
     """What the links look like, by the bodies that stand for them in the world, and where in the bodies' frames."""
     drawn: dict[Body, list[tuple[Body, Any]]] = {body: [] for body in links.bodies}
-    prefix = f"{links.robot.name}/"
-    joints = list(links._joints)
-    by_name = {body.name: k for k, body in reversed(list(enumerate(links.bodies)))}
-    for own in links.robot.geometry.shapes("visual"):
-        k = by_name.get(prefix + own.link, joints.index(own.joint) if own.joint in joints else None)
-        if k is None or links._joints[k] != own.joint:
-            continue  # a joint without any collision shape has no body that could carry its looks
-        offset = compose(invert((links._offsets[k], links._turns[k])), (own.position, own.quaternion))
-        drawn[links.bodies[k]].append((Body(own.shape, name=prefix + own.link, color=own.color), offset))
+    for look in looks_of(links):
+        own = look.shape
+        body = Body(own.shape, name=f"{links.robot.name}/{own.link}", color=own.color)
+        drawn[links.bodies[look.body]].append((body, look.pose))
     return drawn
 
 
 def _matrix(turn: np.ndarray) -> np.ndarray:
-    from nuno.coordinates import Coordinates
-
     return Coordinates(quaternion=turn).rotation

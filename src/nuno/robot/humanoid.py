@@ -289,7 +289,7 @@ class Humanoid(Coordinates):
     def self_collisions(self) -> list[tuple[str, str]]:
         """Return the pairs of links that run into each other, of those that the SRDF lets collide.
 
-        Without an SRDF all pairs count but neighbours and those that overlap in the posture.
+        Without an SRDF all pairs count but neighbours; pairs that overlap in the posture never count.
         """
         return self.geometry.collisions(self.configuration())
 

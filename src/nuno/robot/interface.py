@@ -169,7 +169,7 @@ class RobotInterface(JointInterface):
         """Open or close a gripper.
 
         Args:
-            arm: "larm", "rarm" or "arms".
+            arm: "larm", "rarm" or "arms", which is all that the robot has.
             pos: From 0 (closed) to 1 (open).
             effort: At most [N; N m for hinges].
             wait: Return when it is done.
@@ -185,7 +185,10 @@ class RobotInterface(JointInterface):
         force = number("effort", effort, above=0.0)
         if arm not in ARMS:
             raise UnknownNameError("arm", arm, list(ARMS))
-        goals = [self.send_gripper(hand, opening, force) for hand in ARMS[arm]]
+        known = self.robot.description.hands
+        # a robot with one hand has "arms" too; one whose description names none may have them all the same
+        hands = [hand for hand in ARMS[arm] if arm != "arms" or hand in known or not known]
+        goals = [self.send_gripper(hand, opening, force) for hand in hands]
         if not wait:
             return []
         self.wait_until(lambda: all(goal.is_done for goal in goals))
@@ -236,9 +239,12 @@ class RobotInterface(JointInterface):
         """
         if wrt not in ("local", "world"):
             raise InvalidInputError(f"wrt must be 'local' or 'world', got {wrt!r}")
+        ankles = (WRENCHES["lleg"], WRENCHES["rleg"])
+        if not set(ankles) <= set(self.robot.description.frames):
+            raise RobotModelError(f"{self.robot.name!r} has no force sensors in its legs")
         self.update_robot_state()
         force, moment = np.zeros(3), np.zeros(3)  # on all feet, about the world's origin
-        for frame in (WRENCHES["lleg"], WRENCHES["rleg"]):
+        for frame in ankles:
             pose = self.robot.frame_pose(frame)
             own, torque = (pose.rotation @ part for part in self.read_wrench(frame))
             weight, centre = self._beyond(frame)  # which the sensor does not feel, and the ground does

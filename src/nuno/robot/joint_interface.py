@@ -35,6 +35,8 @@ STATE_TIMEOUT = 3.0
 STILL = (np.deg2rad(0.1), 0.01)
 """[rad], [m] Changes of hinges and slides that count as none when the shortest time is worked out."""
 INTERPOLATIONS = ("linear", "minjerk")
+MOST_POINTS = 100_000
+"""That an interpolation makes; a minute at 1 kHz has 60,000."""
 
 
 class JointInterface(ABC):
@@ -394,11 +396,11 @@ class JointInterface(ABC):
         moved = {joint for own in self.controller_param_table[name] for joint in own["joint_names"]}
         change = np.abs(self.sub_angle_vector(end, start))
         still = change < np.where(self.robot.is_slide, STILL[1], STILL[0])
-        counts = np.array([joint in moved for joint in self.robot.joint_names]) & ~still
+        counts = np.array([joint in moved for joint in self.robot.joint_names], dtype=bool) & ~still
         times = np.where(counts, change / self.robot.velocity_limits, 0.0)
         if return_joint_names:
             return list(zip(times.tolist(), self.robot.joint_names, strict=True))
-        return float(times.max())
+        return float(times.max(initial=0.0))
 
     def sub_angle_vector(self, v0: ArrayLike, v1: ArrayLike) -> np.ndarray:
         """Return v0 - v1, (n,); of joints that turn freely the shorter way round."""
@@ -442,7 +444,7 @@ class JointInterface(ABC):
     ) -> float:
         scale = number("time_scale", time_scale, low=1.0)
         needed = self.angle_vector_duration(start, end, controller_type, return_joint_names=True)
-        shortest, slowest = max(needed)
+        shortest, slowest = max(needed, default=(0.0, "no joint"))
         if time is None:
             return scale * shortest
         asked = number("time", time, low=0.0)
@@ -469,7 +471,10 @@ class JointInterface(ABC):
     ) -> Any:  # fmt: skip
         if interpolation not in INTERPOLATIONS:
             raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {interpolation!r}")
-        count = max(1, int(duration / number("interpolation_dt", interpolation_dt, above=0.0) + 1e-9))
+        wanted = duration / number("interpolation_dt", interpolation_dt, above=0.0)
+        if wanted > MOST_POINTS:
+            raise InvalidInputError(f"interpolation_dt makes {wanted:.3g} points, at most {MOST_POINTS} are sent")
+        count = max(1, int(wanted + 1e-9))
         s = np.arange(1, count + 1) / count
         if interpolation == "minjerk":
             s = s**3 * (10.0 + s * (6.0 * s - 15.0))

@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from nuno import quaternion as quat
 from nuno.body import Body
+from nuno.coordinates import Pose
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.motion import Convoy
 from nuno.validation import number
@@ -31,6 +32,10 @@ class Links:
         world: A world that is no batch.
         meshes: "collision" or "visual".
 
+    Attributes:
+        bodies: One for each shape; a name that the world has already gets a number.
+        names: Of the links that those are the shapes of.
+
     Raises:
         InvalidInputError: other meshes, or a batch.
         MeshError: a mesh that cannot be read.
@@ -48,6 +53,7 @@ class Links:
             Body(own.shape, name=f"{robot.name}/{own.link}", color=own.color, **masks)  # type: ignore[arg-type]
             for own in shapes
         )
+        self.names = tuple(own.link for own in shapes)
         self._keys = tuple(body.key for body in self.bodies)
         self._joints = np.array([own.joint for own in shapes], dtype=int)
         self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
@@ -65,6 +71,10 @@ class Links:
     def joint_of(self, k: int) -> int:
         """Return Pinocchio's index of the joint that carries the k-th body."""
         return int(self._joints[k])
+
+    def offset_of(self, k: int) -> Pose:
+        """Return where the k-th body is in the frame of its joint."""
+        return self._offsets[k], self._turns[k]
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno import quaternion as quat
 from nuno.body import Body
+from nuno.coordinates import Pose
 from nuno.dynamics import ParticleDynamics
+from nuno.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
 
 if TYPE_CHECKING:
-    from nuno.grip import Grip
     from nuno.robot.links import Links
 
 NEAR = 4e-3
@@ -48,6 +50,35 @@ class _Motion:
     moment: np.ndarray
 
 
+class _TurnedBox:
+    """A box in a frame, and the one around it along the world's axes.
+
+    Args:
+        pose: Of the frame.
+        middle: (3,) float [m], of the box in the frame.
+        half: (3,) float [m], half its sides.
+    """
+
+    def __init__(self, pose: Pose, middle: np.ndarray, half: np.ndarray) -> None:
+        self.key = _key(pose)
+        self._place, self._matrix, self._middle, self._half = pose[0], quat.to_matrix(pose[1]), middle, half
+        centre, reach = pose[0] + self._matrix @ middle, np.abs(self._matrix) @ half
+        self._low, self._high = centre - reach, centre + reach
+
+    def overlaps(self, low: np.ndarray, high: np.ndarray) -> bool:
+        """Whether it may have points in common with the box between two corners (3,) [m]."""
+        return bool((self._low <= high).all() and (self._high >= low).all())
+
+    def has_any(self, x: np.ndarray, margin: float) -> bool:
+        """Whether any of points (n, 3) [m] is in it or within a margin [m]."""
+        away = np.abs((x - self._place) @ self._matrix - self._middle)
+        return bool((away <= self._half + margin).all(axis=1).any())
+
+
+def _key(pose: Pose) -> tuple[float, ...]:
+    return (*pose[0].tolist(), *pose[1].tolist())
+
+
 class LinkLoads:
     """The loads on a robot's links, read once a frame.
 
@@ -70,6 +101,7 @@ class LinkLoads:
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}
         self._contacts: dict[Body, list[Load]] = {}
+        self._turned: dict[int, _TurnedBox] = {}  # by number among the static bodies
         self._static: tuple[int, list[Body], np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def read(self) -> tuple[Load, ...]:
@@ -88,35 +120,36 @@ class LinkLoads:
 
     def _of(self, body: Body) -> list[Load]:
         dynamics: Any = body._dynamics
-        x = body._vertices()
-        x = x[0] if x.ndim == 3 else x
+        x = _places(body)
         motion = before = None
         if isinstance(dynamics, ParticleDynamics) and not any(grip.is_tie for grip in dynamics.grips):
             before, motion = self._motions.get(body), _motion_of(dynamics, x, self._world.time)
             self._motions[body] = motion
-        near = self._near(body, x)
         held_by = [self._index.get(grip.target) for grip in dynamics.grips if grip.target is not None]
+        step = 0.0 if motion is None or before is None else motion.time - before.time
+        known = 0.0 < step < 1.5 / self._world.frame_rate
+        known = known and not any(body in coupled.bodies for coupled in self._world._stepping.last)
+        holding = {None if k is None else self._groups[k] for k in held_by}
+        all_held = len(held_by) == len(dynamics.grips)
+        near = self._near(body, x, holding.pop() if known and all_held and len(holding) == 1 else None)
         touched = [self._index[other] for other in near if other in self._index]
         bearing = touched + [k for k in held_by if k is not None]
         if not bearing:
             self._contacts.pop(body, None)
             return []
-        step = 0.0 if motion is None or before is None else motion.time - before.time
-        known = 0.0 < step < 1.5 / self._world.frame_rate and len(touched) == len(near)
-        known = known and not any(body in coupled.bodies for coupled in self._world._stepping.last)
+        known = known and len(touched) == len(near)
         if known and motion is not None and before is not None:
             missing = _missing(dynamics, body, x, before, motion, np.array(self._world.gravity))
-            if len({self._groups[k] for k in bearing}) == 1 and len(held_by) == len(dynamics.grips):
-                self._contacts[
-                    body
-                ] = []  # all that bears it is of one group: what it does there is all that is missing
+            if all_held and len({self._groups[k] for k in bearing}) == 1:
+                # all that bears it is of one group: what it does there is all that is missing
+                self._contacts[body] = []
                 return [self._one(bearing, missing)]
         loads, force, torque = [], np.zeros(3), np.zeros(3)
         for grip in dynamics.grips:
             link = None if grip.target is None else self._index.get(grip.target)
             if link is not None or known:
                 own_force, own_torque = grip.wrench
-                point = _held_point(grip, x)
+                point = held_points(grip, 0, x).mean(axis=0)
                 force, torque = force + own_force, torque + own_torque + moment(point, own_force)
                 if link is not None:
                     loads.append(Load(link, point, own_force, own_torque))
@@ -144,25 +177,41 @@ class LinkLoads:
             if name in names
         ]
 
-    def _near(self, body: Body, x: np.ndarray) -> list[Body]:
-        """The static bodies whose boxes have a vertex of the body in them or near, of those that it touches."""
-        bodies, middles, halves, radii = self._boxes()
+    def _near(self, body: Body, x: np.ndarray, holding: Hashable | None) -> list[Body]:
+        """The static bodies whose boxes have a vertex of the body in them or near, of those that it touches.
+
+        Where one group holds the body and no others come into question, those are not looked at closer: what the group
+        bears is told as a whole.
+        """
+        bodies, _, _, radii = self._boxes()
         if not bodies:
             return []
         margin = 0.5 * body.thickness + NEAR
         poses = [(b._position, b._quaternion) if b._parent is None else b._pose() for b in bodies]
         places = np.array([place for place, _ in poses])
-        gap = np.maximum(np.maximum(x.min(axis=0) - places, places - x.max(axis=0)), 0.0)
-        close = np.flatnonzero((gap * gap).sum(axis=1) < (radii + margin) ** 2)
-        close = np.array([k for k in close.tolist() if self._world._rules.touch(body, bodies[k])], dtype=int)
-        if len(close) and not (body._dynamics is not None and body._dynamics.is_rigid):
-            # of a rigid body, a large face may touch where no corner is
-            turns = _matrices(np.array([poses[k][1] for k in close.tolist()]))  # (k, 3, 3)
-            centres = np.einsum("kj,kji->ki", places[close], turns) + middles[close]
-            away = np.abs(x @ turns.transpose(1, 0, 2).reshape(3, -1) - centres.ravel()).reshape(len(x), -1, 3)
-            beyond = away - (halves[close] + margin)
-            close = close[np.maximum(np.maximum(beyond[..., 0], beyond[..., 1]), beyond[..., 2]).min(axis=0) <= 0.0]
-        return [bodies[k] for k in close.tolist()]
+        low, high = x.min(axis=0), x.max(axis=0)
+        gap = np.maximum(np.maximum(low - places, places - high), 0.0)
+        close = np.flatnonzero((gap * gap).sum(axis=1) < (radii + margin) ** 2).tolist()
+        close = [k for k in close if self._world._rules.touch(body, bodies[k])]
+        held = [k for k in close if holding is not None and self._group_of(bodies[k]) == holding]
+        others = [k for k in close if k not in held]
+        if body._dynamics is None or not body._dynamics.is_rigid:  # a large face of those may touch where no corner is
+            low, high = low - margin, high + margin
+            others = [k for k in others if self._box_at(k, poses[k]).overlaps(low, high)]
+            others = [k for k in others if self._turned[k].has_any(x, margin)]
+        return [bodies[k] for k in (*held, *others)]
+
+    def _box_at(self, k: int, pose: Pose) -> _TurnedBox:
+        """Return the box of the k-th static body where that is now; it is kept while the body rests."""
+        kept = self._turned.get(k)
+        if kept is None or kept.key != _key(pose):
+            _, middles, halves, _ = self._boxes()
+            kept = self._turned[k] = _TurnedBox(pose, middles[k], halves[k])
+        return kept
+
+    def _group_of(self, body: Body) -> Hashable | None:
+        k = self._index.get(body)
+        return None if k is None else self._groups[k]
 
     def _boxes(self) -> tuple[list[Body], np.ndarray, np.ndarray, np.ndarray]:
         """All static bodies, middles and half sides (m, 3) of their boxes in their own frames, radii [m]."""
@@ -174,6 +223,7 @@ class LinkLoads:
             middles = corners[:, 0] + halves
             radii = np.linalg.norm(np.abs(middles) + halves, axis=1)
             self._static = (version, bodies, middles, halves, radii)
+            self._turned.clear()
         return self._static[1:]
 
 
@@ -184,40 +234,41 @@ def _box(body: Body) -> tuple[np.ndarray, np.ndarray]:
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def _matrices(q: np.ndarray) -> np.ndarray:
-    """Return rotation matrices (k, 3, 3) of quaternions (k, 4)."""
-    twice = 2.0 * q[:, :, None] * q[:, None]  # of all pairs of (w, x, y, z)
-    made = twice[:, 1:, 1:].copy()
-    made[:, [0, 1, 2], [0, 1, 2]] += twice[:, 0, 0, None] - 1.0
-    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        made[:, a, b] -= twice[:, 0, 1 + c]
-        made[:, b, a] += twice[:, 0, 1 + c]
-    return made
-
-
-def _held_point(grip: Grip, x: np.ndarray) -> np.ndarray:
-    """Return the point (3,) [m] that a grip's torque is about."""
-    spec: Any = grip._spec
-    if hasattr(spec, "quaternions"):  # a rigid body as a whole
-        return np.asarray(grip.body._pose()[0])
-    if getattr(spec, "vertices", None) is not None:
-        held = spec.vertices[0]
-        return x[held[held >= 0]].mean(axis=0)
-    corners, weights = spec.corners[0], spec.barycentric[0] if hasattr(spec, "barycentric") else spec.weights[0]
-    used = corners[:, 0] >= 0
-    return np.einsum("kc,kcx->kx", weights[used], x[np.maximum(corners[used], 0)]).mean(axis=0)
+def _places(body: Body) -> np.ndarray:
+    """Return the vertices (n, 3) [m] of a dynamic body."""
+    dynamics = body._dynamics
+    if not isinstance(dynamics, ParticleDynamics):
+        x = body._vertices()
+        return x[0] if x.ndim == 3 else x
+    arrays = dynamics.solver.arrays
+    rows = np.array(
+        [arrays[axis].numpy() for axis in "xyz"], dtype=float
+    )  # one after the other: quickly made and summed
+    rows += dynamics.solver.origin[0][:, None]
+    return rows.T
 
 
 def _motion_of(dynamics: ParticleDynamics, x: np.ndarray, time: float) -> _Motion:
-    mass = dynamics.solver.mass[0]
-    momentum = mass[:, None] * dynamics.solver.velocities()[0]
-    return _Motion(time, momentum.sum(axis=0), _moments(x, momentum), mass @ x)
+    mass, arrays = dynamics.solver.mass[0], dynamics.solver.arrays
+    # all sums at once: (x, y, z, 1) of each vertex times (momentum, mass)
+    places, masses = np.ones((4, len(x))), np.empty((4, len(x)))
+    places[:3] = x.T
+    for row, name in zip(masses, ("vx", "vy", "vz"), strict=False):
+        np.multiply(arrays[name].numpy(), mass, out=row)
+    masses[3] = mass
+    sums = places @ masses.T
+    return _Motion(time, sums[3, :3], _moment_of(sums), sums[:3, 3])
 
 
 def _moments(x: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Return the sum (3,) of x times forces, (n, 3) each."""
-    c = x.T @ forces
-    return np.array([c[1, 2] - c[2, 1], c[2, 0] - c[0, 2], c[0, 1] - c[1, 0]])
+    return _moment_of(x.T @ forces)
+
+
+def _moment_of(products: np.ndarray) -> np.ndarray:
+    """Return the sum (3,) of x times f, of the sums of their components' products (3, 3) or more."""
+    x, y, z = products.tolist()[:3]
+    return np.array([y[2] - z[1], z[0] - x[2], x[1] - y[0]])
 
 
 def _missing(

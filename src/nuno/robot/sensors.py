@@ -171,7 +171,7 @@ class Sensors:
         beyond = {name: pin.Force.Zero() for name in self._wrenches}
         for load in loads:
             assert self.links is not None
-            joint = int(self.links._joints[load.link])
+            joint = self.links.joint_of(load.link)
             acting = self._in_joint(joint, load.point, load.force, load.torque)
             self._external[joint] += acting
             self._borne.add(joint)
@@ -224,8 +224,7 @@ class Sensors:
         """Which of the bodies in the world are links beyond a sensor, of those that its joint carries."""
         if self.links is None:
             return []
-        prefix = len(self.robot.name) + 1
-        return [sensor.feels(body.name[prefix:]) for body in self.links.bodies]
+        return [sensor.feels(link) for link in self.links.names]
 
     def _groups(self) -> list[str | int]:
         """For each of the bodies in the world, the wrench sensor beyond which its link is, or else its joint."""

@@ -30,7 +30,7 @@ class SimulatedGripper:
         self.hand, self._joints = hand, joints
         self.goal: Goal | None = None
         self._motion: Goal | None = None
-        self._closes = False
+        self._closes, self._width = False, hand.description.width
         joint = hand.description.joint
         self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
@@ -41,6 +41,8 @@ class SimulatedGripper:
         self.goal = Goal(position)
         self.goal.status = GoalStatus.ACTIVE
         width = position * self.hand.description.width
+        if self.hand.width > 0.0:  # one that is closed already closes on what it closed on before
+            self._width = self.hand.width
         self._closes = width < self.hand.width or position == 0.0
         if not self._closes:
             self.hand.open()
@@ -55,18 +57,18 @@ class SimulatedGripper:
         if self._motion is not None and not self._motion.succeeded:
             goal.finish(GoalStatus.ABORTED, text=f"the fingers were stopped: {self._motion.text}")
             return
-        held = self.hand.close() if self._closes else ()
+        held = self.hand.close(width=self._width) if self._closes else ()
         goal.feedback = tuple(body.name for body in held)
         goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        return self.goal, status, self._motion, self._closes, self.hand.grips
+        return self.goal, status, self._motion, self._closes, self._width, self.hand.grips
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was."""
-        self.goal, status, self._motion, self._closes, grips = saved
+        self.goal, status, self._motion, self._closes, self._width, grips = saved
         if self.goal is not None:
             self.goal.status, self.goal.text = status
         self.hand._grips = list(grips)

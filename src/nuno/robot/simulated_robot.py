@@ -23,6 +23,7 @@ from nuno.robot.sensors import Readings, Sensors
 from nuno.robot.servo import Servo, ServoCommand, external_forces
 from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.robot.simulated_joints import SimulatedJoints
+from nuno.robot.stance import Stance
 from nuno.robot.state import RobotState
 from nuno.robot.trajectory import JointTrajectory, Motion
 from nuno.validation import number
@@ -79,7 +80,7 @@ class SimulatedRobot(RobotInterface):
         self.joints = SimulatedJoints(self.actual, groups)
         self.hands = hands_of(self.links)
         self.grippers = {name: SimulatedGripper(hand, self.joints) for name, hand in self.hands.items()}
-        self.gait = Gait(self.actual, self.joints)
+        self.gait, self.stance = Gait(self.actual, self.joints), Stance(self.actual)
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self.loads = LinkLoads(self.links)
@@ -303,6 +304,8 @@ class SimulatedRobot(RobotInterface):
         if positions is robot._angles and base is None:
             self._state = RobotState(end, before.q, before.v, before.a)
             return
+        if base is None and (stood := self.stance.base(robot._angles, (positions, velocities, accelerations))):
+            base, base_motion = stood
         v, a = np.zeros_like(before.v), np.zeros_like(before.a)
         v[6:], a[6:] = velocities, accelerations
         if base is not None and base_motion is not None:

@@ -10,6 +10,9 @@ import numpy as np
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.validation import finite_array
 
+LONGEST = 1e9
+"""[s] That a trajectory may take: the wire has 32 bits for it."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointTrajectory:
@@ -26,7 +29,8 @@ class JointTrajectory:
         accelerations: (k, m) float [rad/s2; m/s2], or None; only with velocities.
 
     Raises:
-        InvalidInputError: no joints or one twice; times that do not increase; not finite; shapes that do not fit.
+        InvalidInputError: no joints or one twice; times that do not increase or are beyond ``LONGEST``; not finite;
+            shapes that do not fit.
     """
 
     names: tuple[str, ...]
@@ -45,6 +49,8 @@ class JointTrajectory:
         times = finite_array("times", self.times, ("k",))
         if times[0] < 0.0 or (np.diff(times) <= 0.0).any():
             raise InvalidInputError(f"times must be at least 0 and increase from point to point, got {times.tolist()}")
+        if times[-1] > LONGEST:
+            raise InvalidInputError(f"a trajectory takes at most {LONGEST:g} s, got {times[-1]:g} s")
         if self.velocities is None and self.accelerations is not None:
             raise InvalidInputError("accelerations need velocities beside them")
         object.__setattr__(self, "names", names)

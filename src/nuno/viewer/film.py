@@ -29,7 +29,7 @@ from nuno.whole_file import replacing
 if TYPE_CHECKING:
     from nuno.recording import Recording
 
-LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 STEPS = 65535  # into which the room that a thing's points ever take is divided, each way
 
@@ -86,9 +86,14 @@ class Film:
         stage: What is drawn; None where the tracks are known.
         rate: Frames per simulated second [1/s].
         path: Where it is saved at the end of a ``with`` block, or None.
+
+    Raises:
+        InvalidInputError: a path that does not end with .html.
     """
 
     def __init__(self, stage: Stage | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
+        if path is not None:
+            check_extension(FilePath(path), ".html")  # now, not when all is done
         self._stage, self._rate, self._path = stage, rate, path
         self._tracks: dict[int, Track] = {}
         self._times: list[float] = []
@@ -207,7 +212,7 @@ class Film:
             if now >= self._times[-1] + (1.0 - 1e-3) / self._rate:  # where time was set back, later than ever before
                 self._take()
         except Exception as error:  # the world must go on; ``stop`` tells
-            LOG.exception("the recording ended at t = %.3f s", now)
+            logger.exception("the recording ended at t = %.3f s", now)
             self._failed = error
 
     def save(self, path: str | os.PathLike[str], title: str = "Nuno") -> None:

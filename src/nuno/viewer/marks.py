@@ -2,49 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.coordinates import Pose
-from nuno.grip import GripSpec
-from nuno.tie import HoldSpec
+from nuno.held_points import held_points
 
 if TYPE_CHECKING:
-    from nuno.grip import Grip
     from nuno.simulation import Simulation
 
 FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6], dtype=np.uint32)
 """Edges of ``frustum``: from the pinhole to the corners, round the image, and a stroke where up is."""
 
 
-def held_points(world: Simulation, index: int) -> np.ndarray:
-    """Return where the grips of one world hold, (k, 3) float [m]; of a rigid body, the origin of its frame."""
-    found = [np.empty((0, 3))]
-    for dynamics in world._attached():
-        for grip in dynamics.grips:
-            found.append(_points_of(grip, index))
-    return np.concatenate(found)
-
-
-def _points_of(grip: Grip, index: int) -> np.ndarray:
-    spec: Any = grip._spec
-    if isinstance(spec, HoldSpec):
-        place = grip.body._pose()[0]
-        return np.atleast_2d(place[index] if place.ndim == 2 else place)
-    vertices = grip.body._vertices()
-    vertices = vertices[index if len(vertices) > 1 else 0] if vertices.ndim == 3 else vertices
-    if isinstance(spec, GripSpec):
-        if spec.vertices is not None:
-            chosen = spec.vertices[index]
-            return vertices[chosen[chosen >= 0]]
-        corners, weights = spec.corners, spec.barycentric
-    else:
-        corners, weights = spec.corners, spec.weights
-    assert corners is not None and weights is not None
-    valid = corners[index][:, 0] >= 0
-    return np.einsum("kc,kcx->kx", weights[index][valid], vertices[corners[index][valid]])
+def all_held_points(world: Simulation, index: int) -> np.ndarray:
+    """Return where the grips of one world hold, (k, 3) float [m]."""
+    found = [held_points(grip, index) for dynamics in world._attached() for grip in dynamics.grips]
+    return np.concatenate([np.empty((0, 3)), *found])
 
 
 def contact_arrows(world: Simulation, scale: float, indices: list[int]) -> list[np.ndarray]:

@@ -402,8 +402,12 @@
     const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     obey(await new Response(stream).arrayBuffer());
-    const wanted = /[#&]t=([0-9.]+)/.exec(location.hash);
-    if (wanted) film.seek(Number(wanted[1]) - film.start);
+    const follow = () => {
+      const wanted = /[#&]t=([0-9.]+)/.exec(location.hash);
+      if (wanted) film.seek(Number(wanted[1]) - film.start);
+    };
+    follow();
+    addEventListener("hashchange", follow);
     window.nuno.messages += 1;
   }
 

@@ -9,8 +9,6 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path as FilePath
 
-from nuno.errors import MissingPackageError
-
 HERE = FilePath(__file__).parent
 
 
@@ -50,6 +48,5 @@ def _page(title: str, library: str, data: str) -> str:
 def _meshcat() -> FilePath:
     # its Python part, which would be loaded with it, brings IPython and a server for all the network
     found = find_spec("meshcat")
-    if found is None or found.origin is None:
-        raise MissingPackageError("meshcat", "viewer", "the viewer")
+    assert found is not None and found.origin is not None, "meshcat comes with Nuno"
     return FilePath(found.origin).parent / "viewer"

@@ -19,7 +19,7 @@ import tornado.websocket
 from nuno.errors import ViewerError
 from nuno.viewer.page import live_page, mesh_viewer
 
-LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 FIRST_PORT, PORTS = 7000, 100  # where a free port is looked for
 BEHIND = 1 << 24  # [bytes] that may wait for a page before it is sent everything anew
@@ -195,4 +195,4 @@ def _bound(host: str, port: int | None) -> tuple[list[Any], int]:
 
 
 def _log(handler: Any) -> None:
-    LOG.debug("%d %s", handler.get_status(), handler.request.uri)
+    logger.debug("%d %s", handler.get_status(), handler.request.uri)

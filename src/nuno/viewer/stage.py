@@ -14,7 +14,7 @@ from nuno.shape import Plane
 from nuno.validation import count, number
 from nuno.viewer.actor import Actor, light_of
 from nuno.viewer.cast import Cast, Place
-from nuno.viewer.marks import FRUSTUM, camera_pose, contact_arrows, frustum, held_points
+from nuno.viewer.marks import FRUSTUM, all_held_points, camera_pose, contact_arrows, frustum
 from nuno.viewer.style import Styles
 from nuno.viewer.wardrobe import Wardrobe
 
@@ -145,7 +145,7 @@ class Stage:
                 self._leave([key for key in self._marks if key[0] == what], self._marks)
         if self.styles.grips:
             for place in self.places:
-                self._seen_marks["grips", place.index] = held_points(self.world, place.index) + place.offset
+                self._seen_marks["grips", place.index] = all_held_points(self.world, place.index) + place.offset
         start = time.perf_counter()
         if self.styles.contacts and (start >= self._contacts_due or not sparing):
             scale = self.styles.force_scale

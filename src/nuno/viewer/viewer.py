@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from nuno.robot.links import Links
     from nuno.world import World
 
-LOG = logging.getLogger(__name__)
+logger = logging.getLogger(__name__)
 
 
 class Viewer:
@@ -101,7 +101,7 @@ class Viewer:
             target=_follow, args=(weakref.ref(self), self._stop, self._interval), name="nuno-viewer", daemon=True
         )
         self._thread.start()
-        LOG.info("the viewer of %r is at %s", world, self.url)
+        logger.info("the viewer of %r is at %s", world, self.url)
 
     def __enter__(self) -> Viewer:
         return self
@@ -147,7 +147,7 @@ class Viewer:
             ViewerError: the viewer is closed.
         """
         self._check_open()
-        LOG.info("the viewer of %r is at %s", self.world, self.url)
+        logger.info("the viewer of %r is at %s", self.world, self.url)
         if open and _has_screen() and not _in_notebook():
             webbrowser.open(self.url, new=2)
         return self
@@ -270,6 +270,9 @@ class Viewer:
 
         Returns:
             The film, which goes on until its ``stop``, or the end of its ``with`` block.
+
+        Raises:
+            InvalidInputError: a rate that is not positive, or a path that does not end with .html.
         """
         wanted = number("rate", rate, above=0.0)
         styles = replace(self._styles, own=dict(self._styles.own), cameras=dict(self._styles.cameras))
@@ -335,7 +338,7 @@ class Viewer:
             try:
                 self._stage.look(sparing=True)
             except Exception:  # the world must go on
-                LOG.exception("the viewer could not look at the world")
+                logger.exception("the viewer could not look at the world")
             self._looked.set()
 
     # Within
@@ -397,7 +400,7 @@ def _follow(reference: weakref.ref[Viewer], stop: threading.Event, interval: flo
         except ViewerError:
             return
         except Exception:  # one body that cannot be drawn must not end the viewer
-            LOG.exception("the viewer could not draw the world")
+            logger.exception("the viewer could not draw the world")
         viewer = None
 
 

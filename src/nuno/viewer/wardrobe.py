@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from nuno.coordinates import Pose, compose, invert
 from nuno.viewer.cast import Garment
 
 if TYPE_CHECKING:
     from nuno.body import Body
-    from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
-
-LOG = logging.getLogger(__name__)
 
 
 class Wardrobe:
     """What bodies are drawn as, by body key; nothing of links that are visual meshes already.
 
-    A visual mesh goes along with the first body of its joint, in place of all bodies of that joint. Where there is
-    none, as at two joints in G1's waist, it goes along with the joint before, turned as the joint was at first.
+    Visual meshes (``nuno.robot.looks``) are drawn in place of all bodies of a robot.
 
     Args:
         robots: Links whose bodies are in the world as copies; of the others, their bodies tell.
@@ -51,34 +43,14 @@ class Wardrobe:
         self._known.append(links)
         if any(body.group == 0 for body in links.bodies):
             return
-        hulls = links.robot.geometry.shapes("collision")
-        carriers: dict[int, int] = {}
-        for k, hull in enumerate(hulls):
-            carriers.setdefault(hull.joint, k)
+        from nuno.robot.looks import looks_of  # which loads Pinocchio
+
         worn: dict[str, list[Garment]] = {body.key: [] for body in links.bodies}
-        frames = _joint_frames(links.robot)
         names: Counter[str] = Counter()
-        for shape in links.robot.geometry.shapes("visual"):
-            joint, own = shape.joint, (shape.position, shape.quaternion)
-            while joint not in carriers and joint > 0:
-                own, joint = compose(frames[joint], own), int(links.robot.model.parents[joint])
-            if joint not in carriers:
-                LOG.warning("the visual mesh of %r has no body to go along with and is not drawn", shape.link)
-                continue
-            k = carriers[joint]
-            place, turn = compose(invert((hulls[k].position, hulls[k].quaternion)), own)
+        for look in looks_of(links):
+            shape = look.shape
             names[shape.link] += 1
             name = shape.link if names[shape.link] == 1 else f"{shape.link}_{names[shape.link]}"
-            pose = (place, turn / np.linalg.norm(turn))
-            worn[links.bodies[k].key].append(Garment((links.robot.name, name), shape.shape, pose, shape.color))
+            garment = Garment((links.robot.name, name), shape.shape, look.pose, shape.color)
+            worn[links.bodies[look.body].key].append(garment)
         self._garments |= worn
-
-
-def _joint_frames(robot: Humanoid) -> list[Pose]:
-    """Return where each joint is in the frame of the joint before it, as the robot stands now."""
-    import pinocchio as pin
-
-    data = robot.model.createData()  # not the robot's own, which its program may be using
-    pin.forwardKinematics(robot.model, data, robot.configuration())
-    placed = np.array([pin.SE3ToXYZQUAT(placement) for placement in data.liMi])
-    return [(row[:3], row[[6, 3, 4, 5]]) for row in placed]
