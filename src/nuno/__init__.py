@@ -106,7 +106,11 @@ if TYPE_CHECKING:
     from nuno.search.trial import Trial, each
     from nuno.tasks.carry_mat import carry_mat
     from nuno.tasks.carry_result import CarryResult, CarryTrial
+    from nuno.tasks.improve_fold import ImprovedFold, improve_fold
     from nuno.tasks.lift import LiftResult, lift_soft_cube
+    from nuno.tasks.pick_towel import TowelPicker
+    from nuno.tasks.play_fold import PlayedFold, play_fold
+    from nuno.tasks.taught_fold import TaughtFold
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
 
@@ -146,6 +150,7 @@ __all__ = [
     "HeadCameras",
     "Humanoid",
     "ImageError",
+    "ImprovedFold",
     "InvalidInputError",
     "JointTrajectory",
     "Lamp",
@@ -166,6 +171,7 @@ __all__ = [
     "PickResult",
     "Picture",
     "Plane",
+    "PlayedFold",
     "Reach",
     "ReachError",
     "Readings",
@@ -199,7 +205,9 @@ __all__ = [
     "SurfacePoints",
     "SweepResult",
     "Table",
+    "TaughtFold",
     "Tolerances",
+    "TowelPicker",
     "Trial",
     "TriangleMesh",
     "Uniform",
@@ -225,6 +233,7 @@ __all__ = [
     "export_body",
     "find_layers",
     "fit_material",
+    "improve_fold",
     "lift_soft_cube",
     "locate_marker",
     "mesh",
@@ -233,6 +242,7 @@ __all__ = [
     "plan_walk_footsteps",
     "plan_walk_velocity",
     "plane",
+    "play_fold",
     "read_case",
     "read_fold_case",
     "read_sweep",
@@ -326,6 +336,12 @@ _LAZY = {
     "lift_soft_cube": "nuno.tasks.lift",
     "LiftResult": "nuno.tasks.lift",
     "Names": "nuno.robot.wire.names",
+    "TaughtFold": "nuno.tasks.taught_fold",
+    "improve_fold": "nuno.tasks.improve_fold",
+    "play_fold": "nuno.tasks.play_fold",
+    "ImprovedFold": "nuno.tasks.improve_fold",
+    "PlayedFold": "nuno.tasks.play_fold",
+    "TowelPicker": "nuno.tasks.pick_towel",
 }
 
 

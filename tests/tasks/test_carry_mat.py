@@ -11,7 +11,7 @@ from nuno.robot.humanoid import Humanoid
 from nuno.tasks import carry_mat as module
 from nuno.tasks.carry_mat import carry_mat
 
-DISTANCES = (0.3, 0.5)
+DISTANCES = (0.3, 0.36)
 FEW = dict(offsets_x=(0.1,), offsets_y=(0.0, 0.24), settle=1.0, seconds=1.0, device="cpu")
 
 
@@ -43,8 +43,8 @@ def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
     for mu in (0.0, 0.8):
         material = nuno.Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=mu, air_drag=1.0)
         found = carry_mat(
-            talos, mat, material, arm_distances=[0.4], offsets_x=[0.12], offsets_y=[0.0], settle=1.0, seconds=2.0,
-            walks=glides([0.4], 1.5, (-0.5, 0.0, 0.0)), arm_friction=mu, device="cpu",
+            talos, mat, material, arm_distances=[0.34], offsets_x=[0.12], offsets_y=[0.0], settle=1.0, seconds=2.0,
+            walks=glides([0.34], 1.5, (-0.5, 0.0, 0.0)), arm_friction=mu, device="cpu",
         )  # fmt: skip
         trials[mu] = found.trials[0]
     assert trials[0.0].value is None and trials[0.0].failed_at > 0.0
@@ -55,8 +55,8 @@ def test_hands_that_grip_need_no_friction(talos, glides, mat):
     """Gripped edges carry a mat that would slide off: the comparison that hold="grip" is for."""
     material = nuno.Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=0.0, air_drag=1.0)
     found = carry_mat(
-        talos, mat, material, hold="grip", arm_distances=[0.4], offsets_x=[0.12], offsets_y=[0.0], settle=1.0,
-        seconds=2.0, walks=glides([0.4], 1.5, (-0.5, 0.0, 0.0)), arm_friction=0.0, device="cpu",
+        talos, mat, material, hold="grip", arm_distances=[0.34], offsets_x=[0.12], offsets_y=[0.0], settle=1.0,
+        seconds=2.0, walks=glides([0.34], 1.5, (-0.5, 0.0, 0.0)), arm_friction=0.0, device="cpu",
     )  # fmt: skip
     assert found.trials[0].reason == ""
 
@@ -65,8 +65,8 @@ def test_a_cloth_is_carried_too(talos, glides):
     """A cloth mat lies on the arms by friction alone."""
     cloth = nuno.sheet((0.6, 0.4), cells=(18, 12))
     found = carry_mat(
-        talos, cloth, arm_distances=[0.4], offsets_x=[0.12], offsets_y=[0.0], settle=1.0, seconds=1.0,
-        walks=glides([0.4], 1.0, (0.1, 0.0, 0.0)), device="cpu",
+        talos, cloth, arm_distances=[0.34], offsets_x=[0.12], offsets_y=[0.0], settle=1.0, seconds=1.0,
+        walks=glides([0.34], 1.0, (0.1, 0.0, 0.0)), device="cpu",
     )  # fmt: skip
     assert found.trials[0].reason == ""
 
@@ -125,7 +125,7 @@ def test_a_trial_that_diverges_has_failed(talos, glides, mat, monkeypatch):
 
     monkeypatch.setattr(carry_trials, "carry", carry)
     given = FEW | {"seconds": 0.2}
-    found = carry_mat(talos, mat, arm_distances=[0.4], walks=glides([0.4]), **given)
+    found = carry_mat(talos, mat, arm_distances=[0.34], walks=glides([0.34]), **given)
     assert found.failed.tolist() == [False, True]
     assert found.trials[1].reason.startswith("SimulationDiverged") and found.trials[1].failed_at is None
     assert "error" in found.table()
@@ -153,7 +153,7 @@ def test_what_cannot_be_carried_is_refused(talos, tmp_path):
 def test_a_mat_in_the_trunk_is_refused(talos, glides):
     """Hands far ahead of its centre leave the mat no place before the chest."""
     with pytest.raises(nuno.InvalidInputError, match="reaches into the trunk"):
-        carry_mat(talos, arm_distances=[0.4], offsets_x=[0.4], offsets_y=[0.0], walks=glides([0.4]), device="cpu")
+        carry_mat(talos, arm_distances=[0.34], offsets_x=[0.4], offsets_y=[0.0], walks=glides([0.34]), device="cpu")
 
 
 def test_arms_that_do_not_reach_are_refused(talos):

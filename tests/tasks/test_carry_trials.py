@@ -7,7 +7,7 @@ import pytest
 
 import nuno
 from nuno.tasks.carry_mat import FOAM
-from nuno.tasks.carry_plan import key_times, make_plan, motion_along
+from nuno.tasks.carry_plan import key_times, make_plan, motion_along, track_arms
 from nuno.tasks.carry_trials import EVERY, FALLEN, FRAME_RATE, carry, judge, make_room
 
 SETTLE, SECONDS = 0.5, 2.0
@@ -20,10 +20,8 @@ def plan(talos, glides):
     times = key_times(SETTLE, SECONDS)
     motions = [motion_along(walk, times) for walk in glides(DISTANCES, 1.0, (0.1, 0.0, 0.0))]
     mat = nuno.soft_box((0.6, 0.4, 0.02), cells=(9, 6, 3))
-    return make_plan(
-        talos, mat, FOAM, motions, DISTANCES, hold="support", arms="boxes", arm_friction=0.5, settle=SETTLE,
-        seconds=SECONDS,
-    )  # fmt: skip
+    tracks = track_arms(talos, motions, DISTANCES, arms="hulls", settle=SETTLE, seconds=SECONDS)
+    return make_plan(tracks, mat, FOAM, hold="support", arm_friction=0.5)
 
 
 def seen(plan, offset):
@@ -96,7 +94,7 @@ def test_the_arms_bear_the_weight(plan):
 def test_boxes_contain_the_links(talos):
     """A link's box is around its hull, and a hand is one shape."""
     from nuno import quaternion as quat
-    from nuno.tasks.arms import arm_shapes
+    from nuno.tasks.arms import ERROR, arm_shapes
 
     boxes, hulls = arm_shapes(talos, "boxes"), arm_shapes(talos, "hulls")
     assert [shape.part.link for shape in boxes] == [shape.part.link for shape in hulls]
@@ -104,4 +102,5 @@ def test_boxes_contain_the_links(talos):
     for box, hull in zip(boxes, hulls, strict=True):
         vertices = hull.part.position + quat.rotate(hull.part.quaternion, hull.part.shape.mesh()[0])
         inside = quat.rotate(box.part.quaternion * [1, -1, -1, -1], vertices - box.part.position)
-        assert (np.abs(inside) <= 0.5 * np.array(box.part.shape.size) + 1e-6).all()
+        # hulls are simpler than the links' own, and up to ERROR from them
+        assert (np.abs(inside) <= 0.5 * np.array(box.part.shape.size) + ERROR).all()

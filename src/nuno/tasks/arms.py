@@ -13,14 +13,17 @@ import pinocchio as pin
 from nuno import quaternion as quat
 from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, RobotModelError
-from nuno.robot.geometry import LinkShape, convex_hull
-from nuno.shape import Box, TriangleMesh
+from nuno.robot.geometry import LinkShape
+from nuno.shape import Box, Hull, TriangleMesh
+from nuno.tasks.simple_hull import simple_hull
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
 HANDS = ("left_hand", "right_hand")
-SHAPES = ("boxes", "hulls")
+SHAPES = ("hulls", "boxes")
+ERROR = 1e-3
+"""[m] How far the hulls that are touched may be from those of the links: a twentieth of what the mat is thick."""
 SMALLEST = 1e-4
 """[m3] Links in smaller boxes (sensors between two links) add nothing that their neighbours lack."""
 LEVEL = np.array([0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5)])
@@ -40,7 +43,7 @@ class ArmShape:
     side: int
 
 
-def arm_shapes(robot: Humanoid, kind: str = "boxes") -> tuple[ArmShape, ...]:
+def arm_shapes(robot: Humanoid, kind: str = "hulls") -> tuple[ArmShape, ...]:
     """Return the shapes of both arms and of the link that carries them.
 
     A hand with all that is on it is one convex shape: a mat lies on a gripper and does not go into it, where its
@@ -48,7 +51,8 @@ def arm_shapes(robot: Humanoid, kind: str = "boxes") -> tuple[ArmShape, ...]:
 
     Args:
         robot: A robot with the frames "left_hand" and "right_hand".
-        kind: "boxes", the smallest box around each link's collision shape; or "hulls", the collision shapes themselves.
+        kind: "hulls", the convex hulls of the links' collision shapes, with fewer faces and no farther from them than
+            ``ERROR``; or "boxes", the smallest box around each.
 
     Raises:
         InvalidInputError: another kind.
@@ -77,9 +81,8 @@ def arm_shapes(robot: Humanoid, kind: str = "boxes") -> tuple[ArmShape, ...]:
     found = []
     for (side, name), group in parts.items():
         whole = group[0] if len(group) == 1 else _joined(name, group, placed)
-        boxed = _boxed(whole)
-        if np.prod(boxed.shape.size) >= SMALLEST:  # type: ignore[attr-defined]
-            found.append(ArmShape(boxed if kind == "boxes" else whole, side))
+        if np.prod(np.ptp(whole.shape.mesh()[0], axis=0)) >= SMALLEST:
+            found.append(ArmShape(_boxed(whole) if kind == "boxes" else _simple(whole), side))
     return tuple(found)
 
 
@@ -155,17 +158,6 @@ class ArmMotion:
         return positions, quat.multiply(turns, np.broadcast_to(own, turns.shape))
 
 
-def half_sides(shapes: Iterable[ArmShape]) -> np.ndarray:
-    """Return half the sides (n, 3) [m] of each shape's box, along its own axes."""
-    return np.array([_half(shape.part) for shape in shapes])
-
-
-def _half(part: LinkShape) -> np.ndarray:
-    if isinstance(part.shape, Box):
-        return 0.5 * np.array(part.shape.size)
-    return np.abs(part.shape.mesh()[0]).max(axis=0)
-
-
 def _chain(robot: Humanoid, hand: str) -> list[int]:
     """Return the joints from the base to a hand."""
     if hand not in robot.description.frames:
@@ -182,8 +174,16 @@ def _joined(name: str, group: list[LinkShape], placed: Any) -> LinkShape:
         vertices = part.position + quat.rotate(part.quaternion, part.shape.mesh()[0])
         to_first = back * placed[part.joint]
         points.append(vertices @ to_first.rotation.T + to_first.translation)
-    shape = TriangleMesh(*convex_hull(np.concatenate(points)))
+    shape = Hull.of(np.concatenate(points))
     return LinkShape(name, first.joint, shape, shape.centre, quat.IDENTITY, first.color)
+
+
+def _simple(part: LinkShape) -> LinkShape:
+    """Return a shape of triangles as a hull of fewer faces, in its place."""
+    if not isinstance(part.shape, TriangleMesh):
+        return part
+    shape, _ = simple_hull(part.shape.mesh()[0], ERROR)
+    return replace(part, shape=shape, position=part.position + quat.rotate(part.quaternion, shape.centre))
 
 
 def _boxed(part: LinkShape) -> LinkShape:

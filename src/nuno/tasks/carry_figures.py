@@ -32,7 +32,8 @@ def carry_strip(result: CarryResult, trial: int, count: int) -> Figure:
     """Draw a trial at ``count`` times, with Matplotlib and without pyplot."""
     from matplotlib.figure import Figure
 
-    plan, chosen = result.plan, result.trials[trial]
+    plan, chosen, robot = result.plan, result.trials[trial], result.robot
+    assert robot is not None  # strip() asks
     times = np.linspace(0.0, plan.seconds, count)
     if chosen.failed_at is not None:
         fall = chosen.failed_at
@@ -42,7 +43,7 @@ def carry_strip(result: CarryResult, trial: int, count: int) -> Figure:
     figure = Figure(figsize=(2.2 * count, 3.1), layout="constrained", facecolor="white")
     for column, axes in enumerate(figure.subplots(1, count, squeeze=False)[0]):
         q = plan.configuration(int(result.walk_of[trial]), float(times[column]))
-        axes.imshow(picture(result.robot, q, vertices[column], faces))
+        axes.imshow(picture(robot, q, vertices[column], faces))
         axes.set(xticks=[], yticks=[])
         axes.set_title(f"{times[column]:.1f} s", fontsize=9)
     ended = f"F = {1000 * chosen.value:.1f} mm s" if chosen.value is not None else chosen.reason

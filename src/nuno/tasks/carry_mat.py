@@ -10,6 +10,7 @@ import itertools
 import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from nuno.body import Body
 from nuno.errors import InvalidInputError, RobotModelError
 from nuno.materials import Cloth, Material, Soft
 from nuno.search.sweep import sweep
-from nuno.tasks.arms import HANDS, hands_level
-from nuno.tasks.carry_plan import key_times, make_plan, motion_along, plan_motion
+from nuno.tasks.arm_tracks import ArmTracks
+from nuno.tasks.carry_plan import key_times, make_plan, motion_along, plan_motions, track_arms
 from nuno.tasks.carry_result import CarryResult, CarryTrial
 from nuno.tasks.carry_trials import CarryTrials, check_trunk, make_room, mat_size
 from nuno.validation import finite_array, number
@@ -34,8 +35,8 @@ HOLDS = ("support", "grip")
 MATS = ("soft", "cloth")
 SIZE = (0.6, 0.4, 0.02)
 """[m] Of the paper's mat as it is read here: across the arms, along them, and how thick."""
-DISTANCES = tuple(float(d) for d in np.linspace(0.22, 0.58, 10))
-"""[m] Between the hands: the least that Talos' grippers let, and just less than the mat is long."""
+DISTANCES = tuple(float(d) for d in np.linspace(0.22, 0.445, 10))
+"""[m] Between the hands: from the least that Talos' grippers let to where no way holds the mat any more."""
 CELLS, CLOTH_CELLS = (18, 12, 3), (24, 16)
 WALK = (0.5, 0.0, 0.0)
 """Ahead [m], to the left [m], turned by [rad]: four steps of Talos."""
@@ -48,12 +49,12 @@ FABRIC = Cloth(area_density=0.6, bending_rigidity=1e-3, thickness=0.004, frictio
 
 
 def carry_mat(
-    robot: Humanoid | str = "talos", mat: Body | str = "soft", material: Material | None = None, *,
+    robot: Humanoid | str | ArmTracks = "talos", mat: Body | str = "soft", material: Material | None = None, *,
     hold: str = "support", arm_distances: ArrayLike = DISTANCES, offsets_x: ArrayLike = OFFSETS_X,
     offsets_y: ArrayLike = OFFSETS_Y, walk: ArrayLike = WALK, walks: Sequence[Any] | None = None,
-    hands_at: tuple[float, float] | None = None, arms: str = "boxes", arm_friction: float = 0.5, settle: float = 1.5,
+    hands_at: tuple[float, float] | None = None, arms: str = "hulls", arm_friction: float = 0.5, settle: float = 1.5,
     seconds: float = 8.0, device: str = "auto", substeps: int | None = None,
-    results: str | os.PathLike[str] | None = None,
+    results: str | os.PathLike[str] | None = None, executor: Executor | None = None,
 ) -> CarryResult:  # fmt: skip
     """Let a humanoid walk with a mat on its arms, in all ways of holding it, and say how steadily it did.
 
@@ -63,7 +64,9 @@ def carry_mat(
     docs/carrying.md says how they are read). A trial whose state stops being finite has failed, and says so.
 
     Args:
-        robot: A humanoid, which is left as it was, or its name.
+        robot: A humanoid, which is left as it was, or its name; or the tracks of one's arms, planned before (the plan
+            of a result, or ``ArmTracks.load``), which say themselves what ``arm_distances``, ``walk``, ``walks``,
+            ``hands_at``, ``arms``, ``settle`` and ``seconds`` would say: no robot model is needed then.
         mat: "soft" (0.6 x 0.4 x 0.02 m of tetrahedra, three layers of cells), "cloth" (0.6 x 0.4 m), or a sheet or soft
             body of one's own, whose longer side comes to lie across the arms.
         material: Of the mat; None is ``FOAM`` or ``FABRIC`` of this module.
@@ -75,7 +78,7 @@ def carry_mat(
         walk: (3,), where the robot walks: ahead and to the left [m], and turned by [rad].
         walks: Walks made before, one for each distance; None plans them.
         hands_at: How far ahead of the soles and how high the hands are [m]; None is known of Talos and G1.
-        arms: "boxes" around the links' collision shapes, or the "hulls" themselves, which take several times as long.
+        arms: What the mat lies on: "hulls", the links' collision shapes, or the smallest "boxes" around them.
         arm_friction: Coulomb's coefficient of the arms; with the mat's by the geometric mean.
         settle: Seconds that the robot stands with the mat, which is let down onto its arms, before it walks.
         seconds: Seconds from the start of the walk to the end of the trial.
@@ -83,6 +86,7 @@ def carry_mat(
         substeps: As of ``World``.
         results: A file (JSON lines) that finished trials are appended to, from which a run that was killed goes on;
             see ``nuno.sweep``.
+        executor: Of processes, among which the walks are shared out; None plans them one after the other.
 
     Raises:
         InvalidInputError: another hold, a mat wider than the arms, one that reaches into the trunk, or a value that
@@ -93,34 +97,24 @@ def carry_mat(
     begin = time.perf_counter()
     if hold not in HOLDS:
         raise InvalidInputError(f"hold must be one of {HOLDS}, got {hold!r}")
-    carrier = _robot(robot)
     carried, made_of = _mat(mat, material)
-    distances, ahead, aside = (
-        finite_array(name, value, ("n",))
-        for name, value in (("arm_distances", arm_distances), ("offsets_x", offsets_x), ("offsets_y", offsets_y))
+    ahead, aside = (
+        finite_array(name, value, ("n",)) for name, value in (("offsets_x", offsets_x), ("offsets_y", offsets_y))
     )
-    goal = finite_array("walk", walk, (3,))
-    rest, span = number("settle", settle, above=0.1), number("seconds", seconds, above=0.1)
     rubbing = number("arm_friction", arm_friction, low=0.0)
-    place = _hands_at(carrier, hands_at)
-    if walks is not None and len(walks) != len(distances):
-        raise InvalidInputError(f"walks must be {len(distances)}, one for each arm distance, got {len(walks)}")
-    kept = carrier.configuration()
-    try:
-        _check_width(carrier, carried, distances, place)
-        stances = [hands_level(carrier, float(distance), *place) for distance in distances]
-        times = key_times(rest, span)
-        if walks is None:
-            motions = [plan_motion(carrier, stance, goal, times) for stance in stances]
-        else:
-            motions = [motion_along(walk, times) for walk in walks]
-        walking = time.perf_counter()
-        plan = make_plan(
-            carrier, carried, made_of, motions, distances, hold=hold, arms=arms, arm_friction=rubbing, settle=rest,
-            seconds=span,
+    if isinstance(robot, ArmTracks):
+        carrier, tracks = None, robot
+        _check_distances(carried, tracks.distances)
+    else:
+        carrier = _robot(robot)
+        _check_width(carrier, carried, arm_distances, hands_at)
+        tracks = plan_arms(
+            carrier, arm_distances=arm_distances, walk=walk, walks=walks, hands_at=hands_at, arms=arms, settle=settle,
+            seconds=seconds, executor=executor,
         )  # fmt: skip
-    finally:
-        carrier.take_configuration(kept)
+    walking = time.perf_counter()
+    distances = tracks.distances
+    plan = make_plan(tracks, carried, made_of, hold=hold, arm_friction=rubbing)
     rows = list(itertools.product(distances.tolist(), ahead.tolist(), aside.tolist()))
     walk_of = np.repeat(np.arange(len(distances)), len(ahead) * len(aside))
     check_trunk(plan, walk_of, np.array(rows)[:, 1:])
@@ -136,6 +130,38 @@ def carry_mat(
     trials = tuple(_trial(row, outcome) for row, outcome in zip(rows, found.trials, strict=True))
     spent = {"walks": walking - begin, "arms": placed - walking, "trials": time.perf_counter() - placed}
     return CarryResult(trials, plan, carrier, walk_of, substeps, device, spent)
+
+
+def plan_arms(
+    robot: Humanoid | str = "talos", *, arm_distances: ArrayLike = DISTANCES, walk: ArrayLike = WALK,
+    walks: Sequence[Any] | None = None, hands_at: tuple[float, float] | None = None, arms: str = "hulls",
+    settle: float = 1.5, seconds: float = 8.0, executor: Executor | None = None,
+) -> ArmTracks:  # fmt: skip
+    """Return where a humanoid's arms are along its walks, for ``carry_mat`` here or, from a file, elsewhere.
+
+    Args and Raises: those of ``carry_mat``.
+    """
+    from nuno.tasks.arms import SHAPES, hands_level
+
+    if arms not in SHAPES:
+        raise InvalidInputError(f"arms must be one of {SHAPES}, got {arms!r}")
+    carrier = _robot(robot)
+    distances, goal = finite_array("arm_distances", arm_distances, ("n",)), finite_array("walk", walk, (3,))
+    rest, span = number("settle", settle, above=0.1), number("seconds", seconds, above=0.1)
+    place = _hands_at(carrier, hands_at)
+    if walks is not None and len(walks) != len(distances):
+        raise InvalidInputError(f"walks must be {len(distances)}, one for each arm distance, got {len(walks)}")
+    kept = carrier.configuration()
+    try:
+        stances = [hands_level(carrier, float(distance), *place) for distance in distances]
+        times = key_times(rest, span)
+        if walks is None:
+            motions = plan_motions(carrier, stances, goal, times, executor)
+        else:
+            motions = [motion_along(walk, times) for walk in walks]
+        return track_arms(carrier, motions, distances, arms=arms, settle=rest, seconds=span)
+    finally:
+        carrier.take_configuration(kept)
 
 
 def _trial(row: tuple[float, float, float], outcome: Any) -> CarryTrial:
@@ -174,14 +200,23 @@ def _hands_at(robot: Humanoid, hands_at: Any) -> tuple[float, float]:
     return float(ahead), float(height)
 
 
-def _check_width(robot: Humanoid, mat: Body, distances: np.ndarray, place: tuple[float, float]) -> None:
-    """Raise where the mat is narrower than the arms are apart, or wider than they can be."""
+def _check_distances(mat: Body, distances: np.ndarray) -> float:
+    """Return how wide a mat is [m]; raise where that is less than the arms are apart."""
     width = float(max(mat_size(mat.shape, False)[:2]))
     if distances.max() >= width:
         raise InvalidInputError(
             f"the mat is {width:.3f} m across and the arms are up to {distances.max():.3f} m apart: it cannot lie on "
             "both"
         )
+    return width
+
+
+def _check_width(robot: Humanoid, mat: Body, arm_distances: ArrayLike, hands_at: Any) -> None:
+    """Raise where the mat is narrower than the arms are apart, or wider than they can be."""
+    from nuno.tasks.arms import HANDS, hands_level
+
+    width = _check_distances(mat, finite_array("arm_distances", arm_distances, ("n",)))
+    place, kept = _hands_at(robot, hands_at), robot.configuration()
     try:
         hands_level(robot, width, *place)
     except RobotModelError as error:
@@ -190,6 +225,8 @@ def _check_width(robot: Humanoid, mat: Body, distances: np.ndarray, place: tuple
         raise InvalidInputError(
             f"the mat is {width:.3f} m across, wider than the arms of {robot.name!r} can carry: {error}"
         ) from error
+    finally:
+        robot.take_configuration(kept)
 
 
 def _known(value: float) -> float | None:

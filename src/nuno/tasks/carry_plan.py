@@ -1,19 +1,25 @@
-"""Plans of carrying: the walks, and where the arms' shapes are at every half frame of each."""
+"""Plans of carrying: the walks, where the arms' shapes are at every half frame of each, and the mat on them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.body import Body
 from nuno.materials import Material
-from nuno.tasks.arms import ArmMotion, ArmShape, arm_shapes, half_sides
-from nuno.tasks.carry_trials import FRAME_RATE, NEAR, CarryPlan, mat_size
+from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
+from nuno.tasks.carry_trials import CarryPlan, mat_size
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
+
+NEAR = 0.15
+"""[m] Links farther than this from where the mat begins are left out."""
 
 
 def key_times(settle: float, seconds: float) -> np.ndarray:
@@ -22,27 +28,30 @@ def key_times(settle: float, seconds: float) -> np.ndarray:
     return np.arange(-2 * before, 2 * after + 1) * (0.5 / FRAME_RATE)
 
 
-def plan_motion(robot: Humanoid, stance: np.ndarray, goal: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return what a robot does from a stance: configurations (k, nq) at times (k,) [s].
+def plan_motions(
+    robot: Humanoid, stances: Sequence[np.ndarray], goal: np.ndarray, times: np.ndarray,
+    executor: Executor | None = None,
+) -> list[np.ndarray]:  # fmt: skip
+    """Return what a robot does from some stances: for each, configurations (k, nq) at times (k,) [s].
 
     Args:
         robot: The robot, which is left as it was.
-        stance: (nq,), standing; the arms stay as they are in it.
+        stances: (nq,) each, standing; the arms stay as they are in it.
         goal: (3,), where it walks: ahead and to the left [m], turned by [rad].
         times: (k,) [s] from the start of the walk; before it the robot stands.
+        executor: Of processes among which the walks are shared out; None plans one after the other.
 
     Raises:
         WalkError: the robot cannot walk there.
     """
-    from nuno.robot.walking import plan_walk
-
-    kept = robot.configuration()
-    try:
-        robot.take_configuration(stance)
-        x, y, yaw = (float(value) for value in goal)
-        return motion_along(plan_walk(robot, x, y, yaw), times)
-    finally:
-        robot.take_configuration(kept)
+    if executor is None:
+        return _walked(robot, stances, goal, times)
+    # a robot is 14 MB to send, so a job is more than one walk where there are fewer cores
+    shares = np.array_split(np.array(stances), min(len(stances), os.cpu_count() or 1))
+    lean = robot.copy()
+    vars(lean).pop("geometry", None)  # Pinocchio's tables of collisions cannot be sent
+    jobs = [executor.submit(_walked, lean, share, goal, times) for share in shares]
+    return [motion for job in jobs for motion in job.result()]
 
 
 def motion_along(walk: Any, times: np.ndarray) -> np.ndarray:
@@ -52,50 +61,75 @@ def motion_along(walk: Any, times: np.ndarray) -> np.ndarray:
     return np.array([first if time <= 0.0 else walk.configuration_at(start + float(time)) for time in times])
 
 
-def make_plan(
-    robot: Humanoid, mat: Body, material: Material, motions: Sequence[np.ndarray], distances: np.ndarray, *,
-    hold: str, arms: str, arm_friction: float, settle: float, seconds: float,
-) -> CarryPlan:  # fmt: skip
-    """Return what trials have in common.
+def track_arms(
+    robot: Humanoid, motions: Sequence[np.ndarray], distances: np.ndarray, *, arms: str, settle: float, seconds: float
+) -> ArmTracks:
+    """Return where the arms are along motions.
 
     Args:
         robot: The robot.
-        mat: The mat.
-        material: Its material.
         motions: (k, nq) each, configurations at ``key_times``, one motion for each distance.
         distances: (walks,) [m] between the hands.
-        hold: "support" or "grip".
-        arms: "boxes" or "hulls".
-        arm_friction: Coulomb's coefficient of the arms.
+        arms: "hulls" or "boxes".
         settle: Seconds before the walk.
         seconds: Seconds of the walk and after it.
     """
+    from nuno.tasks.arms import ArmMotion, arm_shapes
+
+    shapes = arm_shapes(robot, arms)
     moved = [ArmMotion.of(robot, configurations) for configurations in motions]
-    boxes, shapes = arm_shapes(robot, "boxes"), arm_shapes(robot, arms)
-    size = mat_size(mat.shape, False)
-    turned = bool(size[0] > size[1])
-    near = _near(boxes, moved, 0.5 * mat_size(mat.shape, turned))
-    boxes, shapes = tuple(boxes[k] for k in near), tuple(shapes[k] for k in near)
-    own, around = ([motion.poses(chosen) for motion in moved] for chosen in (shapes, boxes))
-    return CarryPlan(
-        mat.shape, turned, material, tuple(shape.part for shape in shapes), half_sides(boxes),
-        np.array([shape.side for shape in shapes]), arm_friction, distances,
-        np.array([places for places, _ in own]), np.array([turns for _, turns in own]),
-        np.array([places for places, _ in around]), np.array([turns for _, turns in around]),
-        np.array([motion.base for motion in moved]), np.array([motion.hands for motion in moved]),
-        np.array(motions), settle, seconds, hold,
+    placed = [motion.poses(shapes) for motion in moved]
+    return ArmTracks(
+        robot.name, tuple(shape.part.shape for shape in shapes), np.array([shape.side for shape in shapes]), distances,
+        np.array([places for places, _ in placed]), np.array([turns for _, turns in placed]),
+        np.array([motion.base for motion in moved]), np.array([motion.hands for motion in moved]), np.array(motions),
+        settle, seconds,
     )  # fmt: skip
 
 
-def _near(boxes: Sequence[ArmShape], motions: Sequence[ArmMotion], half: np.ndarray) -> list[int]:
+def make_plan(tracks: ArmTracks, mat: Body, material: Material, *, hold: str, arm_friction: float) -> CarryPlan:
+    """Return what trials have in common.
+
+    Args:
+        tracks: Of the arms, of which shapes far from the mat are left out.
+        mat: The mat.
+        material: Its material.
+        hold: "support" or "grip".
+        arm_friction: Coulomb's coefficient of the arms.
+    """
+    size = mat_size(mat.shape, False)
+    turned = bool(size[0] > size[1])
+    tracks = tracks.of_shapes(_near(tracks, 0.5 * mat_size(mat.shape, turned)))
+    own = {item.name: getattr(tracks, item.name) for item in fields(ArmTracks)}
+    return CarryPlan(**own, mat=mat.shape, turned=turned, material=material, friction=arm_friction, hold=hold)
+
+
+def _near(tracks: ArmTracks, half: np.ndarray) -> list[int]:
     """Return which shapes come near the mat wherever it is laid."""
-    reach = np.array([np.linalg.norm(sides) for sides in half_sides(boxes)]) + NEAR
-    close = np.zeros(len(boxes), dtype=bool)
-    for motion in motions:
-        hands = motion.hands[0].mean(axis=0)
-        places = motion.poses(boxes)[0][:, 0]
+    reach = np.array([np.linalg.norm(part.mesh()[0], axis=1).max() for part in tracks.parts]) + NEAR
+    close = np.zeros(len(tracks.parts), dtype=bool)
+    for walk in range(len(tracks.distances)):
+        hands = tracks.hands[walk, 0].mean(axis=0)
+        places = tracks.positions[walk, :, 0]
         # the mat's middle is behind the hands, and by at most half its own size beside them
         low, high = hands - 2.0 * half * (1, 1, 0), hands + half * (1, 2, 0)
         apart = np.maximum(np.maximum(low - places, places - high), 0.0)
         close |= np.linalg.norm(apart, axis=1) < reach
     return [int(k) for k in np.flatnonzero(close)]
+
+
+def _walked(
+    robot: Humanoid, stances: Iterable[np.ndarray], goal: np.ndarray, times: np.ndarray
+) -> list[np.ndarray]:  # fmt: skip
+    from nuno.robot.walking import plan_walk
+
+    kept = robot.configuration()
+    x, y, yaw = (float(value) for value in goal)
+    motions = []
+    try:
+        for stance in stances:
+            robot.take_configuration(stance)
+            motions.append(motion_along(plan_walk(robot, x, y, yaw), times))
+    finally:
+        robot.take_configuration(kept)
+    return motions

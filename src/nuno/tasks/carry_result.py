@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.tasks.carry_trials import FRAME_RATE, CarryPlan, carry, make_room
+from nuno.tasks.arm_tracks import FRAME_RATE
+from nuno.tasks.carry_trials import CarryPlan, carry, make_room
 from nuno.whole_file import replacing
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class CarryResult:
     Attributes:
         trials: By arm distance, then offset in x, then in y.
         plan: What all trials had in common.
-        robot: The robot.
+        robot: The robot; None where its arms' tracks were given.
         walk_of: (trials,) int, the walk that each took, which those of one arm distance share.
         substeps: Substeps a frame that were asked for, None for the solver's own choice.
         device: Where they ran.
@@ -59,7 +60,7 @@ class CarryResult:
 
     trials: tuple[CarryTrial, ...]
     plan: CarryPlan = field(repr=False)
-    robot: Humanoid = field(repr=False)
+    robot: Humanoid | None = field(repr=False)
     walk_of: np.ndarray = field(repr=False)
     substeps: int | None
     device: str
@@ -110,7 +111,7 @@ class CarryResult:
         best = None if self.failed.all() else self.best
         return {
             "format": 1,
-            "robot": self.robot.name,
+            "robot": self.plan.robot,
             "hold": self.plan.hold,
             "mat": {"kind": self.plan.mat.kind, "material": _values(self.plan.material)},
             "arm_friction": self.plan.friction,
@@ -152,10 +153,16 @@ class CarryResult:
         return np.array([found[frame] for frame in frames])
 
     def strip(self, trial: int, count: int = 6) -> Figure:
-        """Return a picture of a trial at ``count`` times, of a failed one around its fall."""
+        """Return a picture of a trial at ``count`` times, of a failed one around its fall.
+
+        Raises:
+            InvalidInputError: no such trial, or there is no robot to draw.
+        """
         from nuno.tasks.carry_figures import carry_strip
 
         self._check(trial)
+        if self.robot is None:
+            raise InvalidInputError("strips show the robot, and of this one only the arms' tracks are known")
         return carry_strip(self, trial, count)
 
     def figure(self) -> Figure:
@@ -172,7 +179,7 @@ class CarryResult:
 
         Args:
             folder: Where.
-            pictures: Whether to draw pictures, which runs two trials once more.
+            pictures: Whether to draw pictures, which runs two trials once more; without a robot only the plot.
         """
         folder = FilePath(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -188,6 +195,8 @@ class CarryResult:
         if not pictures:
             return
         self.figure().savefig(folder / "plot.png", dpi=110)
+        if self.robot is None:
+            return
         if not self.failed.all():
             self.strip(self.best).savefig(folder / "best.png", dpi=110)
         if self.failed.any():

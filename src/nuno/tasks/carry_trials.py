@@ -15,11 +15,10 @@ from nuno.body import Body
 from nuno.errors import InvalidInputError
 from nuno.materials import Cloth, Material
 from nuno.path import Path
-from nuno.robot.geometry import LinkShape
-from nuno.shape import Shape
+from nuno.shape import Box, Shape
+from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
 from nuno.world import World
 
-FRAME_RATE = 60.0
 CHUNK = 30
 """Frames for which the arms' poses are handed over at once: what one run of the solver takes."""
 EVERY = 6
@@ -34,75 +33,33 @@ FALLEN = 0.25
 """[m] How much nearer to the floor the mat's middle is than when it was laid down, for that to be a failure."""
 CALM = 6.0
 """[1/s] Air drag while the mat is laid down, as if by hand: it is not still bouncing when the walk begins."""
-NEAR = 0.15
-"""[m] Links farther than this from where the mat begins are left out."""
 
 
 @dataclass(frozen=True, eq=False)
-class CarryPlan:
-    """What all trials have in common.
+class CarryPlan(ArmTracks):
+    """What all trials have in common: the arms' tracks, and what they carry how.
 
     Attributes:
         mat: The mat's shape; its x and y axes lie along the robot's.
         turned: Whether the mat is turned by a quarter, its x axis to the left.
         material: Its material.
-        parts: The arms' shapes.
-        boxes: (shapes, 3) [m], half the sides of the box around each.
-        sides: (shapes,) int, 0 left arm, 1 right arm, -1 trunk.
         friction: The arms' coefficient.
-        distances: (walks,) [m], between the hands.
-        positions: (walks, shapes, keys, 3) [m], where the parts are, two keys a frame.
-        quaternions: (walks, shapes, keys, 4).
-        box_positions: (walks, shapes, keys, 3) [m], where their boxes are.
-        box_quaternions: (walks, shapes, keys, 4).
-        base: (walks, keys, 3) [m], where the humanoid is.
-        hands: (walks, keys, 2, 3) [m], where its hands are, left and right.
-        configurations: (walks, keys, nq), of the whole robot.
-        settle: Seconds before the walk begins.
-        seconds: Seconds from then on.
         hold: "support" or "grip".
     """
 
     mat: Shape
     turned: bool
     material: Material
-    parts: tuple[LinkShape, ...]
-    boxes: np.ndarray
-    sides: np.ndarray
     friction: float
-    distances: np.ndarray
-    positions: np.ndarray
-    quaternions: np.ndarray
-    box_positions: np.ndarray
-    box_quaternions: np.ndarray
-    base: np.ndarray
-    hands: np.ndarray
-    configurations: np.ndarray
-    settle: float
-    seconds: float
     hold: str
-
-    def configuration(self, walk: int, time: float) -> np.ndarray:
-        """Return the robot's configuration (nq,) at a time [s] from the start of a walk."""
-        key = round(2.0 * FRAME_RATE * (time + self.settle))
-        return np.array(self.configurations[walk, np.clip(key, 0, self.configurations.shape[1] - 1)])
 
     def digest(self, substeps: int | None) -> str:
         """Return a short name of all that the outcomes depend on beside the parameters."""
         made = hashlib.sha256(repr((self.mat, vars(self.material), self.friction, self.hold, substeps)).encode())
-        for array in (self.mat.mesh()[0], self.positions, self.quaternions, self.base, self.hands):
+        meshes = [shape.mesh()[0] for shape in (self.mat, *self.parts)]
+        for array in (*meshes, self.positions, self.quaternions, self.base, self.hands):
             made.update(np.round(array, 9).tobytes())
         return made.hexdigest()[:12]
-
-    @property
-    def times(self) -> np.ndarray:
-        """(keys,) [s], two a frame."""
-        return np.arange(self.positions.shape[2]) * (0.5 / FRAME_RATE)
-
-    @property
-    def frames(self) -> int:
-        """Whole frames of a trial."""
-        return (self.positions.shape[2] - 1) // 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +104,7 @@ def make_room(plan: CarryPlan, device: str = "auto", substeps: int | None = None
     world = World(device=device, frame_rate=FRAME_RATE, substeps=substeps)
     world.add(plane(name="floor"))
     for k, part in enumerate(plan.parts):
-        world.add(Body(part.shape, name=f"arm {k}", friction=plan.friction))
+        world.add(Body(part, name=f"arm {k}", friction=plan.friction))
     turn = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(0.5 * np.pi)) if plan.turned else quat.IDENTITY
     world.add(Body(plan.mat, name="mat", quaternion=turn))
     return world
@@ -172,11 +129,7 @@ def carry(
     from nuno.tasks.mat_sight import MatSight
 
     mat = _lay_down(futures, plan, walks, offsets)
-    order = (0, 2, 1, 3)
-    sight = MatSight(
-        plan.frames, EVERY, plan.box_positions.transpose(order), plan.box_quaternions.transpose(order), plan.boxes,
-        plan.sides, walks, futures.device,
-    )  # fmt: skip
+    sight = MatSight(plan, EVERY, walks, futures.device)
 
     def look(time: float) -> None:
         dynamics: Any = mat._dynamics
@@ -284,7 +237,7 @@ def check_trunk(plan: CarryPlan, walks: np.ndarray, offsets: np.ndarray) -> None
     trunk = [s for s in range(len(plan.parts)) if plan.sides[s] < 0]
     for walk, offset, place in zip(walks, offsets, laid_places(plan, walks, offsets), strict=True):
         for s in trunk:
-            vertices = plan.parts[s].shape.mesh()[0]
+            vertices = plan.parts[s].mesh()[0]
             points = quat.rotate(plan.quaternions[walk, s, 0], vertices) + plan.positions[walk, s, 0]
             if ((points.min(axis=0) < place + half) & (points.max(axis=0) > place - half)).all():
                 raise InvalidInputError(
@@ -301,16 +254,16 @@ def mat_size(mat: Any, turned: bool) -> np.ndarray:
 
 def _surface_points(plan: CarryPlan, walk: int) -> np.ndarray:
     """Return points (k, 3) [m] all over the arms' shapes as they stand."""
-    steps = np.linspace(0.0, 1.0, 7)
     clouds = []
     for s, part in enumerate(plan.parts):
         if plan.sides[s] < 0:
             continue
-        vertices, faces = part.shape.mesh()
-        if len(faces) <= 12:  # a box: its corners alone may all be beside the mat
-            a, b, c = (vertices[faces[:, k]][:, None, None] for k in range(3))
-            u, v = (grid[None, ..., None] for grid in np.meshgrid(steps, steps, indexing="ij"))
-            vertices = (a + u * (1.0 - v) * (b - a) + u * v * (c - a)).reshape(-1, 3)
+        vertices, faces = part.mesh()
+        # the corners alone may all be beside the mat
+        a, b, c = (vertices[faces[:, k]][:, None, None] for k in range(3))
+        steps = np.linspace(0.0, 1.0, 7 if isinstance(part, Box) else 3)
+        u, v = (grid[None, ..., None] for grid in np.meshgrid(steps, steps, indexing="ij"))
+        vertices = (a + u * (1.0 - v) * (b - a) + u * v * (c - a)).reshape(-1, 3)
         clouds.append(quat.rotate(plan.quaternions[walk, s, 0], vertices) + plan.positions[walk, s, 0])
     return np.concatenate(clouds)
 

@@ -10,8 +10,14 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from nuno.scene.colliders import spread
+from nuno.shape import Hull, Shape
+from nuno.tasks.arm_tracks import ArmTracks
+
 FAR = wp.constant(1.0e6)
 """[m] The gap where there is no shape."""
+INSIDE = wp.constant(0.0)
+"""[m] The least gap."""
 
 
 @wp.kernel(enable_backward=False, module="nuno.tasks.mat_sight")
@@ -31,10 +37,11 @@ def see_middle(positions: wp.array2d(dtype=wp.vec3), frame: int, middle_out: wp.
 def see_gaps(
     # of the mat
     positions: wp.array2d(dtype=wp.vec3),
-    # of the arms: poses (walks, keys, shapes), half sides and sides of the body by shape
+    # of the arms: poses (walks, keys, shapes), and by shape its planes, first and last, and the side of the body
     places: wp.array3d(dtype=wp.vec3),
     turns: wp.array3d(dtype=wp.quat),
-    halves: wp.array(dtype=wp.vec3),
+    faces: wp.array(dtype=wp.vec2i),
+    planes: wp.array(dtype=wp.vec4),
     sides: wp.array(dtype=int),
     walk_of: wp.array(dtype=int),
     key: int,
@@ -42,53 +49,53 @@ def see_gaps(
     # out
     gap_out: wp.array3d(dtype=float),
 ):
-    """How far each arm's boxes are from the nearest vertex, 0 where one is inside."""
-    world, side = wp.tid()
+    """How far each arm's shapes are from the nearest vertex, 0 where one is inside."""
+    world, s = wp.tid()
+    side = sides[s]
+    if side < 0:
+        return
     walk = walk_of[world]
+    place = places[walk, key, s]
+    back = wp.quat_inverse(turns[walk, key, s])
     nearest = float(FAR)
-    for s in range(halves.shape[0]):
-        if sides[s] == side:
-            place = places[walk, key, s]
-            back = wp.quat_inverse(turns[walk, key, s])
-            half = halves[s]
-            for i in range(positions.shape[1]):
-                p = wp.quat_rotate(back, positions[world, i] - place)
-                x = wp.max(wp.abs(p[0]) - half[0], 0.0)
-                y = wp.max(wp.abs(p[1]) - half[1], 0.0)
-                z = wp.max(wp.abs(p[2]) - half[2], 0.0)
-                nearest = wp.min(nearest, x * x + y * y + z * z)
-    gap_out[frame, world, side] = wp.sqrt(nearest)
+    for i in range(positions.shape[1]):
+        p = wp.quat_rotate(back, positions[world, i] - place)
+        gap = float(INSIDE)
+        for k in range(faces[s][0], faces[s][1]):
+            f = planes[k]
+            gap = wp.max(gap, f[0] * p[0] + f[1] * p[1] + f[2] * p[2] - f[3])
+            if gap >= nearest:
+                break
+        nearest = wp.min(nearest, gap)
+    wp.atomic_min(gap_out, frame, world, side, nearest)  # the least does not depend on who comes first
 
 
 class MatSight:
     """What was read in each frame of a run, kept on the device until it ends.
 
     Args:
-        frames: Frames of the run.
+        tracks: Of the arms.
         every: Gaps are read every so many frames.
-        places: (walks, keys, shapes, 3) [m], of the arms' boxes, two keys a frame.
-        turns: (walks, keys, shapes, 4), (w, x, y, z).
-        halves: (shapes, 3) [m], half their sides.
-        sides: (shapes,) int, 0 left, 1 right, -1 neither.
         walk_of: (worlds,) int, the walk of each world.
         device: Where the mat is simulated.
     """
 
-    def __init__(
-        self, frames: int, every: int, places: np.ndarray, turns: np.ndarray, halves: np.ndarray, sides: np.ndarray,
-        walk_of: np.ndarray, device: str,
-    ) -> None:  # fmt: skip
-        worlds = len(walk_of)
+    def __init__(self, tracks: ArmTracks, every: int, walk_of: np.ndarray, device: str) -> None:
+        worlds, frames = len(walk_of), tracks.frames
         self.every, self._device = every, device
+        places, turns = (array.transpose(0, 2, 1, 3) for array in (tracks.positions, tracks.quaternions))
+        planes = [spread(_planes(part)) for part in tracks.parts]
+        ends = np.cumsum([0, *map(len, planes)])
         self._shapes: tuple[Any, ...] = (
             wp.array(places.astype(np.float32), dtype=wp.vec3, device=device),
             wp.array(turns[..., [1, 2, 3, 0]].astype(np.float32), dtype=wp.quat, device=device),
-            wp.array(halves.astype(np.float32), dtype=wp.vec3, device=device),
-            wp.array(sides.astype(np.int32), dtype=int, device=device),
+            wp.array(np.stack([ends[:-1], ends[1:]], axis=1).astype(np.int32), dtype=wp.vec2i, device=device),
+            wp.array(np.concatenate(planes).astype(np.float32), dtype=wp.vec4, device=device),
+            wp.array(tracks.sides.astype(np.int32), dtype=int, device=device),
             wp.array(walk_of.astype(np.int32), dtype=int, device=device),
         )
         self._middle = wp.zeros((frames + 1, worlds), dtype=wp.vec3, device=device)
-        self._gap = wp.zeros((frames // every + 1, worlds, 2), dtype=float, device=device)
+        self._gap = wp.full((frames // every + 1, worlds, 2), FAR, dtype=float, device=device)
 
     def see(self, positions: wp.array, frame: int) -> None:
         """Read the mat's vertices (worlds, n) of vec3 at the end of a frame, the 0th being the start."""
@@ -96,8 +103,8 @@ class MatSight:
         wp.launch(see_middle, dim=worlds, inputs=[positions, frame], outputs=[self._middle], device=self._device)
         if frame % self.every == 0:
             wp.launch(
-                see_gaps, dim=(worlds, 2), inputs=[positions, *self._shapes, 2 * frame, frame // self.every],
-                outputs=[self._gap], device=self._device,
+                see_gaps, dim=(worlds, len(self._shapes[-2])), outputs=[self._gap], device=self._device,
+                inputs=[positions, *self._shapes, 2 * frame, frame // self.every],
             )  # fmt: skip
 
     def middles(self) -> np.ndarray:
@@ -107,3 +114,7 @@ class MatSight:
     def gaps(self) -> np.ndarray:
         """Return the gaps to the left and the right arm, (readings, worlds, 2) float64 [m]."""
         return self._gap.numpy().astype(float)
+
+
+def _planes(part: Shape) -> np.ndarray:
+    return (part if isinstance(part, Hull) else Hull.of(part.mesh()[0])).planes

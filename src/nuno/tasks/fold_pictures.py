@@ -1,0 +1,68 @@
+"""FoldPictures: a fold as somebody sees it who stands on the other side of the table."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nuno.camera.camera import Camera
+from nuno.robot.head_cameras import HeadCameras
+from nuno.robot.simulated_robot import SimulatedRobot
+from nuno.robot.support import standing_place
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nuno.body import Body
+
+AHEAD, ASIDE, OVER = 1.15, -0.85, 0.6
+"""[m] From the cloth to the camera, as the robot sees it."""
+LIFTED = 0.12
+"""[m] Over the cloth, what the camera looks at."""
+WIDTH, HEIGHT, FOCAL = 480, 400, 620.0
+"""[px]"""
+
+
+class FoldPictures:
+    """Pictures of a robot and a cloth; a ``watch`` for ``play_fold``.
+
+    Args:
+        robot: The robot.
+        cloth: The cloth, where it lies before.
+
+    Attributes:
+        pictures: (h, w, 3) uint8 by moment.
+    """
+
+    def __init__(self, robot: SimulatedRobot, cloth: Body) -> None:
+        self._looks = HeadCameras(robot.links, (), samples=2)
+        yaw = standing_place(robot.robot)[2]
+        middle = np.asarray(cloth.vertices).mean(axis=0)
+        c, s = math.cos(yaw), math.sin(yaw)
+        eye = middle + np.array((c * AHEAD - s * ASIDE, s * AHEAD + c * ASIDE, OVER))
+        z = middle + np.array((0.0, 0.0, LIFTED)) - eye
+        z /= np.linalg.norm(z)
+        x = np.cross(z, (0.0, 0.0, 1.0))
+        x /= np.linalg.norm(x)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = np.stack([x, np.cross(z, x), z], axis=1), eye
+        self.camera = Camera(WIDTH, HEIGHT, FOCAL, FOCAL, 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1), pose)
+        self.pictures: dict[str, np.ndarray] = {}
+
+    def __call__(self, moment: str) -> None:
+        """Take a picture."""
+        self.pictures[moment] = self._looks.look_from(self.camera).color.numpy()
+
+    def figure(self) -> Figure:
+        """Return all pictures side by side, with their moments."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(2.4 * len(self.pictures), 2.25), layout="constrained", facecolor="white")
+        for k, (moment, picture) in enumerate(self.pictures.items()):
+            axes = figure.add_subplot(1, len(self.pictures), k + 1)
+            axes.imshow(picture)
+            axes.set_title(moment, fontsize=9)
+            axes.set_axis_off()
+        return figure
