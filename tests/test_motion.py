@@ -197,3 +197,17 @@ def test_many_links_cost_little():
         world.move(link, nuno.Path([world.time, world.time + 1.0], [link.position, (0, 0, 1)]))
     world.step()
     assert [id(colliders) for colliders in world._colliders.values()] == tables
+
+
+def test_a_run_that_rounds_to_nothing_is_none():
+    """What a sleep of the rest of a frame leaves: no time passes, also where bodies are on their way."""
+    world = nuno.World(device="cpu")
+    cloth = world.add(nuno.sheet((0.1, 0.1), (4, 4), position=(0.0, 0.0, 0.1)))
+    world.attach(cloth)
+    box = world.add(nuno.box((0.1, 0.1, 0.1), position=(1.0, 0.0, 0.1)))
+    world.move(box, nuno.Path([0.0, 10.0], [(1.0, 0.0, 0.1), (2.0, 0.0, 0.1)]))
+    world.run(0.1)
+    before, now = cloth.vertices, world.time
+    world.run(1e-15)
+    np.testing.assert_array_equal(cloth.vertices, before)
+    assert world.time == now

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from nuno.background import Background
 from nuno.body import Body
-from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
+from nuno.dynamics import SOON, ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.grip import Grip, make_grip
 from nuno.materials import Material
@@ -375,7 +375,8 @@ class World(Simulation):
         ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
         for end in _with_bar(ends, pieces, progress):
             with self._call():
-                self._advance(end - self._time, end, each_frame)
+                if end - self._time > SOON:  # less is no time: the same instant
+                    self._advance(end - self._time, end, each_frame)
 
     def start(self, real_time_factor: float = 1.0) -> None:
         """Run in the background, at ``real_time_factor`` times real time (``math.inf``: as fast as possible).
