@@ -3,11 +3,15 @@
     python benchmarks/carry.py --out carried
     python benchmarks/carry.py --device cuda:0 --mat cloth
     python benchmarks/carry.py --half --every 2
+    python benchmarks/carry.py --save-plans plans.npz --plan-only
+    python benchmarks/carry.py --device cuda:0 --plans plans.npz --warm --json carry.json
     python benchmarks/carry.py --stiffness
 
 Wall time by stage and the process's own busy time (for machines that others use too), the table, and how the trials
 ended. `--half` runs all once more at twice the substeps: how often success and failure agree, and Spearman's rank
-correlation of F over all that succeed in both. `--arms hulls` takes the links' own hulls, `--compare-hulls` both.
+correlation of F over all that succeed in both. `--arms boxes` takes boxes around the links, `--compare-boxes` both.
+`--save-plans` writes where the arms are along the walks to a file; with `--plans` nothing of a robot is needed, and the
+device may be on a machine without Pinocchio. `--warm` runs once more, now that all kernels are loaded.
 `--stiffness` instead clamps strips of the soft mat, 0.15 m free, and reads the bending rigidity off their sag: tip drop
 over reach H / W of a strip under its own weight against the elastica's (theta'' = -G (1 - s) cos theta, G = w L^3 / B).
 """
@@ -15,20 +19,25 @@ over reach H / W of a strip under its own weight against the elastica's (theta''
 from __future__ import annotations
 
 import argparse
+import json
+import multiprocessing
+import pathlib
 import time
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
 
 import nuno
 from nuno.tasks import carry_mat as carrying
+from nuno.tasks.arm_tracks import ArmTracks
 from nuno.tasks.carry_result import CarryResult
 
 TABLE_G = np.array([0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0])
 
 
-def run(**options: Any) -> CarryResult:
+def run(**options: Any) -> tuple[CarryResult, dict[str, Any]]:
     """Carry, and say what came of it."""
     busy, wall = time.process_time(), time.perf_counter()
     result = carrying.carry_mat(**options)
@@ -36,20 +45,43 @@ def run(**options: Any) -> CarryResult:
     print(result.table())
     print(f"{len(result.trials)} trials in {wall:.1f} s ({result.seconds}), busy {busy:.1f} s")
     print(Counter(trial.reason for trial in result.trials), flush=True)
-    return result
+    late = int(sum(trial.failed_at is not None and trial.failed_at > 0.0 for trial in result.trials))
+    said = {
+        "trials": len(result.trials), "failed": int(result.failed.sum()), "failed_under_way": late, "wall_s": wall,
+        "busy_s": busy, "seconds": result.seconds, "device": options["device"], "steadiest": result.best,
+        "values": [None if np.isnan(value) else float(value) for value in result.values],
+    }  # fmt: skip
+    return result, said
 
 
-def compare(first: CarryResult, second: CarryResult, what: str) -> None:
+def compare(first: CarryResult, second: CarryResult, what: str) -> dict[str, float]:
     """Say how alike two results are."""
     from scipy.stats import spearmanr
 
     both = ~first.failed & ~second.failed
     order = spearmanr(first.values[both], second.values[both])[0]
     apart = np.median(np.abs(second.values[both] / first.values[both] - 1.0))
+    agree = (first.failed == second.failed).mean()
     print(
-        f"{what}: success and failure agree in {100 * (first.failed == second.failed).mean():.1f} %, Spearman "
-        f"{order:.3f} over {both.sum()}, F differs by {100 * apart:.1f} % in the median"
+        f"{what}: success and failure agree in {100 * agree:.1f} %, Spearman {order:.3f} over {both.sum()}, F differs "
+        f"by {100 * apart:.1f} % in the median",
+        flush=True,
     )
+    return {"agree": float(agree), "spearman": float(order), "over": int(both.sum()), "apart": float(apart)}
+
+
+def plan(arms: str, path: str | None, processes: int) -> tuple[ArmTracks, dict[str, float]]:
+    """Return the tracks of Talos' arms along ten walks, and the seconds that they took, or read them from a file."""
+    wall, busy = time.perf_counter(), time.process_time()
+    if path is not None:
+        tracks = ArmTracks.load(path)
+    elif processes:
+        # a fresh start: a copy of a process in which threads run may hang
+        with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as executor:
+            tracks = carrying.plan_arms("talos", arms=arms, executor=executor)
+    else:
+        tracks = carrying.plan_arms("talos", arms=arms)
+    return tracks, {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
 
 
 def default_substeps(mat: nuno.Body, material: Any) -> int:
@@ -110,28 +142,47 @@ def main() -> None:
     options.add_argument("--device", default="cpu")
     options.add_argument("--mat", choices=carrying.MATS, default="soft")
     options.add_argument("--hold", choices=carrying.HOLDS, default="support")
-    options.add_argument("--arms", choices=("boxes", "hulls"), default="boxes")
+    options.add_argument("--arms", choices=("hulls", "boxes"), default="hulls")
     options.add_argument("--every", type=int, default=1, help="every so many arm distances only")
-    options.add_argument("--half", action="store_true")
-    options.add_argument("--compare-hulls", action="store_true")
+    options.add_argument("--half", action="store_true", help="once more at half the substep")
+    options.add_argument("--compare-boxes", action="store_true")
+    options.add_argument("--warm", action="store_true", help="once more, with all kernels loaded")
+    options.add_argument("--processes", type=int, default=0, help="that plan walks; 0 plans them in this one")
+    options.add_argument("--plans", help="a file of plans to take")
+    options.add_argument("--save-plans", help="a file to write plans to")
+    options.add_argument("--plan-only", action="store_true")
     options.add_argument("--stiffness", action="store_true")
-    options.add_argument("--out")
+    options.add_argument("--out", help="folder for table and pictures")
+    options.add_argument("--json", help="file for the numbers")
     asked = options.parse_args()
     if asked.stiffness:
         stiffness()
         return
+    tracks, planning = plan(asked.arms, asked.plans, asked.processes)
+    print(f"{len(tracks.distances)} walks and the arms along them: {planning}", flush=True)
+    if asked.save_plans:
+        tracks.save(asked.save_plans)
+    if asked.plan_only:
+        return
     given: dict[str, Any] = dict(
-        mat=asked.mat, hold=asked.hold, arms=asked.arms, device=asked.device,
-        arm_distances=carrying.DISTANCES[:: asked.every],
-    )  # fmt: skip
-    first = run(**given)
+        robot=tracks.of_walks(slice(None, None, asked.every)), mat=asked.mat, hold=asked.hold, device=asked.device
+    )
+    first, said = run(**given)
+    found: dict[str, Any] = {"planning": planning, "first": said}
     if asked.out:
         first.save(asked.out)
+    if asked.warm:
+        found["warm"] = run(**given)[1]
     if asked.half:
         mat = nuno.Body(first.plan.mat)
-        compare(first, run(**given, substeps=2 * default_substeps(mat, first.plan.material)), "half the substep")
-    if asked.compare_hulls:
-        compare(first, run(**(given | {"arms": "hulls"})), "hulls for boxes")
+        finer, found["half"] = run(**given, substeps=2 * default_substeps(mat, first.plan.material))
+        found["half"] |= compare(first, finer, "half the substep")
+    if asked.compare_boxes:
+        boxes = plan("boxes", None, asked.processes)[0].of_walks(slice(None, None, asked.every))
+        second, found["boxes"] = run(**(given | {"robot": boxes}))
+        found["boxes"] |= compare(first, second, "boxes for hulls")
+    if asked.json:
+        pathlib.Path(asked.json).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 
 import nuno
 
-DISTANCES = (0.3, 0.42)  # [m] between the hands
+DISTANCES = (0.27, 0.345)  # [m] between the hands
 AHEAD, ASIDE = (0.05, 0.14), (0.0, 0.24)  # [m] from the mat's centre of gravity to the middle between the hands
 
 options = argparse.ArgumentParser(description=__doc__.splitlines()[0])

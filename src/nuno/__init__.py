@@ -104,6 +104,8 @@ if TYPE_CHECKING:
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
+    from nuno.shape import Hull
+    from nuno.tasks.arm_tracks import ArmTracks
     from nuno.tasks.carry_mat import carry_mat
     from nuno.tasks.carry_result import CarryResult, CarryTrial
     from nuno.tasks.improve_fold import ImprovedFold, improve_fold
@@ -117,6 +119,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "ArmTracks",
     "Body",
     "BodyStateError",
     "Box",
@@ -148,6 +151,7 @@ __all__ = [
     "HandPath",
     "HandTrack",
     "HeadCameras",
+    "Hull",
     "Humanoid",
     "ImageError",
     "ImprovedFold",
@@ -342,6 +346,8 @@ _LAZY = {
     "ImprovedFold": "nuno.tasks.improve_fold",
     "PlayedFold": "nuno.tasks.play_fold",
     "TowelPicker": "nuno.tasks.pick_towel",
+    "Hull": "nuno.shape",
+    "ArmTracks": "nuno.tasks.arm_tracks",
 }
 
 

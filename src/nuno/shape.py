@@ -7,7 +7,7 @@ Every shape has ``kind``, ``centre`` (where its own frame's origin starts in the
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +17,9 @@ from nuno.mesh import primitives
 from nuno.mesh.closed import enclosed_volume
 from nuno.mesh.primitives import MeshArrays
 from nuno.validation import count, finite_array, index_array, number
+
+FLAT = 1e-6
+"""Of its convex hull's volume, what a hull may lack by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +154,56 @@ class TriangleMesh(Shape):
 
 
 @dataclass(frozen=True, eq=False)
+class Hull(TriangleMesh):
+    """A convex solid: particles look at the planes of its faces instead of searching for the nearest one.
+
+    Of up to a few hundred faces that is several times as fast as a `TriangleMesh`. What is thick keeps its distance
+    from the planes, and so a little more from sharp edges.
+
+    Attributes:
+        vertices: (n, 3) float [m]; the shape's frame has its origin at their mean.
+        faces: (m, 3) int, closed, looking outwards, and convex.
+    """
+
+    kind: ClassVar[str] = "hull"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        own, full = enclosed_volume(self._local, self.faces), float(self._quickhull.volume)
+        if not self.is_solid or own < (1.0 - FLAT) * full:
+            raise MeshError(
+                f"a hull is closed, convex and looks outwards, got {len(self.faces)} faces that enclose {own:.6g} m3 "
+                f"of their convex hull's {full:.6g} m3; Hull.of(points) makes one"
+            )
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> Hull:
+        """Return the convex hull of points (n, 3) [m].
+
+        Raises:
+            MeshError: all of them lie in a plane, or are not finite.
+        """
+        hull = _quickhull(finite_array("points", points, ("n", 3), error=MeshError))
+        corners = hull.points[hull.simplices]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
+        faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+        number = np.zeros(len(hull.points), dtype=np.int64)
+        number[hull.vertices] = np.arange(len(hull.vertices))
+        return cls(hull.points[hull.vertices], number[faces])
+
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """(k, 4) float, of each plane face an outward normal and its distance from the frame's origin [m]."""
+        planes: np.ndarray = np.unique(self._quickhull.equations, axis=0)
+        return frozen(planes * (1.0, 1.0, 1.0, -1.0))
+
+    @cached_property
+    def _quickhull(self) -> Any:
+        return _quickhull(self._local)
+
+
+@dataclass(frozen=True, eq=False)
 class ClothMesh(TriangleMesh):
     """A cloth of any cut.
 
@@ -192,6 +245,15 @@ def _primitive(shape: Any) -> MeshArrays:
 @lru_cache(maxsize=512)
 def _looks_outwards(shape: TriangleMesh) -> bool:
     return _is_closed(shape.faces) and enclosed_volume(shape._local, shape.faces) > 0.0
+
+
+def _quickhull(points: np.ndarray) -> Any:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise MeshError(f"a hull needs points that are not all in one plane, got {len(points)}: {error}") from error
 
 
 def frozen(array: np.ndarray) -> np.ndarray:

@@ -33,7 +33,7 @@ READABLE = (1, 2)  # 1 has no paths of bodies
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
 SHAPES = (
     shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule, shapes.Plane, shapes.Sheet,
-    shapes.TriangleMesh, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
+    shapes.TriangleMesh, shapes.Hull, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
     soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
 )  # fmt: skip
 GRIPS = (GripSpec, TieSpec, HoldSpec)

@@ -13,6 +13,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.hull import distance_hull, way_into_hull
 from nuno.contact.led import led_place, led_turn
 from nuno.solver.lanes import (  # noqa: F401
     add,
@@ -34,7 +35,7 @@ from nuno.solver.lanes import (  # noqa: F401
 from nuno.solver.state import CLOCK, FRICTION, ORIGIN, SPEED, THICKNESS, Shapes
 from nuno.solver.warps import leads_warp, most_of_warp
 
-BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH = range(7)
+BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH, HULL = range(8)
 COLUMNS = 20
 """Numbers in a row of `Shapes.table`: position 0-2, rotation (row major, shape to world) 3-11, sizes 12-14,
 friction 15, pair friction 16 (negative: geometric mean), half thickness 17, bounding radius 18. Sizes are half sides
@@ -352,6 +353,8 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
             gap, nx, ny, nz = distance_round(x, y, z, sa, sb)
         elif kind >= SOLID_MESH:
             gap, nx, ny, nz = distance_box(x, y, z, sa, sb, sc)
+            if kind == HULL and anywhere(near - gap):
+                gap, nx, ny, nz = distance_hull(shapes, s, x, y, z, near)
         if anywhere(near - gap):
             ux = t.x[i] - t.px[i]
             uy = t.y[i] - t.py[i]
@@ -360,7 +363,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
                 ux = ux - ex - times(d00, x) - times(d01, y) - times(d02, z)
                 uy = uy - ey - times(d10, x) - times(d11, y) - times(d12, z)
                 uz = uz - ez - times(d20, x) - times(d21, y) - times(d22, z)
-            if kind >= SOLID_MESH:
+            if kind == SOLID_MESH or kind == SHELL_MESH:
                 lx = times(r00, ux) + times(r10, uy) + times(r20, uz)
                 ly = times(r01, ux) + times(r11, uy) + times(r21, uz)
                 lz = times(r02, ux) + times(r12, uy) + times(r22, uz)
@@ -371,11 +374,19 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
             un = times(ux, wx) + times(uy, wy) + times(uz, wz)
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
             passed = -least(gap, gap - un)
-            if kind < PLANE and anywhere(passed):
+            if (kind < PLANE or kind == HULL) and anywhere(passed):
                 lx = times(r00, ux) + times(r10, uy) + times(r20, uz)
                 ly = times(r01, ux) + times(r11, uy) + times(r21, uz)
                 lz = times(r02, ux) + times(r12, uy) + times(r22, uz)
-                at, ax, ay, az, met = way_in(kind, x, y, z, lx, ly, lz, sa, sb, sc)
+                at = gap
+                ax = nx
+                ay = ny
+                az = nz
+                met = gap
+                if kind == HULL:
+                    at, ax, ay, az, met = way_into_hull(shapes, s, x, y, z, lx, ly, lz)
+                else:
+                    at, ax, ay, az, met = way_in(kind, x, y, z, lx, ly, lz, sa, sb, sc)
                 met = least(met, passed)
                 gap = choose(met, at, gap)
                 nx = choose(met, ax, nx)

@@ -11,10 +11,10 @@ import warp as wp
 
 from nuno import quaternion as quat
 from nuno.contact.led import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
-from nuno.contact.shapes import BOX, CAPSULE, COLUMNS, CYLINDER, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
+from nuno.contact.shapes import BOX, CAPSULE, COLUMNS, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
 from nuno.errors import BodyStateError
 from nuno.motion import Schedule, is_led
-from nuno.shape import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from nuno.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.solver.state import Shapes
 
 if TYPE_CHECKING:
@@ -90,13 +90,23 @@ class Colliders:
         slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
         table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
+        faces = np.zeros((max(1, len(bodies)), 2), dtype=np.int32)
+        planes = [np.zeros((1, 4), dtype=np.float32)]
         for k, body in enumerate(bodies):
             row = table[:, k]
             row[:, 15] = body.friction
             row[:, 16] = pair_friction.get(body.name, -1.0)
             position, quaternion = body.position, np.asarray(body.quaternion)
             primitive, centre = _describe(body), np.zeros(3)
-            if primitive is None:
+            if isinstance(body.shape, Hull) and not body.is_deformed:
+                kinds[k] = HULL
+                own, centre, row[:, 12:15] = _hull(body.shape)
+                faces[k, 0] = sum(map(len, planes))
+                faces[k, 1] = faces[k, 0] + len(own)
+                planes.append(own)
+                row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
+                position = position + quat.rotate(quaternion, centre)
+            elif primitive is None:
                 kinds[k] = SOLID_MESH if body.is_solid else SHELL_MESH
                 made, centre, row[:, 12:15] = _meshes_of(body, device)
                 meshes += made
@@ -121,6 +131,8 @@ class Colliders:
         shapes.kind = wp.array(kinds, dtype=int, device=device)
         shapes.table = wp.array(table.ravel(), dtype=float, device=device)
         shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
+        shapes.faces = wp.array(faces, dtype=wp.vec2i, device=device)
+        shapes.planes = wp.array(np.concatenate(planes), dtype=wp.vec4, device=device)
         shapes.slot = wp.array(slots, dtype=int, device=device)
         shapes.pose = wp.zeros(worlds * size if led else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
@@ -231,6 +243,31 @@ def _centred(points: np.ndarray, faces: np.ndarray, device: str) -> tuple[Any, n
         indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
     )
     return mesh, middle, 0.5 * (high - low)
+
+
+@lru_cache(maxsize=256)
+def _hull(shape: Hull) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A hull's planes (k, 4) about the middle of its bounding box; the middle, and the half sides."""
+    points = shape.mesh()[0]
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    planes = spread(shape.planes)
+    planes[:, 3] -= planes[:, :3] @ middle
+    return planes.astype(np.float32), middle, 0.5 * (high - low)
+
+
+def spread(planes: np.ndarray) -> np.ndarray:
+    """Return planes (k, 4) in an order in which each looks elsewhere than all before it.
+
+    What is beside a hull is then found to be so by the first few.
+    """
+    order = [0]
+    likeness = planes[:, :3] @ planes[0, :3]
+    for _ in range(1, len(planes)):
+        likeness[order[-1]] = np.inf
+        order.append(int(np.argmin(likeness)))
+        likeness = np.maximum(likeness, planes[:, :3] @ planes[order[-1], :3])
+    return np.array(planes[order])
 
 
 def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarray]:

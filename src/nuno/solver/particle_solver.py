@@ -247,6 +247,8 @@ class ParticleSolver:
             for name in ("table", "pose", "haste"):
                 setattr(shapes, name, wp.zeros(1, dtype=float, device=self.device))
             shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
+            shapes.faces = wp.zeros(1, dtype=wp.vec2i, device=self.device)
+            shapes.planes = wp.zeros(1, dtype=wp.vec4, device=self.device)
         else:
             shapes = colliders.shapes
         self._colliders, self._shapes = colliders, shapes

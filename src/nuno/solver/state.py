@@ -174,7 +174,8 @@ class Shapes:
     """Static shapes: a row of numbers each, for all worlds (stride 0) or per world.
 
     What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
-    each, ``haste`` how fast any of it moves [m/s].
+    each, ``haste`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
+    outward normal and the distance from the hull's origin [m].
     """
 
     count: int
@@ -184,6 +185,8 @@ class Shapes:
     kind: wp.array(dtype=int)
     table: wp.array(dtype=float)
     mesh: wp.array(dtype=wp.uint64)
+    faces: wp.array(dtype=wp.vec2i)
+    planes: wp.array(dtype=wp.vec4)
     slot: wp.array(dtype=int)
     pose: wp.array(dtype=float)
     timing: wp.array(dtype=int)

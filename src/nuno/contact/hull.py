@@ -1,0 +1,71 @@
+"""Convex hulls as what particles touch: the planes of their faces, which all lanes look at together.
+
+A mesh is searched for the nearest of its triangles by each world on its own; a hull needs no search.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import add, anywhere, choose, fill, least, most, mul, over, size_of, sub, times  # noqa: F401
+from nuno.solver.state import Shapes
+
+FAR = wp.constant(1.0e6)
+"""[m] Farther than anything."""
+
+
+@wp.func
+def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
+    """Signed distance and normal of a convex hull by the planes of its faces; what is not ``near`` [m] may be nearer.
+
+    Beyond an edge it is the distance from the farther plane, which is less than that from the edge.
+    """
+    gap = -fill(x, FAR)
+    nx = fill(x, 0.0)
+    ny = fill(x, 0.0)
+    nz = fill(x, 1.0)
+    ends = shapes.faces[s]
+    for k in range(ends[0], ends[1]):
+        f = shapes.planes[k]
+        own = x * f[0] + y * f[1] + z * f[2] - fill(x, f[3])
+        above = own - gap
+        gap = choose(above, own, gap)
+        nx = choose(above, fill(x, f[0]), nx)
+        ny = choose(above, fill(x, f[1]), ny)
+        nz = choose(above, fill(x, f[2]), nz)
+        if not anywhere(near - gap):
+            break
+    return gap, nx, ny, nz
+
+
+@wp.func
+def way_into_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any):
+    """Where a way of the substep that ends at x, y, z and is u long enters a convex hull, as `way_in`.
+
+    A way that starts inside does not enter.
+    """
+    zero = fill(x, 0.0)
+    one = fill(x, 1.0)
+    latest = zero  # part of the way at which it has come through all the planes that it starts before
+    earliest = one  # part at which it first comes out of one
+    beside = zero
+    gap = zero
+    nx = zero
+    ny = zero
+    nz = one
+    ends = shapes.faces[s]
+    for k in range(ends[0], ends[1]):
+        f = shapes.planes[k]
+        end = x * f[0] + y * f[1] + z * f[2] - fill(x, f[3])
+        start = end - (ux * f[0] + uy * f[1] + uz * f[2])
+        part = over(size_of(start), most(size_of(end - start), fill(x, 1.0e-12)))
+        outside = choose(end, one, zero)
+        beside = most(beside, choose(start, outside, zero))
+        earliest = least(earliest, choose(start, one, choose(end, part, one)))
+        later = choose(start, part - times(outside, part), zero) - latest
+        latest = choose(later, part, latest)
+        gap = choose(later, end, gap)
+        nx = choose(later, fill(x, f[0]), nx)
+        ny = choose(later, fill(x, f[1]), ny)
+        nz = choose(later, fill(x, f[2]), nz)
+    return gap, nx, ny, nz, choose(beside, zero, least(latest, earliest - latest))
