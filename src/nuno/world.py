@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from nuno.background import Background
 from nuno.body import Body
-from nuno.dynamics import SOON, ParticleDynamics, check_material, default_material, make_push, start_dynamics
+from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.grip import Grip, make_grip
 from nuno.materials import Material
