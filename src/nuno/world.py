@@ -20,6 +20,7 @@ from nuno.grip import Grip, make_grip
 from nuno.materials import Material
 from nuno.motion import arrive, path_for
 from nuno.path import Path
+from nuno.progress import with_bar
 from nuno.simulation import CHUNK, SOON, Simulation
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
 from nuno.tie import check_weld
@@ -373,7 +374,7 @@ class World(Simulation):
         chunk = 1 if self.drivers else chunk  # they are asked frame by frame
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
         ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
-        for end in _with_bar(ends, pieces, progress):
+        for end in with_bar(ends, "simulating", progress):
             with self._call():
                 if end - self._time > SOON:  # less is no time: the same instant
                     self._advance(end - self._time, end, each_frame)
@@ -501,12 +502,3 @@ class World(Simulation):
                 return self.run(end - self._time)  # it was stopped while we slept
             background.wait_for_frame()
         return None
-
-
-def _with_bar(ends: list[float], pieces: int, progress: bool | None) -> Any:
-    if pieces == 1 and not progress:
-        return ends
-    from tqdm import tqdm
-
-    hidden = None if progress is None else not progress  # None: hidden unless standard error is a terminal
-    return tqdm(ends, desc="simulating", disable=hidden, delay=0.0 if progress else 2.0, leave=bool(progress))

@@ -30,6 +30,7 @@ from nuno.estimate.hand_sight import disc, hands_seen
 from nuno.estimate.hypotheses import cell_counts
 from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.materials import Cloth
+from nuno.progress import with_bar
 from nuno.validation import count, finite_array, number
 
 log = logging.getLogger(__name__)
@@ -155,7 +156,7 @@ def replay_fold(
     held = np.array([[hand.holds_at(t) for hand in paths] for t in times])
     there = hands_seen(seen_images, camera, at, held, hand_radius, before, lying)
     real = dict(given)
-    for k in _bar([k for k in seen_images if k not in given], progress):
+    for k in with_bar([k for k in seen_images if k not in given], "looking for the cloth", progress, "frame"):
         if before is None or lying is None:
             break
         found = _segmented(seen_images[k], before, lying, camera, table, fold.at(times[[k]], 0)[0], warnings, k)
@@ -319,10 +320,3 @@ def _in_pieces(vertices: np.ndarray, faces: np.ndarray, camera: Camera, spheres:
 def _last_speed(fold: ImaginedFold, world: int) -> float:
     moved = fold.states[-1, world] - fold.states[-2, world]
     return float(np.sqrt((moved**2).sum(axis=-1).mean()) / (fold.times[-1] - fold.times[-2]))
-
-
-def _bar(items: Sequence[Any], progress: bool | None) -> Any:
-    from tqdm import tqdm
-
-    hidden = None if progress is None else not progress
-    return tqdm(items, desc="looking for the cloth", unit="frame", leave=False, disable=hidden, delay=2.0)

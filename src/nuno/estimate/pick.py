@@ -29,6 +29,7 @@ from nuno.estimate.pick_result import PickResult
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, Comparison, rank
 from nuno.estimate.similarity import Silhouette
 from nuno.estimate.turns import TURNS, checked_turns
+from nuno.progress import with_bar
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def estimate_pick(
     seconds["imagine"] = seconds["compare"] = 0.0
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
-    for discretisation in _bar(discretisations, progress):
+    for discretisation in with_bar(discretisations, "imagining", progress, "mesh"):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
         if comparisons and discretisation.best is not None:
@@ -294,9 +295,3 @@ def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray, scale: flo
     if not (mask & ~hidden).any():
         raise ImageError("the mask after is empty but for the hand, so there is no silhouette to compare with")
     return small, Silhouette(shrink(mask & ~hidden) >= 0.5, shrink(hidden) > 0.25)
-
-
-def _bar(items: Sequence[Any], progress: bool | None) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(items, desc="imagining", unit="mesh", leave=False, disable=None if progress is None else not progress)
