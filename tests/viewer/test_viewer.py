@@ -203,7 +203,13 @@ def test_grips_contacts_and_cameras_are_marked():
         grips = feed.named("world", "marks", "grips")["points"].reshape(-1, 3)
         np.testing.assert_allclose(grips, towel.vertices[[0, 6]], atol=1e-7)
         found = world.contacts(towel)
-        arrows = feed.named("world", "marks", "contacts")["points"].reshape(-1, 2, 3)
+
+        def drawn():
+            return feed.named("world", "marks", "contacts")["points"].reshape(-1, 2, 3)
+
+        # the viewer's own thread may have told of this time before, sparing the contacts; ``update`` tells all
+        feed.wait_for(lambda: drawn().shape[0] == len(found) and np.allclose(drawn()[:, 0], found.points, atol=1e-7))
+        arrows = drawn()
         assert len(found) > 5
         np.testing.assert_allclose(arrows[:, 0], found.points, atol=1e-7)
         np.testing.assert_allclose(arrows[:, 1] - arrows[:, 0], 0.5 * found.forces, atol=1e-7)
