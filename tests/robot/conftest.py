@@ -3,6 +3,7 @@
 import pytest
 
 import nuno
+from nuno.robot.simulated_robot import SimulatedRobot
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +32,20 @@ def g1(still_g1):
     still_g1.stand()
     yield still_g1
     still_g1.stand()
+
+
+@pytest.fixture(scope="module")
+def links(still_talos):
+    """Talos' links in a world: hulls are made once."""
+    return still_talos.copy().enter(nuno.World(device="cpu"))
+
+
+@pytest.fixture
+def simulated(links):
+    """Talos, put back as it starts, and a driver for it."""
+    links.robot.stand()
+    links.follow(0.0)
+    robot = SimulatedRobot(links.robot, links.world, links=links)
+    yield robot
+    robot.world.stop()
+    robot.leave()

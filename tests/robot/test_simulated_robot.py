@@ -16,23 +16,6 @@ FRAME = 1.0 / 60.0
 BENT = {"arm_left_4_joint": -1.0, "arm_left_1_joint": 0.4, "head_1_joint": 0.2}
 
 
-@pytest.fixture(scope="module")
-def links(still_talos):
-    """Talos' links in a world: hulls are made once."""
-    return still_talos.copy().enter(nuno.World(device="cpu"))
-
-
-@pytest.fixture
-def simulated(links):
-    """Talos, put back as it starts, and a driver for it."""
-    links.robot.stand()
-    links.follow(0.0)
-    robot = SimulatedRobot(links.robot, links.world, links=links)
-    yield robot
-    robot.world.stop()
-    robot.leave()
-
-
 def test_the_programs_own_model_is_left_alone(simulated):
     """What the program plans with neither moves the robot, nor is moved by it."""
     robot = nuno.Humanoid()

@@ -2,28 +2,10 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 import nuno
-from nuno.robot.simulated_robot import SimulatedRobot
 
 FRAME = 1.0 / 60.0
-
-
-@pytest.fixture(scope="module")
-def links(still_talos):
-    """Talos' links in a world: hulls are made once."""
-    return still_talos.copy().enter(nuno.World(device="cpu"))
-
-
-@pytest.fixture
-def simulated(links):
-    """Talos, put back as it starts, and a driver for it."""
-    links.robot.stand()
-    links.follow(0.0)
-    robot = SimulatedRobot(links.robot, links.world, links=links)
-    yield robot
-    robot.leave()
 
 
 def test_what_was_planned_with_feet_on_the_ground_arrives_so(simulated):

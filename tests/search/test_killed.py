@@ -13,17 +13,13 @@ import pytest
 import searched
 
 import nuno.search as search
+from interrupts import heed_interrupts
 from nuno.errors import ResultsInUseError
 from nuno.search.parameters import make_parameters
 from nuno.search.results_file import ResultsFile, make_header
 
 PROGRAM = Path(__file__).with_name("sweep_program.py")
 PATIENCE = 60.0  # [s] for a process to start on a busy machine
-
-
-def heed_interrupts():
-    """Undo what a shell does to programs that it runs in the background: they ignore Ctrl-C, and all they start too."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def begin(results, marks, trials, seconds, way):

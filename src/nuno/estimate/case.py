@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -12,7 +11,8 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
-from nuno.errors import FileFormatError, InvalidInputError
+from nuno.errors import InvalidInputError
+from nuno.estimate.case_file import read_case_file
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
 
@@ -61,18 +61,7 @@ def read_case(folder: str | os.PathLike[str]) -> PickCase:
         ImageError: an image cannot be read.
     """
     folder = FilePath(folder)
-    path = folder / "input.json"
-    if not path.is_file():
-        raise InvalidInputError(f"{folder} is not a case: there is no input.json in it")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{path} is not JSON: {error}") from error
-    if not isinstance(data, dict):
-        raise FileFormatError(f"{path} must hold an object, got {type(data).__name__}")
-    missing = [name for name in NEEDED if name not in data]
-    if missing:
-        raise InvalidInputError(f"{path} lacks {', '.join(missing)}; it needs {', '.join(NEEDED)}")
+    path, data = read_case_file(folder, NEEDED)
     images = []
     for name in ("image_before", "image_after"):
         if not isinstance(data[name], str):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from dataclasses import dataclass
@@ -13,7 +12,8 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, read_image
-from nuno.errors import FileFormatError, InvalidInputError
+from nuno.errors import InvalidInputError
+from nuno.estimate.case_file import read_case_file
 from nuno.estimate.fold import replay_fold
 from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.hand_path import HandPath
@@ -67,18 +67,7 @@ def read_fold_case(folder: str | os.PathLike[str]) -> FoldCase:
         ImageError: an image cannot be read, or is not of the camera's size.
     """
     folder = FilePath(folder)
-    path = folder / "input.json"
-    if not path.is_file():
-        raise InvalidInputError(f"{folder} is not a case: there is no input.json in it")
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{path} is not JSON: {error}") from error
-    if not isinstance(data, dict):
-        raise FileFormatError(f"{path} must hold an object, got {type(data).__name__}")
-    missing = [name for name in NEEDED if name not in data]
-    if missing:
-        raise InvalidInputError(f"{path} lacks {', '.join(missing)}; it needs {', '.join(NEEDED)}")
+    path, data = read_case_file(folder, NEEDED)
     frames = data["frames"]
     if not isinstance(frames, list) or len(frames) < 2 or not all(isinstance(frame, dict) for frame in frames):
         raise InvalidInputError(f"frames in {path} must be a list of two or more objects")

@@ -7,13 +7,9 @@ import sys
 
 from wire_with import PATIENCE
 
+from interrupts import heed_interrupts
 from nuno.__main__ import main
 from nuno.robot.wire.client import WireRobot
-
-
-def heed_interrupts():
-    """Undo what a shell does to programs that it runs in the background: they ignore Ctrl-C, and all they start too."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_serve(still_g1):
