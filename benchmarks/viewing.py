@@ -3,9 +3,10 @@
     python benchmarks/viewing.py --json out.json
 
 Talos stands at a table with a towel of 30 by 20 cells and a soft cube on it, and moves an arm; a page (here: a reader
-of its messages, on a thread of its own) is connected. Each round times the same frames without a viewer, with one, with
-contacts in it, and with a recording; the middle of the rounds' ratios is told. "paced" steps once a real 1/60 s, as a
-world in the background does, so that the viewer's own work falls between the frames; "unpaced" never pauses.
+of its messages, in a process of its own, as a browser is) is connected. Each round times the same frames without a
+viewer, with one, with contacts in it, and with a recording; the middle of the rounds' ratios is told. "paced" steps
+once a real 1/60 s, as a world in the background does, so that the viewer's own work falls between the frames; "unpaced"
+never pauses.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import threading
+import multiprocessing
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -43,8 +46,9 @@ def make():
     return world, tick
 
 
-def read(url: str, sizes: list[int]) -> None:
-    """Receive what a page would, until the viewer is closed."""
+def read(url: str, pipe: Any) -> None:
+    """Receive what a page would, until the viewer is closed, and tell how long [bytes] each message was."""
+    sizes: list[int] = []
     from tornado.websocket import websocket_connect
 
     async def receive() -> None:
@@ -53,6 +57,23 @@ def read(url: str, sizes: list[int]) -> None:
             sizes.append(len(message))
 
     asyncio.run(receive())
+    pipe.send(sizes)
+
+
+@contextmanager
+def reader(viewer: Any, sizes: list[int]) -> Iterator[None]:
+    """A page that is connected meanwhile; the sizes of the messages that it got are added at the end."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=read, args=(viewer.url, there))
+    process.start()
+    while not viewer.page_count:
+        time.sleep(0.01)
+    time.sleep(0.5)
+    yield
+    viewer.close()
+    sizes += here.recv()
+    process.join()
 
 
 def timed(world, tick, frames: int, paced: bool) -> tuple[float, float, float]:
@@ -83,18 +104,20 @@ def main() -> None:
     for paced in (True, False):
         times: dict[str, list[tuple[float, float, float]]] = {}
         sizes: list[int] = []
+        watched: list[float] = []
         for _ in range(options.rounds):
             for case in ("alone", "viewer", "contacts", "recording"):
                 with ExitStack() as stack:
                     if case != "alone":
                         viewer = stack.enter_context(Viewer(world, contacts=case == "contacts"))
-                        fresh = sizes if case == "viewer" else []
-                        threading.Thread(target=read, args=(viewer.url, fresh), daemon=True).start()
-                        time.sleep(1.0)
+                        stack.enter_context(reader(viewer, sizes if case == "viewer" else []))
                         if case == "recording":
                             film = viewer.record()
                             stack.callback(film.stop)
+                    begin = time.perf_counter()
                     times.setdefault(case, []).append(timed(world, tick, options.frames, paced))
+                    if case == "viewer":
+                        watched.append(time.perf_counter() - begin)
         alone = np.array(times["alone"])
         for case, found in times.items():
             step, thread, process = 100.0 * (np.median(np.array(found) / alone, axis=0) - 1.0)
@@ -104,7 +127,8 @@ def main() -> None:
                 "process_more_percent": float(process),
             })  # fmt: skip
             print(rows[-1])
-        print(f"a message has {np.median(sizes) / 1e3:.1f} kB, the first {max(sizes) / 1e6:.1f} MB")
+        rate = len(sizes) / sum(watched)
+        print(f"{rate:.0f} messages a second of {np.median(sizes) / 1e3:.1f} kB, the first {max(sizes) / 1e6:.1f} MB")
     if options.json:
         with open(options.json, "w") as file:
             json.dump(rows, file, indent=2)

@@ -16,6 +16,8 @@ from feed import Feed
 
 import nuno
 from nuno.viewer import Film, Viewer
+from nuno.viewer import viewer as viewer_module
+from nuno.viewer.stage import Stage
 
 
 def make_world(**options):
@@ -102,8 +104,9 @@ def test_bodies_come_and_go_while_it_looks():
         assert Feed(viewer).paths() == feed.paths() == ["world/cube", "world/marks/grips", "world/table", "world/towel"]
 
 
-def test_a_body_is_removed_again_and_again_while_it_looks(caplog):
+def test_a_body_is_removed_again_and_again_while_it_looks(caplog, monkeypatch):
     """What is drawn may be gone at any time; nothing is logged as an error, and the rest is still followed."""
+    monkeypatch.setattr(viewer_module, "SHARE", 1.0)  # looks as often as it can
     world = make_world()
     with caplog.at_level(logging.WARNING), Viewer(world, frame_rate=500.0, contacts=True) as viewer:
         feed = Feed(viewer)
@@ -122,8 +125,10 @@ def test_a_body_is_removed_again_and_again_while_it_looks(caplog):
     assert not caplog.records
 
 
-def test_viewing_changes_no_bit():
+def test_viewing_changes_no_bit(monkeypatch):
     """A world that is looked at, with contacts, and filmed, moves as one that is not."""
+    monkeypatch.setattr(viewer_module, "SHARE", 1.0)  # looks as often as it can
+    monkeypatch.setattr(viewer_module, "IDLE", 0.0)  # though there is no page
     runs = []
     for looked_at in (False, True):
         world = make_world()
@@ -163,6 +168,45 @@ def test_a_stepped_world_is_followed():
         while time.monotonic() < end:
             world.step()
         assert sum(c["do"] == "clock" for c in feed.commands[seen:]) >= 5, "of 30 in a second"
+
+
+def test_it_looks_rarely_while_nobody_does(monkeypatch):
+    """Without a page a world is looked at only now and then; a page that comes is shown all of it, and follows."""
+    monkeypatch.setattr(viewer_module, "IDLE", 1e6)
+    looks = []
+    look = Stage.look
+    monkeypatch.setattr(Stage, "look", lambda own, sparing=False: (looks.append(sparing), look(own, sparing))[1])
+    world = nuno.World(device="cpu")
+    ball = world.add(nuno.sphere(0.1, name="ball"))
+    with Viewer(world, frame_rate=500.0) as viewer:
+        time.sleep(0.2)  # a hundred looks
+        assert len(looks) <= 2  # when it was made, and the thread's first
+        ball.locate((0, 0, 1))
+        feed = Feed(viewer)
+        feed.wait_for(lambda: feed.named("world", "ball")["pose"][2] == 1.0)
+        assert len(looks) > 2
+
+
+def test_it_takes_a_share_of_the_time_only(monkeypatch):
+    """Looks that take long are done more rarely than they were asked for."""
+    busy = 0.02
+
+    def look(own, sparing=False):
+        looks.append(time.perf_counter())
+        end = time.thread_time() + busy
+        while time.thread_time() < end:
+            pass
+
+    looks = []
+    monkeypatch.setattr(viewer_module, "SHARE", 0.1)
+    with Viewer(nuno.World(device="cpu"), frame_rate=1000.0) as viewer:
+        Feed(viewer)
+        monkeypatch.setattr(Stage, "look", look)
+        time.sleep(3.0)
+    assert len(looks) > 3
+    # what is measured is an average of the last five or so, which have to be taken in first: 5 of them in a hurry,
+    # then one in busy / SHARE = 0.2 s; in a hurry there would be a hundred and more
+    assert len(looks) < 30
 
 
 def test_modes_are_what_draw_draws():

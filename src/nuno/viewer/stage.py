@@ -51,6 +51,8 @@ class Stage:
         self._entered: list[Actor] = []
         self._left: list[int] = []
         self._contacts_due = 0.0
+        self._placed: list[Actor] = []  # whose frames and offsets the next two are
+        self._inner = self._offsets = np.empty((0, 7))
 
     @property
     def actors(self) -> list[Actor]:
@@ -101,9 +103,10 @@ class Stage:
         entered = [actor for actor in self._entered if actor.number not in left]
         self._entered, self._left = [], []
         new = {actor.number for actor in entered}
-        moved = [actor for actor in self.actors if actor.moved and actor.number not in new]
-        for actor in self.actors:
+        moved = [actor for actor in self.actors if actor.moved]
+        for actor in moved:
             actor.moved = False
+        moved = [actor for actor in moved if actor.number not in new]
         return left, entered, moved
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -126,11 +129,14 @@ class Stage:
         if actors:  # all at once: a robot has fifty links
             poses = [pose for cast in rigid for pose in cast.poses()]
             places, turns = np.array([pose[0] for pose in poses]), np.array([pose[1] for pose in poses])
-            inner = np.array([actor.inner for actor in actors])
-            offsets = np.array([actor.offset for actor in actors])
+            if actors != self._placed:  # most often those that moved before move again
+                self._placed = actors
+                self._inner = np.array([actor.inner for actor in actors])
+                self._offsets = np.array([actor.offset for actor in actors])
             now = np.concatenate(
-                [places + quat.rotate(turns, inner[:, :3]) + offsets, quat.multiply(turns, inner[:, 3:])], axis=1
-            ).astype(np.float32)
+                [places + quat.rotate(turns, self._inner[:, :3]) + self._offsets,
+                 quat.multiply(turns, self._inner[:, 3:])], axis=1,
+            ).astype(np.float32)  # fmt: skip
             before = np.array([UNPLACED if actor.pose is None else actor.pose for actor in actors])
             for k in np.flatnonzero((now != before).any(axis=1)):
                 actors[k].pose, actors[k].moved = now[k], True

@@ -27,6 +27,7 @@ from nuno.errors import InvalidInputError, UnknownNameError, ViewerError
 from nuno.recording import Recording
 from nuno.simulation import CHUNK
 from nuno.validation import finite_array, number
+from nuno.viewer.changes import changes, clock
 from nuno.viewer.film import Film
 from nuno.viewer.marks import camera_pose
 from nuno.viewer.message import pack
@@ -41,6 +42,11 @@ if TYPE_CHECKING:
     from nuno.world import World
 
 logger = logging.getLogger(__name__)
+
+SHARE = 0.02
+"""Of a core's time that looking and sending may take; where they take longer, they are done more rarely."""
+IDLE = 0.5
+"""[s] Between two looks while no page is there, so that the next finds the world about as it is."""
 
 
 class Viewer:
@@ -59,7 +65,7 @@ class Viewer:
         worlds: Which world of a batch, or which ones side by side; None is all, up to nine.
         spacing: [m] between worlds side by side, along x and y; None is a little more than they need.
         robots: Links whose bodies came into the world as copies, as in an imagined one.
-        frame_rate: Looks per second of real time [1/s].
+        frame_rate: Looks per second of real time [1/s], at most: fewer where they would take over 2 % of it.
         host: Which of this machine's addresses the page is served at; by default, nothing outside it gets it.
         port: The page's port; None is the first that is free from 7000 on.
 
@@ -93,7 +99,7 @@ class Viewer:
         self._piece = 2  # frames of a run between two chances to look
         self._last_chance = time.perf_counter()
         self._stop = threading.Event()
-        self._sent_time = 0.0
+        self._sent_time = self._idle_until = 0.0
         self._look(wait=True)
         self._server = Server(host, port, _weakly(self, Viewer._everything))
         world._watchers.append(self)
@@ -353,7 +359,7 @@ class Viewer:
                 return self._shown.message()
             view = self._view or View.around(*self._stage.bounds())
             entered = [actor.entrance() for actor in self._stage.actors]
-            return pack({"commands": [{"do": "clear"}, view.command(), *entered, _clock(self._stage)]})
+            return pack({"commands": [{"do": "clear"}, view.command(), *entered, clock(self._stage.time)]})
 
     def _look(self, wait: bool) -> list[dict[str, Any]]:
         """Look at the world and return what changed; without waiting, only if that does not hold the world up.
@@ -373,14 +379,18 @@ class Viewer:
                 self._wanted = True
             if not self._looked.wait(self._interval):
                 return []  # a long piece of a run, which looks when it is done
-        return _changes(*self._stage.settle())
+        return changes(*self._stage.settle())
 
     def _send(self, commands: list[dict[str, Any]]) -> None:
         if self._shown is None and (commands or self._stage.time != self._sent_time):
-            self._server.send(pack({"commands": [*commands, _clock(self._stage)]}))
+            self._server.send(pack({"commands": [*commands, clock(self._stage.time)]}))
             self._sent_time = self._stage.time
 
     def _follow_once(self) -> None:
+        now = time.perf_counter()
+        if not self.page_count and now < self._idle_until:
+            return
+        self._idle_until = now + IDLE
         with self._turn:
             if not self._stop.is_set():
                 self._send(self._look(wait=False))
@@ -388,10 +398,11 @@ class Viewer:
 
 def _follow(reference: weakref.ref[Viewer], stop: threading.Event, interval: float) -> None:
     """Look again and again until the viewer is closed or dropped."""
-    due = time.perf_counter()
+    due, cost = time.perf_counter(), 0.0
     while not stop.is_set():
-        due = max(due + interval, time.perf_counter())
+        due = max(due + max(interval, cost / SHARE), time.perf_counter())
         stop.wait(due - time.perf_counter())
+        begin = time.thread_time()  # the frames are held up for as long, more or less: Python does one thing at a time
         viewer = reference()
         if viewer is None:
             return
@@ -402,6 +413,7 @@ def _follow(reference: weakref.ref[Viewer], stop: threading.Event, interval: flo
         except Exception:  # one body that cannot be drawn must not end the viewer
             logger.exception("the viewer could not draw the world")
         viewer = None
+        cost += 0.2 * (time.thread_time() - begin - cost)
 
 
 def _weakly(viewer: Viewer, method: Any) -> Any:
@@ -413,25 +425,6 @@ def _weakly(viewer: Viewer, method: Any) -> Any:
         return pack({"commands": []}) if alive is None else method(alive)
 
     return call
-
-
-def _changes(left: list[int], entered: list[Any], moved: list[Any]) -> list[dict[str, Any]]:
-    commands: list[dict[str, Any]] = []
-    if left:
-        commands.append({"do": "leave", "ids": left})
-    commands += [actor.entrance() for actor in entered]
-    placed = [actor for actor in moved if actor.pose is not None]
-    if placed:
-        poses = np.array([actor.pose for actor in placed], np.float32).ravel()
-        commands.append({"do": "place", "ids": [actor.number for actor in placed], "poses": poses})
-    commands += [
-        {"do": "shift", "id": actor.number, "points": actor.points.ravel()} for actor in moved if actor.pose is None
-    ]
-    return commands
-
-
-def _clock(stage: Stage) -> dict[str, Any]:
-    return {"do": "clock", "time": stage.time}
 
 
 def _has_screen() -> bool:

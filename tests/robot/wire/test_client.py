@@ -18,7 +18,7 @@ from nuno.robot.wire.names import Names
 
 def cut(robot):
     """End a connection as a cable that is cut does."""
-    robot.connection._socket.transport.abort()
+    robot.connection._link.abort()
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_connection_that_drops_in_a_motion(serve, join, plain, factor):
     thread.start()
     time.sleep(0.1)
     begin = time.monotonic()
-    robot.connection._loop.call_soon_threadsafe(cut, robot)
+    cut(robot)
     thread.join(PATIENCE)
     assert "is lost" in raised[0][0]
     assert raised[0][1] - begin < 1.0  # milliseconds, where the machine is not busy

@@ -1,5 +1,6 @@
 """A client's connection: answers, results, and what happens when the other side is gone or silent."""
 
+import json
 import socket
 import threading
 import time
@@ -177,6 +178,33 @@ def test_too_long_a_message(other_side):
     with Connection(other_side(lambda own: (own.recv(), own.send("x" * 10**6), silent(own))), max_message=10**5) as own:
         with pytest.raises(ConnectionLostError, match="1009"):
             own.call("/s", "t", {}, timeout=10.0)
+
+
+def test_sending_from_several_threads(other_side):
+    """Messages that threads send at once arrive whole, those of one thread in its order, also at a slow reader."""
+    got, done = [], threading.Event()
+
+    def handle(own):
+        for data in own:
+            got.append(json.loads(data)["msg"])
+            time.sleep(0.001 if len(got) < 100 else 0.0)
+            if len(got) == 400:
+                done.set()
+
+    with Connection(other_side(handle)) as connection:
+
+        def send(name):
+            for k in range(100):
+                connection.send({"op": "publish", "topic": "/t", "msg": {"of": name, "k": k, "data": "x" * 30000}})
+
+        threads = [threading.Thread(target=send, args=(name,)) for name in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert done.wait(20.0)
+    for name in range(4):
+        assert [own["k"] for own in got if own["of"] == name] == list(range(100))
 
 
 def test_waiting_in_a_callback_is_refused(other_side):

@@ -418,8 +418,8 @@ def test_a_client_that_does_not_read(serve, raw, plain):
         assert other.hear(op="service_response", id="t")["result"]
         assert time.monotonic() - begin < 1.0  # milliseconds, where the machine is not busy
         time.sleep(0.02)
-    client = next(own for own in server._bridge._clients if own.subscriptions)
-    assert len(client.outbox._waiting) <= 3 * 16 + 1
+    client = next(own for own in server._bridge.clients if own.subscriptions)
+    assert client.link.waiting <= 3 * 16 + 1
 
 
 def test_clients_that_come_and_go(serve, raw, plain):
@@ -434,7 +434,7 @@ def test_clients_that_come_and_go(serve, raw, plain):
             client.socket.close()
         else:
             client.socket.socket.close()
-    until(lambda: not server._bridge._clients)
+    until(lambda: not server._bridge.clients)
     until(lambda: plain.goals["larm_controller"][0].is_done)
     assert not server._bridge.has_subscribers("/joint_states")
     assert advance(raw(server))["result"]
@@ -473,7 +473,7 @@ def test_loopback_by_default(serve):
     """Only programs of this machine can connect unless asked otherwise."""
     server = serve()
     assert server.url == f"ws://127.0.0.1:{server.port}"
-    assert {own.getsockname()[0] for own in server._bridge.sockets} == {"127.0.0.1"}
+    assert {own.getsockname()[0] for own in server._bridge.listening} == {"127.0.0.1"}
 
 
 def test_closing(serve, join, plain):

@@ -17,7 +17,7 @@ from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.interface import BASE, RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.wire import messages as ros
-from nuno.robot.wire.bridge import Client, told
+from nuno.robot.wire.bridge_client import Client, told
 from nuno.robot.wire.broadcast import Broadcast, motion_fields
 from nuno.robot.wire.names import GO_VELOCITY, Names
 from nuno.robot.wire.protocol import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, Message

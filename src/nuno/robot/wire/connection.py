@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import logging
+import selectors
+import socket
+import ssl
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import suppress
 from typing import Any
 
 from nuno.errors import (
@@ -20,13 +22,17 @@ from nuno.errors import (
     RobotTimeoutError,
 )
 from nuno.robot.wire.bridge import import_websockets
-from nuno.robot.wire.outbox import Outbox
+from nuno.robot.wire.link import Link
+from nuno.robot.wire.nudge import Nudge
 from nuno.robot.wire.protocol import FROM_SERVERS, UNKNOWN, Message, decode, encode
 from nuno.validation import number
 
 logger = logging.getLogger(__name__)
 
 Fields = dict[str, Any]
+
+LOOK = 0.25
+"""[s] Between two looks at whether the other side is still there, at most."""
 
 
 class SentGoal:
@@ -100,8 +106,9 @@ class Connection:
         self._lost: ConnectionLostError | None = None
         self._closing = False
         self._lock = threading.Lock()  # of the tables above, against a connection that is lost meanwhile
+        self._link, self._nudge = self._connect(), Nudge()
         ready: Future[None] = Future()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._stay(ready)), name="nuno-wire", daemon=True)
+        self._thread = threading.Thread(target=self._stay, args=(ready,), name="nuno-wire", daemon=True)
         self._thread.start()
         ready.result()
 
@@ -128,8 +135,8 @@ class Connection:
     def close(self) -> None:
         """Disconnect; a second time does nothing."""
         self._closing = True
-        with suppress(RuntimeError):  # the loop has ended already
-            self._loop.call_soon_threadsafe(self._stop.set)
+        self._link.close(1000, "")
+        self._nudge.give()
         if threading.current_thread() is not self._thread:
             self._thread.join()
 
@@ -233,45 +240,68 @@ class Connection:
             ConnectionLostError: there is no connection any more.
         """
         self.check()
-        self._outbox.put(encode(message))
+        self._link.add(encode(message))
+        self._link.flush()
+        if self._link.wants_room:
+            self._nudge.give()
+
+    def _connect(self) -> Link:
+        """Return a link that has asked the other side for a websocket."""
+        try:
+            uri = self._websockets.parse_uri(self.url)
+            own = socket.create_connection((uri.host, uri.port), self.timeout)
+            try:
+                if uri.secure:
+                    own = ssl.create_default_context().wrap_socket(own, server_hostname=uri.host)
+                protocol = self._websockets.ClientProtocol(uri, max_size=self._max_message)
+                link = Link(own, protocol, self._alive, self.timeout)
+            except BaseException:
+                own.close()
+                raise
+        except (OSError, ValueError, self._websockets.WebSocketException) as error:
+            reason = f"no answer within {self.timeout:g} s" if isinstance(error, TimeoutError) else error
+            raise NotConnectedError(f"cannot connect to {self.url}: {reason}") from error
+        link.greet()
+        return link
 
     # In the connection's thread
 
-    async def _stay(self, ready: Future[None]) -> None:
-        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+    def _stay(self, ready: Future[None]) -> None:
+        reason, link = "this side failed", self._link
         try:
-            socket = await self._websockets.connect(
-                self.url, compression=None, max_size=self._max_message, open_timeout=self.timeout, close_timeout=1.0,
-                ping_interval=self._alive / 4, ping_timeout=self._alive, proxy=None,
-            )  # fmt: skip
-        except (OSError, ValueError, self._websockets.WebSocketException) as error:
-            reason = f"no answer within {self.timeout} s" if isinstance(error, TimeoutError) else error
-            ready.set_exception(NotConnectedError(f"cannot connect to {self.url}: {reason}"))
-            return
-        self._socket = socket
-        self._outbox = Outbox(self._loop, socket.send, socket.transport.abort)
-        ready.set_result(None)
-        reason = "this side failed"
-        try:
-            jobs = (self._outbox.run(), self._listen(socket), self._stop.wait())
-            tasks = [asyncio.create_task(job) for job in jobs]
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in tasks:
-                task.cancel()
-            ends = await asyncio.gather(*tasks, return_exceptions=True)
-            await socket.close()
-            reason = "it was closed here" if self._closing else _reason(socket, ends)
+            with selectors.DefaultSelector() as selector:
+                selector.register(self._nudge, selectors.EVENT_READ)
+                selector.register(link, selectors.EVENT_READ)
+                watched = selectors.EVENT_READ
+                while not link.is_over:
+                    wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if link.wants_room else 0)
+                    if wanted != watched:
+                        selector.modify(link, wanted)
+                        watched = wanted
+                    for key, _ in selector.select(min(LOOK, self._alive / 8)):
+                        if key.fileobj is self._nudge:
+                            self._nudge.take()
+                    link.flush()
+                    for data in link.read():
+                        self._hear(data)
+                    link.look(time.monotonic())
+                    if link.is_open and not ready.done():
+                        ready.set_result(None)
+            reason = "it was closed here" if self._closing else link.end
         finally:  # whatever happened, nobody is to wait for ever
             self._lose(reason)
+            if not ready.done():
+                ready.set_exception(NotConnectedError(f"cannot connect to {self.url}: {reason}"))
+            link.shut()
+            self._nudge.close()
 
-    async def _listen(self, socket: Any) -> None:
-        async for data in socket:
-            try:
-                self._take(decode(data, FROM_SERVERS))
-            except MessageError as error:
-                logger.warning("%s: %s", self.url, error)
-            except Exception:
-                logger.exception("what was called with a message of %s raised", self.url)
+    def _hear(self, data: bytes) -> None:
+        try:
+            self._take(decode(data, FROM_SERVERS))
+        except MessageError as error:
+            logger.warning("%s: %s", self.url, error)
+        except Exception:
+            logger.exception("what was called with a message of %s raised", self.url)
 
     def _take(self, message: Message) -> None:
         op, identity = message["op"], message.get("id")
@@ -309,14 +339,3 @@ class Connection:
             self._pending, self._goals = {}, {}
         for future in waiting:
             future.set_exception(ConnectionLostError(str(self._lost)))
-
-
-def _reason(socket: Any, ends: list[Any]) -> str:
-    """Return why a websocket has ended, as far as either side said."""
-    for end in ends:
-        sent = getattr(end, "sent", None)
-        if getattr(end, "rcvd", None) is None and sent is not None:
-            return f"given up, code {sent.code}, {sent.reason}"
-    if socket.close_code in (None, 1006):
-        return "the other side went away without a word"
-    return f"the other side closed it, code {socket.close_code}{socket.close_reason and ', '}{socket.close_reason}"

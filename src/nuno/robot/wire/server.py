@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import logging
-import queue
 import threading
 import time
+from collections import deque
 from types import TracebackType
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import TICK
 from nuno.robot.wire import messages as ros
-from nuno.robot.wire.bridge import Bridge, Client
+from nuno.robot.wire.bridge import Bridge
+from nuno.robot.wire.bridge_client import UNANSWERED, Client
 from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import ADVANCE, CLOCK_KIND, RUNNING, STEPPED, Names
@@ -29,7 +30,7 @@ OFTEN = 0.004
 STALE = 0.5
 """[s] Of the robot's time, at most, between two publications."""
 YIELD = 1e-5
-"""[s] In which the threads that send and receive get their turn, though the simulation is late."""
+"""[s] In which a program that wants the robot's lock gets its turn, though the simulation is late."""
 LATE = 0.25
 """[s] A simulation that is later than this behind real time gives the lost time up."""
 LONGEST = 3600.0
@@ -80,7 +81,7 @@ class RobotServer:
         self.tick = own if tick is None else number("tick", tick, above=0.0)
         self.robot, self.lock = robot, threading.RLock()
         self.error: Exception | None = None
-        self._inbox: queue.SimpleQueue[tuple[Client, Message | None] | None] = queue.SimpleQueue()
+        self._inbox: deque[tuple[Client, Message | None] | None] = deque()
         self._waiting: list[tuple[Client, Message, float]] = []
         alive = number("alive", alive, above=0.0)
         self._bridge = Bridge(self._receive, self._left, host, port, max_message, alive, origins)
@@ -119,7 +120,8 @@ class RobotServer:
 
     def close(self) -> None:
         """Stop what clients have asked for, disconnect them and end; a second time does nothing."""
-        self._inbox.put(None)
+        self._inbox.append(None)
+        self._bridge.wake()
         self._thread.join()
         self._bridge.close()
 
@@ -149,21 +151,25 @@ class RobotServer:
         self._thread = threading.Thread(target=self._run, name="nuno-server", daemon=True)
         self._thread.start()
 
-    # In the bridge's thread
+    # In the thread that watches the bridge's sockets: most often the server's own
 
     def _receive(self, client: Client, message: Message) -> None:
-        self._inbox.put((client, message))
+        self._inbox.append((client, message))
 
     def _left(self, client: Client) -> None:
-        self._inbox.put((client, None))
+        self._inbox.append((client, None))
 
     # In the server's own thread
 
     def _run(self) -> None:
         try:
             while self._listen():
-                with self.lock, self._bridge.together():
+                with self.lock:
                     self._tick()
+                if self._factor is not None and not self._commands.has_ended:  # a result comes after its last state
+                    self._catch_up()
+                with self.lock, self._bridge.together():
+                    self._tell()
             with self.lock:
                 self._commands.stop()
         except Exception as error:
@@ -173,17 +179,18 @@ class RobotServer:
 
     def _listen(self) -> bool:
         """Deal with what has come, and then with what comes until the next tick is due; returns whether to go on."""
-        present = self._inbox.qsize()
+        self._bridge.pump(0.0)
+        present = len(self._inbox)
         while True:
             left = self._due() - time.perf_counter()
             if present <= 0 and left <= 0.0:
                 time.sleep(YIELD)
                 return True
-            try:
-                got = self._inbox.get(timeout=None if present > 0 or left == float("inf") else left)
-            except queue.Empty:
-                return True
+            if not self._inbox:
+                self._bridge.pump(left)
+                continue
             present -= 1
+            got = self._inbox.popleft()
             if got is None:
                 return False
             self._deal(*got)
@@ -215,6 +222,18 @@ class RobotServer:
             self._next_tick = max(self._next_tick, time.perf_counter() - LATE) + span / self._factor
         if span > 0.0:
             self.robot.sleep(span)
+
+    def _catch_up(self) -> None:
+        """Deal with what has come meanwhile: nobody is to wait for all that is published as well."""
+        self._bridge.pump(0.0)
+        for _ in range(len(self._inbox)):
+            got = self._inbox[0]
+            if got is None:
+                return
+            self._inbox.popleft()
+            self._deal(*got)
+
+    def _tell(self) -> None:
         now, wall = self.robot.now(), time.perf_counter()
         old = wall - self._published[0] >= OFTEN or now - self._published[1] >= STALE
         if self._factor is None or old or self._commands.has_ended:
@@ -231,4 +250,6 @@ class RobotServer:
         span = ros.seconds(message.get("args"), "duration")
         if not 0.0 <= span <= LONGEST:
             raise MessageError(f"duration must lie in [0, {LONGEST:g}] s, got {span:g} s")
+        if sum(own is client for own, _, _ in self._waiting) >= UNANSWERED:
+            raise MessageError(f"a client may wait for {UNANSWERED} times at once, no more")
         self._waiting.append((client, message, self.robot.now() + span))
