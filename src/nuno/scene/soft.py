@@ -1,4 +1,4 @@
-"""A soft body's elements: tetrahedra, their rest shape, and the colours in which they are solved.
+"""A soft body's elements: tetrahedra, their rest shape, and the stars in which they are solved.
 
 Everything here depends on the rest shape alone; materials come in when a solver is made.
 """
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import MeshError
 from nuno.mesh.tetrahedra import boundary_faces
-from nuno.scene.colouring import by_colour, colour_first_fit
+from nuno.scene.stars import Stars, stars
 
 THINNEST = 1e-9
 """Least volume over the cube of the longest edge: below it, float32 has no digit of the volume left."""
@@ -23,8 +23,7 @@ THINNEST = 1e-9
 class SoftTopology:
     """Everything about a soft body that does not depend on its material or state.
 
-    Elements are kept in the order in which they were given, which is that of a material's values per element;
-    ``order`` sorts them by colour for the solver.
+    Elements are kept in the order in which they were given, which is that of a material's values per element.
 
     Attributes:
         rest: (n, 3) float64, rest shape [m].
@@ -33,8 +32,7 @@ class SoftTopology:
         inverse: (m, 3, 3) float64 [1/m], inverse of the matrix whose columns are the edges from the first vertex.
         fraction: (m,) float64, how much of each element is filled: scales its mass and stiffness.
         faces: (f, 3) int32, triangles of the boundary, counterclockwise from outside.
-        order: (m,) int, elements sorted by colour.
-        offsets: (colours + 1,) int32, where each colour starts in ``order``.
+        stars: The elements in groups, sorted by colour.
         cell_size: Smallest height of an element [m], between a vertex and the opposite face.
         extent: Longest straight line in the rest shape's bounding box [m].
     """
@@ -45,8 +43,7 @@ class SoftTopology:
     inverse: np.ndarray
     fraction: np.ndarray
     faces: np.ndarray
-    order: np.ndarray
-    offsets: np.ndarray
+    stars: Stars
     cell_size: float
     extent: float
     device_arrays: dict[Any, Any] = field(default_factory=dict, repr=False)
@@ -100,12 +97,10 @@ class SoftTopology:
         steepest = np.linalg.norm(shape_gradients(inverse), axis=2).max()
         # neighbours one after the other take fewer colours than elements in the order of some mesh
         along = np.lexsort(np.round(rest[corners].mean(axis=1) / np.cbrt(volume.mean()), 3).T)
-        colours = np.empty(len(corners), dtype=np.int64)
-        colours[along] = colour_first_fit(corners[along], len(rest))
-        order, offsets = by_colour(colours)
         return cls(
-            rest, corners.astype(np.int32), volume, inverse, share, boundary_faces(corners), order, offsets,
-            float(1.0 / steepest), float(np.linalg.norm(np.ptp(rest, axis=0))),
+            rest, corners.astype(np.int32), volume, inverse, share, boundary_faces(corners),
+            stars(corners, volume, along, len(rest)), float(1.0 / steepest),
+            float(np.linalg.norm(np.ptp(rest, axis=0))),
         )  # fmt: skip
 
     def masses(self, density: np.ndarray) -> np.ndarray:

@@ -1,8 +1,7 @@
-"""The tetrahedra by the threads of a CUDA block: each thread reads its next element while it works on one.
+"""The stars by the threads of a CUDA block: each thread reads which its next one is while it works on one.
 
-A colour of a body that fits a block has about as many elements as the block has threads, and all wait for each other
-before the next colour. Read only then, an element's numbers would come from far away in every colour anew; the reading
-takes longer than the arithmetic.
+A colour of a body that fits a block has about as many stars as the block has threads, and all wait for each other
+before the next colour. Read only then, a star's vertices would come from far away in every colour anew.
 """
 
 from typing import Any
@@ -10,64 +9,42 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.lanes import barrier
+from nuno.solver.soft_stars import damp_star, solve_star, stiffness
 from nuno.solver.soft_state import Tetrahedra
 from nuno.solver.state import DAMPING, Settings
-from nuno.solver.tetrahedron import solve_tetrahedron
-from nuno.solver.viscosity import damp_tetrahedron
 
 
-@wp.struct
-class Element:
-    """What the table has of one element: see `nuno.solver.tetrahedron.COLUMNS`."""
-
-    tet: wp.vec4i
-    m11: float
-    m22: float
-    m33: float
-    m12: float
-    m13: float
-    m23: float
-    inverse: float
-    filled: float
-    soft: int
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+int4 v = reinterpret_cast<const int4*>(corners.data)[i];
+return {v.x, v.y, v.z, v.w};
+#else
+return corners.data[i];
+#endif
+""")
+def four_corners(corners: wp.array(dtype=wp.vec4i), i: int) -> wp.vec4i:
+    """Element i, on CUDA by one instruction."""
+    ...
 
 
-@wp.func
-def read_element(table: Tetrahedra, first: int, last: int):
-    """Element ``first``, or an empty one from ``last`` on."""
-    e = Element()
-    if first < last:
-        n = table.rows
-        e.tet = table.tet[first]
-        e.m11 = table.number[first]
-        e.m22 = table.number[n + first]
-        e.m33 = table.number[2 * n + first]
-        e.m12 = table.number[3 * n + first]
-        e.m13 = table.number[4 * n + first]
-        e.m23 = table.number[5 * n + first]
-        e.inverse = table.number[6 * n + first]
-        e.filled = table.number[7 * n + first]
-        e.soft = table.soft[first]
-    return e
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+int2 v = reinterpret_cast<const int2*>(pairs.data)[i];
+return {v.x, v.y};
+#else
+return pairs.data[i];
+#endif
+""")
+def pair(pairs: wp.array(dtype=wp.vec2i), i: int) -> wp.vec2i:
+    """Element i, on CUDA by one instruction."""
+    ...
 
 
 @wp.func
-def solve_element(t: Any, e: Element, square: float, limit: float):
-    """One element's elasticity."""
-    mu = t.mu[e.soft] * square * e.filled
-    bulk = t.bulk[e.soft] * square * e.filled
-    solve_tetrahedron(
-        t, e.tet[0], e.tet[1], e.tet[2], e.tet[3], e.m11, e.m22, e.m33, e.m12, e.m13, e.m23, e.inverse, mu, bulk, limit
-    )
-
-
-@wp.func
-def damp_element(t: Any, e: Element, time: float):
-    """One element's viscosity."""
-    eta = t.mu[e.soft] * time * e.filled
-    damp_tetrahedron(
-        t, e.tet[0], e.tet[1], e.tet[2], e.tet[3], e.m11, e.m22, e.m33, e.m12, e.m13, e.m23, e.inverse, eta
-    )
+def read_star(table: Tetrahedra, k: int):
+    """The vertices of star k, and its shape; of the last star beyond it."""
+    i = wp.min(k, table.rows - 1)
+    return four_corners(table.inner, i), four_corners(table.outer, i), pair(table.shape, i)
 
 
 @wp.func
@@ -75,20 +52,26 @@ def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads
     """One pass over the tetrahedra's elasticity, as `nuno.solver.soft_frame.elastic`."""
     square = run.dt * run.dt
     limit = wp.min(table.speed * run.dt, 0.5 * table.height)
+    mu, bulk = stiffness(t, square)
     colours = table.colour.shape[0] - 1
     first = table.colour[0]
     last = table.colour[1]
-    ready = read_element(table, first + thread, last)
-    for c in range(colours):
-        now = ready
-        start = last
-        stop = table.colour[wp.min(c + 2, colours)]
-        ready = read_element(table, start + thread, stop)
-        if first + thread < last:
-            solve_element(t, now, square, limit)
-        for k in range(first + thread + threads, last, threads):
-            solve_element(t, read_element(table, k, last), square, limit)
-        first = start
+    inner, outer, shape = read_star(table, first + thread)
+    for colour in range(colours):
+        stop = table.colour[wp.min(colour + 2, colours)]
+        k = first + thread
+        if k >= last:
+            inner, outer, shape = read_star(table, last + thread)
+        while k < last:
+            p = inner
+            q = outer
+            now = shape
+            inner, outer, shape = read_star(table, wp.where(k + threads < last, k + threads, last + thread))
+            solve_star(
+                t, table, k, now[0], now[1], p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], square, mu, bulk, limit
+            )
+            k += threads
+        first = last
         last = stop
         barrier(threads)
 
@@ -97,19 +80,23 @@ def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads
 def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
     """One pass over the tetrahedra's viscosity, as `nuno.solver.soft_frame.viscous`."""
     time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
+    eta = t.mu[0] * time
     colours = table.colour.shape[0] - 1
     first = table.colour[0]
     last = table.colour[1]
-    ready = read_element(table, first + thread, last)
-    for c in range(colours):
-        now = ready
-        start = last
-        stop = table.colour[wp.min(c + 2, colours)]
-        ready = read_element(table, start + thread, stop)
-        if first + thread < last:
-            damp_element(t, now, time)
-        for k in range(first + thread + threads, last, threads):
-            damp_element(t, read_element(table, k, last), time)
-        first = start
+    inner, outer, shape = read_star(table, first + thread)
+    for colour in range(colours):
+        stop = table.colour[wp.min(colour + 2, colours)]
+        k = first + thread
+        if k >= last:
+            inner, outer, shape = read_star(table, last + thread)
+        while k < last:
+            p = inner
+            q = outer
+            now = shape
+            inner, outer, shape = read_star(table, wp.where(k + threads < last, k + threads, last + thread))
+            damp_star(t, table, k, now[0], now[1], p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], time, eta)
+            k += threads
+        first = last
         last = stop
         barrier(threads)

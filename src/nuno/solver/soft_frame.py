@@ -17,11 +17,10 @@ from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub
 from nuno.solver.shared import BLOCKS_AT_ONCE
 from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES, column, figures
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
+from nuno.solver.soft_stars import damp_star, shape_of, solve_star, stiffness
 from nuno.solver.soft_state import CRUMPLED, SEEN, SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra, view
 from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SCALARS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
-from nuno.solver.tetrahedron import entry, solve_tetrahedron
-from nuno.solver.vector import at, corner, scaled, spread
-from nuno.solver.viscosity import damp_tetrahedron
+from nuno.solver.vector import corner
 from nuno.solver.wide import as_lanes
 
 
@@ -34,57 +33,47 @@ def turn_notes(t: Any, thread: int):
 
 
 @wp.func
-def solve_tetrahedra(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The elasticity of the tetrahedra of one colour."""
-    n = table.rows
+def solve_stars(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The elasticity of the tetrahedra of one colour's stars."""
     square = run.dt * run.dt
     limit = wp.min(table.speed * run.dt, 0.5 * table.height)
+    mu, bulk = stiffness(t, square)
     for k in range(first + thread, last, threads):
-        which = table.soft[k]
-        filled = entry(table.number, k, 7, n)
-        a = corner(table.tet, k, 0, 4)
-        b = corner(table.tet, k, 1, 4)
-        c = corner(table.tet, k, 2, 4)
-        d = corner(table.tet, k, 3, 4)
-        m11 = entry(table.number, k, 0, n)
-        m22 = entry(table.number, k, 1, n)
-        m33 = entry(table.number, k, 2, n)
-        m12 = entry(table.number, k, 3, n)
-        m13 = entry(table.number, k, 4, n)
-        m23 = entry(table.number, k, 5, n)
-        inverse = entry(table.number, k, 6, n)
-        mu = scaled(at(t.mu, which) * square, filled)
-        bulk = scaled(at(t.bulk, which) * square, filled)
-        solve_tetrahedron(t, a, b, c, d, m11, m22, m33, m12, m13, m23, inverse, mu, bulk, limit)
+        a = corner(table.inner, k, 0, 4)
+        b = corner(table.inner, k, 1, 4)
+        c = corner(table.inner, k, 2, 4)
+        d = corner(table.inner, k, 3, 4)
+        e = corner(table.outer, k, 0, 4)
+        f = corner(table.outer, k, 1, 4)
+        g = corner(table.outer, k, 2, 4)
+        h = corner(table.outer, k, 3, 4)
+        row, count = shape_of(table, k)
+        solve_star(t, table, k, row, count, a, b, c, d, e, f, g, h, square, mu, bulk, limit)
 
 
 @wp.func
-def damp_tetrahedra(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The viscosity of the tetrahedra of one colour, over ``run.damped`` substeps."""
-    n = table.rows
+def damp_stars(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+    """The viscosity of the tetrahedra of one colour's stars, over ``run.damped`` substeps."""
     time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
+    eta = times(t.mu[0], time)
     for k in range(first + thread, last, threads):
-        mu = at(t.mu, table.soft[k])
-        eta = scaled(scaled(mu, spread(mu, time)), entry(table.number, k, 7, n))
-        a = corner(table.tet, k, 0, 4)
-        b = corner(table.tet, k, 1, 4)
-        c = corner(table.tet, k, 2, 4)
-        d = corner(table.tet, k, 3, 4)
-        m11 = entry(table.number, k, 0, n)
-        m22 = entry(table.number, k, 1, n)
-        m33 = entry(table.number, k, 2, n)
-        m12 = entry(table.number, k, 3, n)
-        m13 = entry(table.number, k, 4, n)
-        m23 = entry(table.number, k, 5, n)
-        inverse = entry(table.number, k, 6, n)
-        damp_tetrahedron(t, a, b, c, d, m11, m22, m33, m12, m13, m23, inverse, eta)
+        a = corner(table.inner, k, 0, 4)
+        b = corner(table.inner, k, 1, 4)
+        c = corner(table.inner, k, 2, 4)
+        d = corner(table.inner, k, 3, 4)
+        e = corner(table.outer, k, 0, 4)
+        f = corner(table.outer, k, 1, 4)
+        g = corner(table.outer, k, 2, 4)
+        h = corner(table.outer, k, 3, 4)
+        row, count = shape_of(table, k)
+        damp_star(t, table, k, row, count, a, b, c, d, e, f, g, h, time, eta)
 
 
 @wp.func
 def viscous(t: Any, table: Any, run: Settings, thread: int, threads: int):
     """One pass over the tetrahedra's viscosity, colour by colour."""
     for c in range(table.colour.shape[0] - 1):
-        damp_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
+        damp_stars(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
         barrier(threads)
 
 
@@ -94,14 +83,14 @@ def viscous(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads
         viscous_ahead(t, table, run, thread, threads)
     else:
         for c in range(table.colour.shape[0] - 1):
-            damp_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
+            damp_stars(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
 
 
 @wp.func
 def elastic(t: Any, table: Any, run: Settings, thread: int, threads: int):
     """One pass over the tetrahedra's elasticity, colour by colour, always in this order: at rest nothing moves."""
     for c in range(table.colour.shape[0] - 1):
-        solve_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
+        solve_stars(t, table, run, table.colour[c], table.colour[c + 1], thread, threads)
         barrier(threads)
 
 
@@ -111,7 +100,7 @@ def elastic(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads
         elastic_ahead(t, table, run, thread, threads)
     else:
         for c in range(table.colour.shape[0] - 1):
-            solve_tetrahedra(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
+            solve_stars(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
 
 
 @wp.func
@@ -234,13 +223,18 @@ def run_soft_wide(
             t.notes[SPEED] = largest(p.notes[SPEED])
 
 
+FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
+"""Threads of a block, and of one where worlds queue up for multiprocessors and have all but the substep's start in
+their memory, in which four worlds fit at once. A colour of such a body has about 128 stars: more threads would only
+wait for them. The bits are the same."""
+
 # quotients and roots as the processor has them: see `nuno.solver.shared`
 for _name in ("blocks", "blocks_partly", "few_partly", "blocks_shared", "few_shared"):
     wp.get_module(f"nuno.solver.run_soft_{_name}").options["fast_math"] = True
 
 
 @wp.kernel(
-    enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks"
+    enable_backward=False, launch_bounds=(FEW_THREADS, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks"
 )  # fmt: skip
 def run_soft_blocks(
     s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
@@ -334,7 +328,9 @@ def run_shared(
         outside.vz[i] = t.vz[i]
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_partly")
+@wp.kernel(
+    enable_backward=False, launch_bounds=(FEW_THREADS, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_partly"
+)
 def run_soft_blocks_partly(
     s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):
@@ -342,7 +338,7 @@ def run_soft_blocks_partly(
     run_partly(s, topo, size, run, shapes, substeps, wp.tid(), threads)
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_soft_few_partly")
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_soft_few_partly")
 def run_soft_few_partly(
     s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):
@@ -350,7 +346,9 @@ def run_soft_few_partly(
     run_partly(s, topo, size, run, shapes, substeps, wp.tid(), threads)
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, BLOCKS_AT_ONCE), module="nuno.solver.run_soft_blocks_shared")
+@wp.kernel(
+    enable_backward=False, launch_bounds=(MANY_THREADS, MANY_AT_ONCE), module="nuno.solver.run_soft_blocks_shared"
+)  # fmt: skip
 def run_soft_blocks_shared(
     s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):
@@ -358,7 +356,7 @@ def run_soft_blocks_shared(
     run_shared(s, topo, size, run, shapes, substeps, wp.tid(), threads)
 
 
-@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_soft_few_shared")
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_soft_few_shared")
 def run_soft_few_shared(
     s: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.scene.soft import SoftTopology, moduli, shape_gradients
+from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
+from nuno.scene.stars import ELEMENTS
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.solver.soft_frame import (
+    FEW_THREADS,
+    MANY_THREADS,
     run_soft_blocks,
     run_soft_blocks_partly,
     run_soft_blocks_shared,
@@ -32,13 +35,13 @@ from nuno.solver.tetrahedron import COLUMNS
 if TYPE_CHECKING:
     from nuno.materials import Soft
 
-BLOCK_THREADS = 256
-"""Threads of a CUDA block, which runs one world."""
 COLLAPSED = 1e-3
 """Width of a body, in cells, below which it is a line or a point, from where no force of its own leads back."""
 MOST_REPLY, MOST_BETWEEN = 0.7, 4
 """Viscosity works on every so many substeps (at most 4) that an element's reply to its own viscosity stays below 0.7 on
 average; smooth motions are then damped at 0.85 to 0.95 of the stated rate, and at 0.95 to 0.99 at half the reply."""
+DIGITS = 22
+"""Binary digits in which rest shapes that count as one agree: float32 has 24."""
 LOOSENING = 0.1
 """How far, in cells, a body that is a line or a point is shaken."""
 
@@ -131,42 +134,50 @@ class SoftSolver(ParticleSolver):
         self._allocate_particles()
 
     def _upload(self, shared: bool) -> Tetrahedra:
-        """The elements on the device, sorted by colour; ``shared`` where all have the same moduli."""
+        """The stars on the device, sorted by colour; ``shared`` where all elements have the same moduli."""
         topology, made = self.topology, Tetrahedra()
-        order = topology.order
-        inverse, volume = topology.inverse[order], topology.volume[order]
-        m = (inverse @ inverse.transpose(0, 2, 1) * volume[:, None, None]).reshape(-1, 9)
-        number = [*m[:, [0, 4, 8, 1, 2, 5]].T, 1.0 / (6.0 * volume), topology.fraction[order]]
+        stars = topology.stars
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
-            kind = np.float32 if dtype is float else np.int32
+            kind = np.float32 if dtype in (float, wp.vec4) else np.int32
             return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=self.device)
 
-        made.particles, made.rows = self.particle_count, len(order)
-        made.speed, made.height = self._speed, topology.cell_size
-        made.tet = put(topology.tets[order], wp.vec4i)
-        made.number = put(np.concatenate(number), float)
-        made.soft = put(np.zeros(len(order)) if shared else order, int)
-        made.colour = put(topology.offsets, int)
+        made.particles, made.rows = self.particle_count, len(stars.elements)
+        made.speed, made.height, made.differ = self._speed, topology.cell_size, int(not shared)
+        made.inner, made.outer = put(stars.vertices[:, :4], wp.vec4i), put(stars.vertices[:, 4:], wp.vec4i)
+        kinds, kind = rest_shapes(topology)
+        outer = (stars.elements >= 0).sum(axis=1) - 1
+        made.number = put(kinds.reshape(-1, 4), wp.vec4)
+        made.shape = put(np.column_stack([kind * ELEMENTS, outer]), wp.vec2i)
+        made.soft = put(np.zeros(1) if shared else np.maximum(stars.elements, 0).ravel(), int)
+        made.colour = put(stars.offsets, int)
         return made
 
     def _widen(self) -> WideTetrahedra:
-        """The elements by groups of sixteen; a group that would be short repeats its last element."""
+        """The stars by groups of sixteen; a group that would be short repeats its last star."""
         narrow, wide = self._topology, WideTetrahedra()
         rows, starts = [], [0]
-        for first, last in pairwise(self.topology.offsets.tolist()):
+        for first, last in pairwise(self.topology.stars.offsets.tolist()):
             count = -(-(last - first) // LANES)
             rows.append(np.minimum(first + np.arange(count * LANES), last - 1).reshape(count, LANES))
             starts.append(starts[-1] + count)
         table = np.concatenate(rows)
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
-            return wp.array(np.ascontiguousarray(values).reshape(-1, LANES), dtype=dtype, device="cpu")
+            """(rows, 16, k) as (rows * k) vectors."""
+            values = np.ascontiguousarray(values.reshape(len(table), LANES, -1).transpose(0, 2, 1))
+            return wp.array(values.reshape(-1, LANES), dtype=dtype, device="cpu")
 
-        wide.rows, wide.speed, wide.height = len(table), narrow.speed, narrow.height
-        wide.tet = put(narrow.tet.numpy()[table].transpose(0, 2, 1), lane_int)
-        wide.number = put(narrow.number.numpy().reshape(COLUMNS, -1)[:, table].transpose(1, 0, 2), lane)
-        wide.soft = put(narrow.soft.numpy()[table], lane_int)
+        wide.rows, wide.differ = len(table), narrow.differ
+        wide.speed, wide.height = narrow.speed, narrow.height
+        wide.inner, wide.outer = (put(a.numpy()[table], lane_int) for a in (narrow.inner, narrow.outer))
+        # an element that only others of the group have is one of zeros, which does nothing
+        first, outer = narrow.shape.numpy()[table].transpose(2, 0, 1)
+        wide.count = wp.array(outer.max(axis=1), dtype=int, device="cpu")
+        shapes = narrow.number.numpy().reshape(-1, ELEMENTS, COLUMNS)
+        wide.number = put(shapes[first // ELEMENTS], lane)
+        soft = narrow.soft.numpy().reshape(-1, ELEMENTS) if narrow.differ else np.zeros((narrow.rows, ELEMENTS), int)
+        wide.soft = put(soft[table].astype(np.int32), lane_int)
         wide.colour = wp.array(np.array(starts, np.int32), dtype=int, device="cpu")
         wide.scalars = wp.zeros(SCALARS, dtype=lane, device="cpu")
         wide.notes = wp.zeros(NOTES, dtype=lane, device="cpu")
@@ -175,9 +186,10 @@ class SoftSolver(ParticleSolver):
     def _advance(self, run: Settings, substeps: int) -> None:
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
+            kernel, threads = self._block_kernel()
             wp.launch(
-                self._block_kernel(), dim=self.group_count * BLOCK_THREADS,
-                inputs=[*common, substeps, BLOCK_THREADS], device=self.device, block_dim=BLOCK_THREADS,
+                kernel, dim=self.group_count * threads, inputs=[*common, substeps, threads], device=self.device,
+                block_dim=threads,
             )  # fmt: skip
         elif self.plan == "vector":
             if self._wide is None:
@@ -193,14 +205,37 @@ class SoftSolver(ParticleSolver):
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
-    def _block_kernel(self) -> Any:
-        """The kernel that has as much of a world in shared memory as fits, and of registers as there are."""
+    def _block_kernel(self) -> tuple[Any, int]:
+        """The kernel that has as much of a world in shared memory and registers as fits, and its threads."""
         if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
-            return run_soft_blocks
+            return run_soft_blocks, FEW_THREADS
         few = self.group_count <= wp.get_device(self.device).sm_count
         if self.particle_count > ROOMY_PARTICLES:
-            return run_soft_few_partly if few else run_soft_blocks_partly
-        return run_soft_few_shared if few else run_soft_blocks_shared
+            return (run_soft_few_partly if few else run_soft_blocks_partly), FEW_THREADS
+        return (run_soft_few_shared, FEW_THREADS) if few else (run_soft_blocks_shared, MANY_THREADS)
+
+
+def rest_shapes(topology: SoftTopology) -> tuple[np.ndarray, np.ndarray]:
+    """Return the different rest shapes of stars (k, 5, 8), `COLUMNS` of each element, and of which a star is, (s,).
+
+    The voxels of a lattice have the same numbers, which are then always near at hand. Those are alike that differ by
+    less than what float32 can tell.
+    """
+    stars = topology.stars
+    there = stars.elements >= 0
+    element = stars.elements[there]
+    inverse = np.linalg.inv(edge_matrices(topology.rest, stars.corners[there]))
+    volume = topology.volume[element]
+    products = (inverse @ inverse.transpose(0, 2, 1) * volume[:, None, None]).reshape(-1, 9)[:, [0, 4, 8, 1, 2, 5]]
+    numbers = np.zeros((*there.shape, COLUMNS))
+    numbers[there] = np.column_stack([products, 1.0 / (6.0 * volume), topology.fraction[element]])
+    # products have the size of the largest of a star, the rest their own
+    size = np.abs(numbers)
+    size[..., :6] = size[..., :6].max(axis=(1, 2), keepdims=True)
+    grain = np.exp2(np.ceil(np.log2(np.maximum(size, 1e-30))) - DIGITS)
+    rounded = (np.round(numbers / grain) * grain).reshape(len(numbers), -1)
+    _, first, kind = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    return numbers[first], kind.reshape(-1)
 
 
 def viscous_reply(topology: SoftTopology, viscosity: np.ndarray, inverse_mass: np.ndarray) -> float:

@@ -28,31 +28,43 @@ SoftLanes = _make("SoftLanes", lane, lane_int)
 """Sixteen worlds in the lanes of each element: batches on the CPU."""
 
 
+STAR = wp.constant(5)
+"""Elements that a star has room for: see `nuno.scene.stars`."""
+
+
 @wp.struct
 class Tetrahedra:
-    """A soft body's elements, the same in every world, sorted by colour.
+    """A soft body's elements, the same in every world, in stars that are sorted by colour.
 
-    ``number`` holds the columns of `nuno.solver.tetrahedron`; ``soft`` is which of a world's moduli an element has.
+    ``inner`` and ``outer`` are a star's vertices, ``shape`` where the ``number`` of its elements begin and how many
+    outer elements it has. Rest shapes are rows of `STAR` elements, two vectors of four columns of
+    `nuno.solver.tetrahedron` each. ``soft`` is which of a world's moduli an element has, where they ``differ``.
     """
 
     particles: int
     rows: int
+    differ: int
     speed: float
     height: float
-    tet: wp.array(dtype=wp.vec4i)
-    number: wp.array(dtype=float)
+    inner: wp.array(dtype=wp.vec4i)
+    outer: wp.array(dtype=wp.vec4i)
+    shape: wp.array(dtype=wp.vec2i)
+    number: wp.array(dtype=wp.vec4)
     soft: wp.array(dtype=int)
     colour: wp.array(dtype=int)
 
 
 @wp.struct
 class WideTetrahedra:
-    """The same by groups of sixteen, and room for what all particles of a world have in common."""
+    """The same by groups of sixteen stars, and room for what all particles of a world have in common."""
 
     rows: int
+    differ: int
     speed: float
     height: float
-    tet: wp.array(dtype=lane_int)
+    inner: wp.array(dtype=lane_int)
+    outer: wp.array(dtype=lane_int)
+    count: wp.array(dtype=int)
     number: wp.array(dtype=lane)
     soft: wp.array(dtype=lane_int)
     colour: wp.array(dtype=int)

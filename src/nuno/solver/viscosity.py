@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.solver.lanes import add, fill, fused, lessened, most, mul, over, sub, times  # noqa: F401
 from nuno.solver.tetrahedron import add_dot, combine, dot
-from nuno.solver.vector import at, put, scaled
+from nuno.solver.vector import scaled
 
 SHARE, MOST = wp.constant(0.2), wp.constant(0.9)
 """An element's reply T to its own viscosity counts as 1 + 0.2 T: what the rest of the pass does not undo is half of
@@ -15,11 +15,34 @@ what the three directions of T have on average. Below 0.9 T an element would tur
 
 @wp.func
 def damp_tetrahedron(
-    t: Any,
-    a: Any,
-    b: Any,
-    c: Any,
-    d: Any,
+    ax: Any,
+    ay: Any,
+    az: Any,
+    bx: Any,
+    by: Any,
+    bz: Any,
+    cx: Any,
+    cy: Any,
+    cz: Any,
+    dx: Any,
+    dy: Any,
+    dz: Any,
+    vax: Any,
+    vay: Any,
+    vaz: Any,
+    vbx: Any,
+    vby: Any,
+    vbz: Any,
+    vcx: Any,
+    vcy: Any,
+    vcz: Any,
+    vdx: Any,
+    vdy: Any,
+    vdz: Any,
+    wa: Any,
+    wb: Any,
+    wc: Any,
+    wd: Any,
     m11: Any,
     m22: Any,
     m33: Any,
@@ -32,14 +55,38 @@ def damp_tetrahedron(
     """Viscous stress 2 mu tau E', E' the rate of Green's strain; forces v F (2 mu tau E') B^T on b, c and d.
 
     It works on velocities before a substep's forces come in, so that a body at rest under load stands where elasticity
-    alone puts it. The stress is symmetric: momentum and angular momentum stay.
+    alone puts it. The stress is symmetric: momentum and angular momentum stay. An element whose numbers are all zero
+    damps nothing.
 
     Args:
-        t: The state.
-        a: The element's first vertex.
-        b: Its second.
-        c: Its third.
-        d: Its fourth.
+        ax: Where the first vertex is, along x [m]; likewise the others.
+        ay: y.
+        az: z.
+        bx: x.
+        by: y.
+        bz: z.
+        cx: x.
+        cy: y.
+        cz: z.
+        dx: x.
+        dy: y.
+        dz: z.
+        vax: How fast the first vertex is, along x [m/s]; likewise the others.
+        vay: y.
+        vaz: z.
+        vbx: x.
+        vby: y.
+        vbz: z.
+        vcx: x.
+        vcy: y.
+        vcz: z.
+        vdx: x.
+        vdy: y.
+        vdz: z.
+        wa: Inverse mass of the first [1/kg]; likewise the others.
+        wb: Of the second.
+        wc: Of the third.
+        wd: Of the fourth.
         m11: Column 0 of the element's numbers (see `nuno.solver.tetrahedron.COLUMNS`), and so on.
         m22: Column 1.
         m33: Column 2.
@@ -48,31 +95,19 @@ def damp_tetrahedron(
         m23: Column 5.
         inverse: 1 / (6 v).
         eta: 2 mu tau dt times the filled fraction, tau the damping.
+
+    Returns:
+        How fast the vertices are then: x, y and z of the first, and so on [m/s].
     """
-    ax = at(t.x, a)
-    ay = at(t.y, a)
-    az = at(t.z, a)
-    ex = at(t.x, b) - ax
-    ey = at(t.y, b) - ay
-    ez = at(t.z, b) - az
-    fx = at(t.x, c) - ax
-    fy = at(t.y, c) - ay
-    fz = at(t.z, c) - az
-    gx = at(t.x, d) - ax
-    gy = at(t.y, d) - ay
-    gz = at(t.z, d) - az
-    vax = at(t.vx, a)
-    vay = at(t.vy, a)
-    vaz = at(t.vz, a)
-    vbx = at(t.vx, b)
-    vby = at(t.vy, b)
-    vbz = at(t.vz, b)
-    vcx = at(t.vx, c)
-    vcy = at(t.vy, c)
-    vcz = at(t.vz, c)
-    vdx = at(t.vx, d)
-    vdy = at(t.vy, d)
-    vdz = at(t.vz, d)
+    ex = bx - ax
+    ey = by - ay
+    ez = bz - az
+    fx = cx - ax
+    fy = cy - ay
+    fz = cz - az
+    gx = dx - ax
+    gy = dy - ay
+    gz = dz - az
     hx = vbx - vax
     hy = vby - vay
     hz = vbz - vaz
@@ -98,10 +133,6 @@ def damp_tetrahedron(
     q31 = fused(g13, m33, fused(g12, m23, scaled(g11, m13)))
     q32 = fused(g23, m33, fused(g22, m23, scaled(g12, m13)))
     q33 = fused(g33, m33, fused(g23, m23, scaled(g13, m13)))
-    wa = at(t.w, a)
-    wb = at(t.w, b)
-    wc = at(t.w, c)
-    wd = at(t.w, d)
     one = fill(ax, 1.0)
     # the trace of B^T S B, S the edges' scalar products, is |F|^2: a stretched element replies more
     stretched = (
@@ -129,15 +160,16 @@ def damp_tetrahedron(
     rbx, rby, rbz = combine(n11, n12, n13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     rcx, rcy, rcz = combine(n12, n22, n23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     rdx, rdy, rdz = combine(n13, n23, n33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    put(t.vx, a, fused(wa, rbx + rcx + rdx, vax))
-    put(t.vy, a, fused(wa, rby + rcy + rdy, vay))
-    put(t.vz, a, fused(wa, rbz + rcz + rdz, vaz))
-    put(t.vx, b, lessened(wb, rbx, vbx))
-    put(t.vy, b, lessened(wb, rby, vby))
-    put(t.vz, b, lessened(wb, rbz, vbz))
-    put(t.vx, c, lessened(wc, rcx, vcx))
-    put(t.vy, c, lessened(wc, rcy, vcy))
-    put(t.vz, c, lessened(wc, rcz, vcz))
-    put(t.vx, d, lessened(wd, rdx, vdx))
-    put(t.vy, d, lessened(wd, rdy, vdy))
-    put(t.vz, d, lessened(wd, rdz, vdz))
+    vax = fused(wa, rbx + rcx + rdx, vax)
+    vay = fused(wa, rby + rcy + rdy, vay)
+    vaz = fused(wa, rbz + rcz + rdz, vaz)
+    vbx = lessened(wb, rbx, vbx)
+    vby = lessened(wb, rby, vby)
+    vbz = lessened(wb, rbz, vbz)
+    vcx = lessened(wc, rcx, vcx)
+    vcy = lessened(wc, rcy, vcy)
+    vcz = lessened(wc, rcz, vcz)
+    vdx = lessened(wd, rdx, vdx)
+    vdy = lessened(wd, rdy, vdy)
+    vdz = lessened(wd, rdz, vdz)
+    return vax, vay, vaz, vbx, vby, vbz, vcx, vcy, vcz, vdx, vdy, vdz
