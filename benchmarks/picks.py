@@ -25,8 +25,9 @@ from nuno import NunoError, World, box, estimate_pick, plane, read_case, sheet
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
 from nuno.camera.table import Table
-from nuno.estimate.futures import Futures, score_futures, solver_of
+from nuno.estimate.futures import Futures, solver_of
 from nuno.estimate.hypotheses import Discretisation, Hypothesis
+from nuno.estimate.pick_sight import score_futures
 from nuno.estimate.similarity import Silhouette
 from nuno.materials import Cloth
 from nuno.path import Path as HandPath

@@ -46,6 +46,7 @@ class FreeFall:
 
     diverging = False
     self_contact = True
+    substeps = 1
 
     def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity, self.frame = np.array(gravity, dtype=np.float32), 1.0 / frame_rate
@@ -77,6 +78,9 @@ class FreeFall:
         """Take what ``save_state`` gave."""
         assert all(array.dtype == np.float32 for array in state.values())
         self.x, self.v = state["local"].copy(), state["velocities"].copy()
+
+    keep = save_state
+    put_back = load_state
 
     def set_colliders(self, colliders):
         """Take the colliders."""

@@ -32,6 +32,21 @@ def test_a_held_towel_reads_its_weight(compliance):
     np.testing.assert_allclose(mean_force(world, grips, 60), (0.0, 0.0, -weight), atol=0.01 * weight)
 
 
+def test_asking_for_contacts_changes_no_wrench():
+    """Promise of the interface: asking changes nothing, also of a towel that takes more substeps beside a soft cube."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.2, 0.2), (4, 4), position=(0.0, 0.0, 0.6)))
+    world.attach(towel, nuno.Cloth(area_density=0.3))
+    cube = world.add(nuno.soft_box((0.05, 0.05, 0.05), (2, 2, 2), position=(0.0, 0.0, 0.65)))
+    world.attach(cube, FOAM)
+    assert cube._dynamics.substeps > towel._dynamics.substeps
+    grip = world.grip(towel, [0], to=towel.vertices[0])
+    world.run(0.1)
+    before = grip.wrench
+    world.contacts(towel)
+    np.testing.assert_array_equal(grip.wrench, before)
+
+
 def test_a_grip_of_surface_points_bears_the_weight():
     """Equilibrium, of points that lie between the vertices."""
     world = nuno.World(device="cpu")

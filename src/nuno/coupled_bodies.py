@@ -10,7 +10,7 @@ import warp as wp
 from nuno import quaternion as quat
 from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
 from nuno.contact.coupled_ties import Holds, Ties
-from nuno.contact.shapes import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
+from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coordinates import compose
 from nuno.dynamics import ParticleDynamics
 from nuno.grip import Grip
@@ -38,6 +38,9 @@ class CoupledBodies:
         world: Whose they are.
         group: The bodies, in the world's order.
         ties: The grips that join them or hold rigid ones.
+
+    Attributes:
+        kept: Of each body, in which worlds (worlds,) bool the last frame is this group's.
     """
 
     def __init__(self, world: Simulation, group: list[Body], ties: tuple[Grip, ...]) -> None:
@@ -45,6 +48,7 @@ class CoupledBodies:
         self.particles = [body for body in group if isinstance(body._dynamics, ParticleDynamics)]
         self.rigid = [body for body in group if isinstance(body._dynamics, RigidDynamics)]
         self.bodies = [*self.particles, *self.rigid]
+        self.kept: dict[Body, np.ndarray] = {}
         self._dynamics: list[Any] = [body._dynamics for body in self.bodies]
         solvers = [body._dynamics.solver for body in self.particles]  # type: ignore[union-attr]
         scene = world._rigid
@@ -75,12 +79,27 @@ class CoupledBodies:
         rigid = self._world._rigid
         return same and (not self.rigid or (rigid is not None and rigid.solver.state.capacity == self._capacity))
 
-    def run_frame(self, time: float, duration: float, substeps: int) -> None:
-        """Advance by ``duration`` [s], at most a frame."""
+    def run_frame(
+        self, time: float, duration: float, substeps: int, party: dict[Body, np.ndarray], kept: dict[Body, np.ndarray]
+    ) -> None:
+        """Advance by ``duration`` [s], at most a frame.
+
+        Args:
+            time: The world's time [s].
+            duration: [s].
+            substeps: In how many substeps.
+            party: Of each body in each world (worlds,), the first of those that it goes with, in the group's numbers.
+            kept: See the attribute.
+        """
+        self.kept = kept
         self._lead_holds(time, duration)
         if self.rigid and self._world._rigid is not None:
             self.coupling.led = self._world._rigid.lead(self._world, time, duration)
-        self.coupling.run_frame(time, duration, substeps)
+        # the group's numbers are those of the world's order, the coupling's have rigid bodies last
+        number = np.empty(len(self.bodies), dtype=int)
+        number[[list(party).index(body) for body in self.bodies]] = np.arange(len(self.bodies))
+        first = number[np.stack([party[body] for body in self.bodies])]
+        self.coupling.run_frame(time, duration, substeps, first)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray] | None:
         """Force [N] and torque [N m] (worlds, 3) of a tie or hold over the last frame; None if it is not of these."""
@@ -106,7 +125,7 @@ class CoupledBodies:
             return []
         own, found = self.bodies.index(body), []
         for world, pair, point, normal, force in self.coupling.contacts():
-            if own in pair:
+            if own in pair and self.kept[body][world]:
                 sign = 1.0 if pair[0] == own else -1.0
                 other = self.bodies[pair[1] if pair[0] == own else pair[0]]
                 found.append((point, sign * normal, sign * force, other.name, world))
@@ -200,6 +219,8 @@ class CoupledBodies:
 
         ties.corners, ties.weights = put(corners, wp.vec4i, 4), put(weights, wp.vec4, 4)
         ties.slot, ties.point, ties.compliance = put(slots, int), put(points, wp.vec3, 3), put(compliance, float)
+        owners = np.repeat([self.bodies.index(grip.body) for grip in self._point_ties], self._tie_counts)
+        ties.body = wp.array(owners.astype(np.int32) if ties.count else np.zeros(1, np.int32), dtype=int, device=device)
         for name in ("pull", "total"):
             setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=wp.vec3, device=device))
         return ties
@@ -225,6 +246,8 @@ class CoupledBodies:
             for grip in self._frame_holds
         ]
         holds.slot = wp.array(np.array(slots or [0], np.int32), dtype=int, device=device)
+        owners = [self.bodies.index(grip.body) for grip in self._frame_holds]
+        holds.body = wp.array(np.array(owners or [0], np.int32), dtype=int, device=device)
         holds.leader = wp.array(np.array(leaders or [-1], np.int32), dtype=int, device=device)
         soft = [grip.compliance for grip in self._frame_holds] or [0.0]
         holds.compliance = wp.array(np.array(soft, np.float32), dtype=float, device=device)
@@ -251,9 +274,11 @@ class CoupledBodies:
             if grip._offsets is not None and grip.target is not None:
                 # a static leader: from where it led last to where it is now
                 goal = [np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(grip.target._pose(), grip._offsets)]
-                last = getattr(grip, "_last_pose", goal)
-                grip._last_pose = goal  # type: ignore[attr-defined]
-                poses: list[Any] = [last, goal]
+                now, before, last = getattr(grip, "_led", (-np.inf, goal, goal))
+                if now != time:  # a frame that it goes through twice starts in the same place
+                    before = last
+                grip._led = (time, before, goal)  # type: ignore[attr-defined]
+                poses: list[Any] = [before, goal]
             else:
                 poses = [spec.at(time), spec.at(time + duration)]
             leads = int(holds.leader.numpy()[k]) >= 0
@@ -263,7 +288,7 @@ class CoupledBodies:
                 if leads:
                     place[:, k, end] -= grip.target._dynamics.centre  # type: ignore[union-attr]
                 else:
-                    place[:, k, end] -= self.coupling.origin
+                    place[:, k, end] -= own.solver.origin
                 turn[:, k, end] = q
         device = str(self._world.device)
         holds.place.assign(wp.array(place.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=device))

@@ -90,6 +90,10 @@ class Dynamics:
         """Set the state that `state` gave."""
         raise NotImplementedError
 
+    def prepare(self, time: float, frame: float) -> None:
+        """Bring what acts on the body from ``time`` [s] on, once for each run or ``frame`` [s]."""
+        raise NotImplementedError
+
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether all numbers of the state are finite."""
         raise NotImplementedError
@@ -187,10 +191,13 @@ class ParticleDynamics(Dynamics):
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
             self._pushing = pushing
 
-    def run(self, time: float, duration: float, frame: float) -> None:
-        """Advance from ``time`` by ``duration`` [s], with the grips and pushes of that span."""
-        self.prepare(time, frame)
-        self.solver.run(time, duration)
+    def keep(self) -> Any:
+        """Return what `put_back` takes: as `state`, but where the solver has it."""
+        return self.solver.keep()
+
+    def put_back(self, kept: Any) -> None:
+        """Set the state that `keep` kept."""
+        self.solver.put_back(kept)
 
     def state(self) -> State:
         """Return copies of all that the next step depends on."""

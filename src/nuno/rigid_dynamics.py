@@ -13,7 +13,8 @@ from nuno.dynamics import Dynamics, State, check_material
 from nuno.materials import Rigid
 from nuno.mesh.mass_properties import mass_properties
 from nuno.scene.rigid_shape import RigidPart, rigid_shape
-from nuno.solver.rigid_solver import ENTRY, POINT, SAVED, RigidSolver
+from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED
+from nuno.solver.rigid_solver import RigidSolver
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -163,7 +164,7 @@ class RigidDynamics(Dynamics):
         values = material.resolved(world.world_count)
         self.mass, self.inertia, self.centre = _mass_of(body, material, values["density"][:, 0])
         place, turn = body._pose()
-        self.scene = world._rigid_scene(np.mean(place.reshape(-1, 3), axis=0))
+        self.scene = world._rigid_scene(place)
         self.solver = self.scene.solver
         self.slot = self.solver.add(
             self.parts, position=place + quat.rotate(turn, self.centre), quaternion=turn, mass=self.mass,
@@ -208,7 +209,7 @@ class RigidDynamics(Dynamics):
         )
         self.solver.set_velocity(self.slot, quat.rotate(turn, velocity), quat.rotate(turn, spin))
 
-    def prepare(self, time: float) -> None:
+    def prepare(self, time: float, frame: float) -> None:
         """Bring the pushes that act from ``time`` [s] on."""
         pushing = self.pushing(time)
         if pushing != self._pushing:

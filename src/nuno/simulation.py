@@ -241,16 +241,20 @@ class Simulation:
         return self._resting == before
 
     def _advance(
-        self, duration: float, end: float | None = None, each_frame: Callable[[float], None] | None = None
-    ) -> None:
-        """Advance everything, or leave the world as it was and raise; ``each_frame`` is as in ``World.run``."""
+        self, duration: float, end: float | None = None, look: Callable[[float], None] | None = None,
+        instants: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        """Advance everything, or leave the world as it was and raise.
+
+        ``look`` is called with the time [s] at each of ``instants`` (k,), or else at the end of each frame.
+        """
         start = self._time
         finish = start + duration if end is None else end
         for driver in self.drivers:
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
         self._rests = False
-        saved = [(d, d.state()) for d in moving.values() if isinstance(d, ParticleDynamics)]
+        saved = [(d, d.keep()) for d in moving.values() if isinstance(d, ParticleDynamics)]
         rigid = None if self._rigid is None else self._rigid.save()
         self._bring_colliders()
         try:
@@ -263,10 +267,10 @@ class Simulation:
             for stop in stops:
                 if moving:
                     self._schedule_led(now, stop - now)
-                if each_frame is None:
+                if look is None:
                     self._stepping.run(now, stop)
                 else:
-                    self._run_frames(now, stop, each_frame)
+                    self._run_looking(now, stop, look, instants)
                 now = stop
             for body, dynamics in moving.items():
                 finite = np.atleast_1d(dynamics.finite())
@@ -274,7 +278,7 @@ class Simulation:
                     raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
         except BaseException:
             for own, state in saved:
-                own.load_state(state)
+                own.put_back(state)
             if self._rigid is not None and rigid is not None:
                 self._rigid.load(rigid)
             for driver in self.drivers:
@@ -292,12 +296,21 @@ class Simulation:
         for watcher in tuple(self._watchers):
             watcher.seen()
 
-    def _run_frames(self, time: float, stop: float, each_frame: Callable[[float], None]) -> None:
-        """Advance from ``time`` to ``stop`` [s] frame by frame, telling the time after each."""
-        frame = 1.0 / self.frame_rate
-        ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
-        if not len(ends) or stop - ends[-1] > SOON:
-            ends = np.append(ends, stop)
-        for begin, end in zip([time, *ends[:-1]], ends, strict=True):
-            self._stepping.run(float(begin), float(end))
-            each_frame(float(end))
+    def _run_looking(
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None
+    ) -> None:
+        """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each."""
+        if instants is None:
+            frame = 1.0 / self.frame_rate
+            ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
+            if not len(ends) or stop - ends[-1] > SOON:
+                ends = np.append(ends, stop)
+        else:
+            ends = instants[(instants > time + SOON) & (instants < stop + SOON)]
+        now = time
+        for end in ends.tolist():
+            self._stepping.run(now, end)
+            look(end)
+            now = end
+        if stop - now > SOON:
+            self._stepping.run(now, stop)

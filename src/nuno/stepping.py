@@ -1,7 +1,9 @@
 """How a span of time is gone through: bodies that may touch go together, substep by substep, others by themselves.
 
 A body that is near no other is run as if it were alone, so that what happens elsewhere changes none of its bits.
-Which bodies are near is asked anew every frame, from their boxes as they may grow within it.
+Which bodies are near is asked anew every frame, and in every world of a batch by itself (`nuno.parties`). Where a body
+takes another number of substeps in some worlds than in others, it goes through the frame with each number, and each
+world keeps what comes of its own.
 """
 
 from __future__ import annotations
@@ -10,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.dynamics import SOON, Dynamics, ParticleDynamics
+from nuno.dynamics import SOON
+from nuno.frame_runs import FrameRuns
+from nuno.parties import Parties, find_parties
 from nuno.path import Path
 
 if TYPE_CHECKING:
@@ -18,10 +22,6 @@ if TYPE_CHECKING:
     from nuno.grip import Grip
     from nuno.simulation import Simulation
 
-GROWTH = 1.5
-"""Times its present speed that a body may have within a frame, besides what gravity adds."""
-SLACK = 0.02
-"""[m] What constraints may throw a particle within a frame."""
 KEPT = 16
 """Sets of bodies whose tables of contacts are kept."""
 
@@ -52,6 +52,7 @@ class Stepping:
             self._version = world._collider_version
         self.last = []
         if not self._may_meet(moving, rigid) and not (rigid and world._led_bodies()):
+            self._prepare(moving, time)
             self._run_apart(moving, time, stop - time)
             return
         now = time
@@ -59,23 +60,27 @@ class Stepping:
             # the same instants whether a span is gone through at once or in pieces
             duration = min(frame, stop - now)
             self.last = []
+            self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
 
     def _run_apart(self, moving: list[Body], time: float, duration: float) -> None:
-        frame = 1.0 / self._world.frame_rate
         slots = []
         for body in moving:
             dynamics: Any = body._dynamics
             if dynamics.is_rigid:
-                dynamics.prepare(time)
                 slots.append(dynamics.slot)
             else:
-                dynamics.run(time, duration, frame)
+                dynamics.solver.run(time, duration)
         if slots:
             scene = self._world._rigid
             assert scene is not None
             scene.solver.run(time, duration, [*slots, *scene.lead(self._world, time, duration)])
+
+    def _prepare(self, moving: list[Body], time: float) -> None:
+        """Bring what acts on each body; once, for that forgets where a leading body was before."""
+        for body in moving:
+            body._dynamics.prepare(time, 1.0 / self._world.frame_rate)  # type: ignore[union-attr]
 
     def _may_meet(self, moving: list[Body], rigid: list[Body]) -> bool:
         """Whether two bodies could touch that different solvers move, or any are tied."""
@@ -86,75 +91,44 @@ class Stepping:
         return any(rules.touch(a, b) for k, a in enumerate(particles) for b in (*particles[k + 1 :], *rigid))
 
     def _run_frame(self, moving: list[Body], time: float, duration: float) -> None:
-        alone: list[Body] = []
-        for group in self._groups(moving, duration):
-            held = any(grip.is_tie for body in group for grip in body._dynamics.grips)  # type: ignore[union-attr]
-            kinds = {body._dynamics.is_rigid for body in group}  # type: ignore[union-attr]
-            if not held and (len(group) == 1 or kinds == {True}):
-                alone += group
+        parties = find_parties(self._world, moving, duration)
+        counts = np.unique(parties.substeps)
+        runs = FrameRuns(self._world, [body for body, own in zip(moving, parties.substeps, strict=True) if np.ptp(own)])
+        for count in counts:
+            its = parties.substeps == count
+            kept = {body: own for body, own in zip(moving, its, strict=True) if own.any()}
+            runs.begin(kept)
+            self._run_with(moving, parties, int(count), kept, time, duration)
+            runs.end(kept)
+        runs.settle()
+
+    def _run_with(
+        self, moving: list[Body], parties: Parties, count: int, kept: dict[Body, np.ndarray], time: float,
+        duration: float,
+    ) -> None:  # fmt: skip
+        """Advance the bodies that take so many substeps in some world, which are kept in the worlds where they do."""
+        first, alone = parties.at(count), []
+        for group in _joined(first, [k for k, body in enumerate(moving) if body in kept]):
+            bodies = [moving[k] for k in group]
+            grips = [grip for body in bodies for grip in body._dynamics.grips]  # type: ignore[union-attr]
+            kinds = {body._dynamics.is_rigid for body in bodies}  # type: ignore[union-attr]
+            if not any(grip.is_tie for grip in grips) and (len(bodies) == 1 or kinds == {True}):
+                alone += bodies
             else:
-                self._run_together(group, time, duration)
+                party = np.searchsorted(group, first[group])
+                self._run_together(bodies, party, count, {body: kept[body] for body in bodies}, time, duration)
         self._run_apart(alone, time, duration)
 
-    def _groups(self, moving: list[Body], duration: float) -> list[list[Body]]:
-        """The bodies that may meet within ``duration`` [s], directly or by others between them, and those tied."""
-        low, high = zip(*(self._box(body, duration) for body in moving), strict=True)
-        lows, highs = np.stack(low), np.stack(high)  # (bodies, worlds, 3)
-        near = (lows[:, None] <= highs[None]).all(axis=-1) & (lows[None] <= highs[:, None]).all(axis=-1)
-        meet = near.any(axis=-1)
-        rules = self._world._rules
-        place = {body: k for k, body in enumerate(moving)}
-        root = list(range(len(moving)))
-
-        def find(k: int) -> int:
-            while root[k] != k:
-                root[k] = root[root[k]]
-                k = root[k]
-            return k
-
-        for a, b in zip(*np.nonzero(np.triu(meet, 1)), strict=True):
-            if find(a) != find(b) and rules.touch(moving[a], moving[b]):
-                root[max(find(a), find(b))] = min(find(a), find(b))
-        for body in moving:
-            for grip in body._dynamics.grips:  # type: ignore[union-attr]
-                if grip.is_tie and grip.target in place:
-                    a, b = find(place[body]), find(place[grip.target])
-                    root[max(a, b)] = min(a, b)
-        groups: dict[int, list[Body]] = {}
-        for k, body in enumerate(moving):
-            groups.setdefault(find(k), []).append(body)
-        return list(groups.values())
-
-    def _box(self, body: Body, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """The box (worlds, 3) that a body may reach within ``duration`` [s]: lower and upper corner."""
-        dynamics: Any = body._dynamics
-        fall = 0.5 * float(np.linalg.norm(self._world.gravity)) * duration**2
-        if dynamics.is_rigid:
-            middle, _ = dynamics.solver.pose(dynamics.slot)
-            velocity, spin = dynamics.solver.velocity(dynamics.slot)
-            radius = dynamics.radius
-            speed = np.linalg.norm(velocity, axis=-1) + np.linalg.norm(spin, axis=-1) * radius
-            grow = (radius + GROWTH * speed * duration + fall + SLACK)[:, None]
-            return middle - grow, middle + grow
-        positions = dynamics.solver.positions()
-        speed = np.linalg.norm(dynamics.solver.velocities(), axis=-1).max(axis=-1)
-        grow = (GROWTH * speed * duration + fall + SLACK + body.thickness)[:, None]
-        return positions.min(axis=1) - grow, positions.max(axis=1) + grow
-
-    def _run_together(self, group: list[Body], time: float, duration: float) -> None:
+    def _run_together(
+        self, group: list[Body], party: np.ndarray, substeps: int, kept: dict[Body, np.ndarray], time: float,
+        duration: float,
+    ) -> None:  # fmt: skip
         from nuno.solver.particle_solver import substeps_of
 
         world = self._world
         frame = 1.0 / world.frame_rate
-        dynamics: list[Dynamics] = [body._dynamics for body in group]  # type: ignore[misc]
-        substeps = max(each.substeps for each in dynamics)
         if duration < frame - SOON:
             substeps = substeps_of(duration, frame, substeps)
-        for each in dynamics:
-            if isinstance(each, ParticleDynamics):
-                each.prepare(time, frame)
-            else:
-                each.prepare(time)  # type: ignore[attr-defined]
         key = tuple(body.key for body in group)
         ties = tuple(grip for body in group for grip in body._dynamics.grips if grip.is_tie)  # type: ignore[union-attr]
         found = self._couplings.pop((key, ties), None)
@@ -165,7 +139,7 @@ class Stepping:
         while len(self._couplings) >= KEPT:
             self._couplings.pop(next(iter(self._couplings)))
         self._couplings[key, ties] = found
-        found.run_frame(time, duration, substeps)
+        found.run_frame(time, duration, substeps, dict(zip(group, party, strict=True)), kept)
         self.last.append(found)
 
     # -- what grips bear
@@ -175,8 +149,11 @@ class Stepping:
         worlds = self._world.world_count
         nothing = np.zeros((worlds, 3)), np.zeros((worlds, 3))
         if grip.is_tie:
-            told = (coupled.wrench(grip) for coupled in self.last)
-            return next((found for found in told if found is not None), nothing)
+            for coupled in self.last:
+                told = coupled.wrench(grip)
+                for sums, own in zip(nothing, told or (), strict=False):
+                    sums[coupled.kept[grip.body]] = own[coupled.kept[grip.body]]
+            return nothing
         dynamics: Any = grip.body._dynamics
         known = [other for other in dynamics.grips if not other.is_tie]
         if dynamics.grips_changed:
@@ -189,6 +166,26 @@ class Stepping:
         count = np.maximum(held.sum(axis=1, keepdims=True), 1)
         arms = np.where(held, now - np.where(held, now, 0.0).sum(axis=1, keepdims=True) / count, 0.0)
         return forces.sum(axis=1), np.cross(arms, forces).sum(axis=1)
+
+
+def _joined(first: np.ndarray, members: list[int]) -> list[list[int]]:
+    """Return the members that belong together in any world; first (bodies, worlds) is the first of each one's party."""
+    root = {k: k for k in members}
+
+    def find(k: int) -> int:
+        while root[k] != k:
+            root[k] = root[root[k]]
+            k = root[k]
+        return k
+
+    for k in members:
+        for other in np.unique(first[k]):
+            a, b = find(k), find(int(other))
+            root[max(a, b)] = min(a, b)
+    groups: dict[int, list[int]] = {}
+    for k in members:
+        groups.setdefault(find(k), []).append(k)
+    return list(groups.values())
 
 
 def _led(spec: Any, time: float, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Callable
-from contextlib import suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.background import Background
 from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
@@ -20,8 +15,7 @@ from nuno.grip import Grip, make_grip
 from nuno.materials import Material
 from nuno.motion import arrive, path_for
 from nuno.path import Path
-from nuno.progress import with_bar
-from nuno.simulation import CHUNK, SOON, Simulation
+from nuno.running import Running
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
 from nuno.tie import check_weld
 from nuno.validation import count, finite_array, number
@@ -31,7 +25,7 @@ if TYPE_CHECKING:
     from nuno.contact_points import ContactPoints
 
 
-class World(Simulation):
+class World(Running):
     """A room: static bodies, which cost nothing, and attached ones, which move.
 
     All methods may be called while the world runs in the background; they take effect between frames. Where a
@@ -46,18 +40,6 @@ class World(Simulation):
     Raises:
         InvalidInputError: a value that is not finite or out of range.
     """
-
-    def __enter__(self) -> World:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self.stop()
-        else:
-            with suppress(Exception):  # the error that ended the block is the one to see
-                self.stop()
 
     # Bodies
 
@@ -340,71 +322,6 @@ class World(Simulation):
                 positions = wp.array(dynamics.vertices(own), dtype=wp.vec3, device=self.device)
             return {"positions": positions, "velocities": velocities}
 
-    # Time
-
-    def step(self) -> None:
-        """Advance by one frame."""
-        self.run(1.0 / self.frame_rate)
-
-    def run(
-        self, seconds: float, progress: bool | None = None, *, each_frame: Callable[[float], None] | None = None
-    ) -> None:
-        """Advance by whole frames and a shorter last one; in the background, sleep until that time has come.
-
-        Args:
-            seconds: How long [s] of simulated time.
-            progress: Show a progress bar; None shows one in a terminal after two seconds.
-            each_frame: Called with the time [s] at the end of each frame. What is dynamic is as it is then; ``time``
-                and the bodies that follow paths go on some frames at a time only.
-
-        Raises:
-            BodyStateError: ``each_frame`` is given for a world that runs in the background.
-            SimulationDiverged: a state stopped being finite; the world keeps the last good one.
-        """
-        span = number("seconds", seconds, low=0.0)
-        with self._call():
-            begin = self._time
-        if self.is_running:
-            if each_frame is not None:
-                raise BodyStateError("a world that runs in the background tells no frames; stop it first")
-            self._wait_until(begin + span)
-            return
-        frames = span * self.frame_rate
-        chunk = min(CHUNK, math.gcd(*(watcher.frames for watcher in self._watchers)) or CHUNK)
-        chunk = 1 if self.drivers else chunk  # they are asked frame by frame
-        pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
-        ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
-        for end in with_bar(ends, "simulating", progress):
-            with self._call():
-                if end - self._time > SOON:  # less is no time: the same instant
-                    self._advance(end - self._time, end, each_frame)
-
-    def start(self, real_time_factor: float = 1.0) -> None:
-        """Run in the background, at ``real_time_factor`` times real time (``math.inf``: as fast as possible).
-
-        Raises:
-            BodyStateError: the world runs already.
-        """
-        with self._call():
-            if self.is_running:
-                raise BodyStateError("the world runs in the background already")
-            factor = math.inf if real_time_factor == math.inf else real_time_factor
-            if factor != math.inf:
-                factor = number("real_time_factor", factor, above=0.0)
-            self._background = Background(self, factor)
-
-    def stop(self) -> None:
-        """End the running in the background, after the frame it is in; nothing where it does not run.
-
-        Raises:
-            Exception: whatever ended it early, such as ``SimulationDiverged``.
-        """
-        background = self._background
-        if background is not None:
-            background.stop()
-        self._raise_background_error()
-        self._background = None
-
     # Snapshots
 
     def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
@@ -493,12 +410,3 @@ class World(Simulation):
 
         with self._call():
             return render.render_ids(self, camera)
-
-    def _wait_until(self, end: float) -> None:
-        while self._time < end - SOON:
-            background = self._background
-            self._raise_background_error()
-            if background is None or not background.alive:
-                return self.run(end - self._time)  # it was stopped while we slept
-            background.wait_for_frame()
-        return None

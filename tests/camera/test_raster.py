@@ -233,14 +233,6 @@ def test_region_is_a_cutout_of_the_whole_image():
     assert (part == whole[:, 21:54, 37:87]).all()
 
 
-def test_region_around_holds_all_points():
-    """A region around points holds their pixels; points behind the camera ask for the whole image."""
-    vertices, _ = _square(20.25, 30.75, 50.5, 40.5, 1.0)
-    assert Region.around(PLAIN, vertices, margin=1.0) == Region(19, 29, 34, 14)
-    assert Region.around(PLAIN, vertices * (1, 1, -1)) == Region.full(PLAIN)
-    assert Region.around(PLAIN, _square(-500, -500, -400, -400, 1.0)[0]) == Region(0, 0, 1, 1)
-
-
 def test_layers_hide_and_are_hidden():
     """What is drawn over a layer is seen where it is nearer; at equal depth the wanted body is."""
     layer = _draw(PLAIN, *_square(10, 10, 60, 60, 1.0), label=1)

@@ -9,8 +9,9 @@ from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate import kernels
-from nuno.estimate.futures import imagine_picks, score_futures
+from nuno.estimate.futures import imagine_picks
 from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.pick_sight import score_futures
 from nuno.estimate.similarity import Silhouette
 
 

@@ -10,8 +10,8 @@ import nuno
 from nuno import ImageError, InvalidInputError
 from nuno.camera import raster
 from nuno.camera.table import Table
-from nuno.estimate.futures import draw_futures, masks_of_turned
 from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.pick_sight import draw_futures, masks_of_turned
 from nuno.estimate.turns import turn
 
 TOP = 0.72  # [m] height of the table top

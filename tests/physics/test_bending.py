@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from elastica import cantilever, drop_over_reach, rigidity_ratio
+from scipy.integrate import solve_ivp
 from world_with import GRAVITY, attached
 
 import nuno
@@ -18,6 +19,22 @@ def test_the_master_curve_is_the_published_one():
     """Solved here against Peirce's rule: at G = 8 the chord falls by 41.5 degrees (Peirce 1930)."""
     assert np.degrees(np.arctan(drop_over_reach(8.0))) == pytest.approx(41.5, abs=0.05)  # as he rounds it
     assert drop_over_reach(0.1) == pytest.approx(0.1 / 8, rel=1e-3)  # small deflection G / 8, next order G^2
+
+
+@pytest.mark.parametrize("tip", [0.1, 0.8, 1.3, 1.5, 1.565])
+def test_the_master_curve_is_what_integration_from_the_tip_gives(tip):
+    """Another method: from a tip at an angle [rad], theta'' = -t cos(theta) is level at t^3 = G."""
+
+    def slope(t, y):
+        return [y[1], -t * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])]
+
+    def level(t, y):
+        return y[0]
+
+    level.terminal = True
+    found = solve_ivp(slope, (0.0, 100.0), [tip, 0.0, 0.0, 0.0], events=level, rtol=1e-10, atol=1e-12)
+    load, ratio = found.t[-1] ** 3, found.y[3, -1] / found.y[2, -1]
+    assert drop_over_reach(load) == pytest.approx(ratio, rel=1e-5)  # the accuracy asked of solve_bvp is 1e-8
 
 
 @pytest.mark.parametrize("along", ["warp", "weft"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from linear_solid import displacements
 from soft_with import GRAVITY, block, solver
 
 import nuno
@@ -25,16 +26,30 @@ def settled(friction, substeps=None, cells=10):
 def test_a_cube_under_its_own_weight():
     """Closed form: it loses rho g h^2 / (2 E) of its height and (1 - 2 nu) rho g h / (2 E) of its volume.
 
-    Linear elasticity on a smooth floor: 3.92 mm and 0.0078. A floor that grips keeps the lowest layer from widening,
-    which costs volume.
+    Linear elasticity on a smooth floor: 3.92 mm and 0.0078.
     """
     lower, volume = settled(0.0)
     # the strain of 4 % at the floor is not small: 3.85 mm and 0.0081 once converged; 24 substeps leave 2 and 7 % more
     assert lower == pytest.approx(1000 * GRAVITY * 0.2**2 / 1e5, rel=0.05)
     assert 1.0 - volume == pytest.approx(0.4 * 1000 * GRAVITY * 0.2 / 1e5, rel=0.15)
-    lower, volume = settled(0.5)
-    assert lower == pytest.approx(1000 * GRAVITY * 0.2**2 / 1e5, rel=0.1)
-    assert 0.989 < volume < 0.992
+
+
+def test_a_cube_on_a_floor_that_grips():
+    """Another method, linear elasticity on the same tetrahedra, their lowest vertices held: 3.65 mm and 0.0095.
+
+    The floor keeps the lowest layer from widening, which takes a fifth more of the volume than a smooth floor does.
+    """
+    body = block((0.2, 0.2, 0.2), (10, 10, 10))
+    x = body.rest
+    held = np.repeat(x[:, 2:] < -0.1 + 1e-9, 3, axis=1)
+    moved = displacements(x, body.tets, 5e4, 0.3, np.array([0.0, 0.0, -1000.0 * GRAVITY]), held)
+    expected = -moved[x[:, 2] > 0.1 - 1e-9, 2].mean()
+    lost = 1.0 - element_volumes(body, x + moved).sum() / body.volume.sum()
+    assert (expected, lost) == pytest.approx((3.65e-3, 0.0096), rel=0.01)  # by cells of 8 mm 3.69 mm and 0.0095
+    lower, volume = settled(0.5, 48)
+    # as on the smooth floor; 24 substeps leave 2 and 6 % more
+    assert lower == pytest.approx(expected, rel=0.03)
+    assert 1.0 - volume == pytest.approx(lost, rel=0.05)
 
 
 def test_more_substeps_come_nearer():
@@ -60,5 +75,6 @@ def test_slides_where_the_slope_is_steeper_than_friction(mu, ratio):
     if ratio < 1:
         assert abs(x1[0] - x0[0]) < 1e-6  # static friction: no creep
     else:
-        expected = GRAVITY * (np.sin(alpha) - mu * np.cos(alpha))
-        assert (v1[0] - v0[0]) / 0.6 == pytest.approx(expected, rel=0.05)  # as found 2 and 3 %, of a body that shakes
+        # found 0.2 to 1.3 % of the friction off (7 % of the acceleration), by the direction and the elements' order
+        friction = GRAVITY * np.sin(alpha) - (v1[0] - v0[0]) / 0.6
+        assert friction == pytest.approx(mu * GRAVITY * np.cos(alpha), rel=0.015)

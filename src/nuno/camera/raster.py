@@ -66,7 +66,7 @@ def _distort(x: float, y: float, v: View) -> wp.vec2:
 
 
 @wp.func
-def _project(p: wp.vec3, v: View) -> wp.vec2i:
+def project(p: wp.vec3, v: View) -> wp.vec2i:
     """Pixel of a point in the camera's frame, in steps of 1/256 px."""
     x = p[0] / p[2]
     y = p[1] / p[2]
@@ -101,9 +101,9 @@ def _owned(dx: wp.int64, dy: wp.int64) -> wp.int64:
 @wp.func
 def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
     """Draw one triangle that lies in front of the near plane (vertices in the camera's frame)."""
-    sa = _project(a, v)
-    sb = _project(b, v)
-    sc = _project(c, v)
+    sa = project(a, v)
+    sb = project(b, v)
+    sc = project(c, v)
     left = wp.max((wp.min(sa[0], wp.min(sb[0], sc[0])) + 255) >> 8, v.x0)
     right = wp.min(wp.max(sa[0], wp.max(sb[0], sc[0])) >> 8, v.x0 + v.width - 1)
     top = wp.max((wp.min(sa[1], wp.min(sb[1], sc[1])) + 255) >> 8, v.y0)

@@ -32,20 +32,6 @@ class Region:
         """The whole image of a camera."""
         return cls(0, 0, camera.width, camera.height)
 
-    @classmethod
-    def around(cls, camera: Camera, points: np.ndarray, *, margin: float = 2.0) -> "Region":
-        """The smallest rectangle that holds the pixels of all points (..., 3) [m], plus a margin [px].
-
-        The whole image if a point is behind the camera; one pixel if all points are beside the image.
-        """
-        pixels = camera.project(points).reshape(-1, 2)
-        if not len(pixels) or not np.isfinite(pixels).all():
-            return cls.full(camera)
-        size = (camera.width, camera.height)
-        low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, np.array(size) - 1).astype(int)
-        high = np.clip(np.ceil(pixels.max(axis=0) + margin), low, np.array(size) - 1).astype(int)
-        return cls(int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
-
     def check(self, camera: Camera) -> None:
         """Raise InvalidInputError unless the rectangle lies inside the camera's image."""
         if (

@@ -16,16 +16,8 @@ from nuno.contact.coupled_rows import (
     Particles,
     Rows,
 )
+from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SPHERE, distance_box, distance_cylinder, distance_round
 from nuno.contact.nearness import closest_on_edges
-from nuno.contact.shapes import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    SPHERE,
-    distance_box,
-    distance_cylinder,
-    distance_round,
-)
 from nuno.solver.rigid_body import RigidState, point_before
 
 
@@ -75,8 +67,8 @@ def part_distance(elements: Elements, part: int, x: wp.vec3):
 
 
 @wp.kernel(enable_backward=False, module="nuno.contact.coupled_geometry")
-def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, dt: float, reach: float):
-    """Weights, normal and distance of every row; ``reach`` [m] bounds what comes into contact in the substep."""
+def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, dt: float):
+    """Weights, normal and distance of every row."""
     world, k = wp.tid()
     if k >= wp.min(rows.count[world], rows.room):
         return
@@ -85,6 +77,7 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
     q = rows.corners[r]
     bodies = rows.bodies[r]
     apart = body_radius(elements, world, bodies[0]) + body_radius(elements, world, bodies[1])
+    reach = elements.reach[world * elements.bodies + bodies[0]]
     kind = rows.kind[r]
     gap = float(1.0e6)
     n = wp.vec3(0.0, 0.0, 1.0)

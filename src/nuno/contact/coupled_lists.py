@@ -44,6 +44,8 @@ class Elements:
     touch: wp.array(dtype=int)
     friction: wp.array(dtype=float)
     radius: wp.array(dtype=float)
+    party: wp.array(dtype=int)  # in each world, the first body of those that go together
+    reach: wp.array(dtype=float)  # in each world, what bounds how far a body's contacts come in a substep [m]
     solid: wp.array(dtype=int)  # by body, whether its triangles enclose it
     low: wp.array(dtype=wp.vec3)
     high: wp.array(dtype=wp.vec3)
@@ -112,9 +114,10 @@ def later(a: wp.vec4i, b: wp.vec4i):
 
 
 @wp.func
-def may_touch(elements: Elements, a: int, b: int):
-    """Whether two bodies touch at all."""
-    return elements.touch[a * elements.bodies + b] != 0
+def may_touch(elements: Elements, world: int, a: int, b: int):
+    """Whether two bodies touch at all, and go together in this world."""
+    together = elements.party[world * elements.bodies + a] == elements.party[world * elements.bodies + b]
+    return together and elements.touch[a * elements.bodies + b] != 0
 
 
 @wp.func
@@ -150,7 +153,7 @@ def list_vertex(
     while wp.bvh_query_next(query, hit):
         t = hit - world * elements.triangles
         other = elements.triangle_body[t]
-        if other != body and may_touch(elements, body, other):
+        if other != body and may_touch(elements, world, body, other):
             f = elements.triangle[t]
             add_row(
                 rows, world, VERTEX_TRIANGLE, wp.vec4i(i, f[0], f[1], f[2]), -1, -1, wp.vec2i(body, other), wp.vec3()
@@ -173,7 +176,7 @@ def list_edge(
     while wp.bvh_query_next(query, hit):
         t = hit - world * elements.triangles
         other = elements.triangle_body[t]
-        if other > body and may_touch(elements, body, other):
+        if other > body and may_touch(elements, world, body, other):
             edges = elements.triangle_edges[t]
             for c in range(3):
                 if edges[c] >= 0:
@@ -196,7 +199,7 @@ def list_parts(
     x = place(particles, world * particles.count + i)
     for part in range(elements.parts):
         other = elements.part_body[part]
-        if may_touch(elements, body, other):
+        if may_touch(elements, world, body, other):
             slot = elements.part_slot[part]
             centre = point_of(rigid, world * rigid.capacity + slot, elements.part_place[part])
             if wp.length(x - centre) < far + elements.part_radius[part]:
@@ -219,7 +222,7 @@ def list_point(
     while wp.bvh_query_next(query, hit):
         t = hit - world * elements.triangles
         other = elements.triangle_body[t]
-        if may_touch(elements, body, other):
+        if may_touch(elements, world, body, other):
             f = elements.triangle[t]
             if near_triangle(particles, world * particles.count, x, f, far):
                 corners = wp.vec4i(f[0], f[1], f[2], -1)

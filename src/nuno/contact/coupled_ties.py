@@ -17,6 +17,7 @@ class Ties:
     count: int
     corners: wp.array(dtype=wp.vec4i)  # (worlds * count), -1: none
     weights: wp.array(dtype=wp.vec4)
+    body: wp.array(dtype=int)  # (count), among the coupled bodies
     slot: wp.array(dtype=int)  # -1: none
     point: wp.array(dtype=wp.vec3)
     compliance: wp.array(dtype=float)  # (count) [m/N]
@@ -29,6 +30,7 @@ class Holds:
     """Rigid bodies whose frame follows another rigid body's, or key poses."""
 
     count: int
+    body: wp.array(dtype=int)  # (count), among the coupled bodies
     slot: wp.array(dtype=int)  # (count)
     leader: wp.array(dtype=int)  # (count), -1: the key poses
     compliance: wp.array(dtype=float)  # (count) [m/N], and over the square of 1 m [1/(N m)] for turns

@@ -8,18 +8,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.shapes import (
-    BOX,
-    COLUMNS,
-    LEAVE_SPEED,
-    PLANE,
-    SOLID_MESH,
-    SWIFT,
-    distance_solid,
-    press,
-    touch_shape,
-    way_in,
-)
+from nuno.contact.distances import BOX, PLANE, SOLID_MESH, distance_solid, way_in
+from nuno.contact.shapes import COLUMNS, LEAVE_SPEED, SWIFT, press, touch_shape
 from nuno.solver.state import FRICTION, ORIGIN, THICKNESS, Shapes
 
 

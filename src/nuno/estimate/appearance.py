@@ -20,6 +20,7 @@ pattern is blurred to `BLUR`: finer detail would ask for futures that are right 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -242,6 +243,13 @@ def compare_pattern(
     Returns:
         (worlds,) float, half the logarithm of the ratio of residuals; 0 or more says that the pattern does not fit.
     """
+    return begin_pattern(keys, positions, faces, uv, pattern)()
+
+
+def begin_pattern(
+    keys: wp.array, positions: wp.array, faces: wp.array, uv: np.ndarray, pattern: Pattern
+) -> Callable[[], np.ndarray]:
+    """Begin what `compare_pattern` does, and return a function that waits for the answer."""
     device, worlds, height = keys.device, keys.shape[0], keys.shape[1]
     region, camera = pattern.region, pattern.camera
     u, v = np.meshgrid(np.arange(region.width) + region.x0, np.arange(region.height) + region.y0)
@@ -261,7 +269,12 @@ def compare_pattern(
         ],
         outputs=sums,
     )  # fmt: skip
-    squares, products, plain_squares, plain_products, totals = (s.numpy().sum(axis=1, dtype=float) for s in sums)
+    return lambda: _unexplained([s.numpy().sum(axis=1, dtype=float) for s in sums], pattern)
+
+
+def _unexplained(sums: list[np.ndarray], pattern: Pattern) -> np.ndarray:
+    """Half the logarithm of the ratio of residuals (worlds,), from the sums over each world's pixels."""
+    squares, products, plain_squares, plain_products, totals = sums
     whole = pattern.weights.sum(dtype=float)
     missed = pattern.variance * np.maximum(1.0 - totals[:, 1] / whole, 0.0) + FLOOR
     left = [

@@ -17,8 +17,8 @@ from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.footage import FoldFootage, Footage
 from nuno.estimate.futures import LIFT_SECONDS, SETTLE_SECONDS, is_turned
 from nuno.estimate.hand_sight import disc
-from nuno.estimate.pick import HAND_MARGIN
 from nuno.estimate.pick_result import PickResult
+from nuno.estimate.seeing import HAND_MARGIN
 from nuno.materials import Cloth
 from nuno.path import Path
 from nuno.search.minimise import Minimum, minimise

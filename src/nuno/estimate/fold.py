@@ -6,8 +6,10 @@ The state that comes out tells what vision alone cannot see: which parts lie und
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -47,6 +49,8 @@ REACH = 0.01
 """[m] How far beyond its radius a hand takes hold: what a corner measured in an image, and a tracked hand, are off."""
 HAND_MARGIN = 1.0
 """[px] around a hand that count neither as cloth nor as background."""
+SEEING = 8
+"""Images that are looked at at once, at most: beyond that Python's lock is what they wait for."""
 LOW_AGREEMENT = 0.8
 """Overlap below which a frame is named in a warning."""
 REST_SPEED = 0.05
@@ -156,12 +160,9 @@ def replay_fold(
     held = np.array([[hand.holds_at(t) for hand in paths] for t in times])
     there = hands_seen(seen_images, camera, at, held, hand_radius, before, lying)
     real = dict(given)
-    for k in with_bar([k for k in seen_images if k not in given], "looking for the cloth", progress, "frame"):
-        if before is None or lying is None:
-            break
-        found = _segmented(seen_images[k], before, lying, camera, table, fold.at(times[[k]], 0)[0], warnings, k)
-        if found is not None:
-            real[k] = found
+    if before is not None and lying is not None:
+        looked_for = {k: fold.at(times[[k]], 0)[0] for k in seen_images if k not in given}
+        real |= _segmented(seen_images, before, lying, camera, table, looked_for, warnings, progress)
     seconds["segment"] = time.perf_counter() - clock
 
     clock = time.perf_counter()
@@ -289,15 +290,29 @@ def _hold_warnings(fold: ImaginedFold, reach: float) -> list[str]:
 
 
 def _segmented(
-    image: np.ndarray, before: np.ndarray, lying: np.ndarray, camera: Camera, table: Table, vertices: np.ndarray,
-    warnings: list[str], frame: int,
-) -> np.ndarray | None:  # fmt: skip
-    """The cloth in an image, near where a replay has it; None, with a warning, where none is found."""
-    try:
-        return segment_after(image, camera, table, before, lying, vertices.mean(axis=0), hand_radius=0.0)
-    except ClothNotFoundError as error:
-        warnings.append(f"frame {frame} is not compared: {error}")
-        return None
+    images: Mapping[int, np.ndarray], before: np.ndarray, lying: np.ndarray, camera: Camera, table: Table,
+    near: Mapping[int, np.ndarray], warnings: list[str], progress: bool | None,
+) -> dict[int, np.ndarray]:  # fmt: skip
+    """The cloth in images, by frame, near vertices (n, 3) [m] that a replay has; where there is none, a warning."""
+
+    def look(frame: int) -> np.ndarray | ClothNotFoundError:
+        at = near[frame].mean(axis=0)
+        try:
+            return segment_after(images[frame], camera, table, before, lying, at, hand_radius=0.0)
+        except ClothNotFoundError as error:
+            return error
+
+    found = {}
+    # each image by itself, on a thread a core: NumPy and OpenCV let others run meanwhile
+    with ThreadPoolExecutor(min(max(len(near), 1), len(os.sched_getaffinity(0)), SEEING)) as threads:
+        looking = {frame: threads.submit(look, frame) for frame in near}
+        for frame in with_bar(list(near), "looking for the cloth", progress, "frame"):
+            seen = looking[frame].result()
+            if isinstance(seen, ClothNotFoundError):
+                warnings.append(f"frame {frame} is not compared: {seen}")
+            else:
+                found[frame] = seen
+    return found
 
 
 def _around(camera: Camera, positions: np.ndarray, there: np.ndarray, radius: float) -> np.ndarray:

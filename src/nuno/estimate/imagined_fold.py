@@ -129,10 +129,9 @@ def imagine_fold(
         now = np.asarray(body.vertices)
         return now[None] if now.ndim == 2 else now
 
-    times, states = [begin], [vertices().astype(np.float32)]
-    step, frame = 1.0 / futures.frame_rate, 0
+    times, states = [begin], [vertices().astype(np.float32)[None]]
+    step, frame, now = 1.0 / futures.frame_rate, 0, begin
     while True:
-        now = begin + futures.time
         while active and active[0][0] <= now + SOON:
             active.pop(0)[1].release()
         while holds and holds[0][0] <= now + SOON:
@@ -150,13 +149,17 @@ def imagine_fold(
         if now >= end - SOON:
             break
         events = [b for b, _ in active] + [hold[0] for hold in holds]
-        goal = min([begin + (frame + 1) * step, end, *(t for t in events if t > now + SOON)])
-        futures.run(goal - now, progress=False)
-        if goal >= begin + (frame + 1) * step - SOON:
-            frame = math.floor((goal - begin) / step + 0.01)
-        times.append(goal)
-        states.append(vertices().astype(np.float32))
-    return ImaginedFold(futures, body, world, np.array(times), np.array(states), tuple(done))
+        stop = min([end, *(t for t in events if t > now + SOON)])
+        goals = []
+        while now < stop - SOON:
+            now = min(begin + (frame + 1) * step, stop)
+            if now >= begin + (frame + 1) * step - SOON:
+                frame = math.floor((now - begin) / step + 0.01)
+            goals.append(now)
+        found = futures.trace(body, np.array(goals) - begin)
+        times += goals
+        states.append(found.reshape(len(goals), len(materials), -1, 3))
+    return ImaginedFold(futures, body, world, np.array(times), np.concatenate(states), tuple(done))
 
 
 def _take(

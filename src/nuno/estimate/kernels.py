@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
 
-from nuno.camera import raster
+from nuno.camera import extent, raster
 from nuno.estimate import appearance, similarity
 from nuno.solver import pack
 from nuno.solver.frame import run_lanes
@@ -35,7 +35,8 @@ def compile_ahead(device: str) -> Callable[[], None]:
     if device != "cpu":
         return lambda: None
     wp.init()  # once, before threads do
-    modules = [run_lanes.module, *(wp.get_module(part.__name__) for part in (pack, raster, similarity, appearance))]
+    parts = (pack, extent, raster, similarity, appearance)
+    modules = [run_lanes.module, *(wp.get_module(part.__name__) for part in parts)]
     pool = ThreadPoolExecutor(THREADS, thread_name_prefix="nuno-compile")
     loading = [pool.submit(wp.load_module, module, device) for module in modules]
     pool.shutdown(wait=False)

@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
-from nuno.camera.segmentation import segment_after, segment_before
-from nuno.camera.table import Table
+from nuno.camera.segmentation import segment_before
+from nuno.camera.table import Table, table_margin
 from nuno.device import checked_device, found_device
-from nuno.errors import EstimationError, ImageError, InvalidInputError
-from nuno.estimate.appearance import find_pattern
-from nuno.estimate.futures import LIFT_SECONDS, imagine_picks, masks_of_turned, score_futures
+from nuno.errors import EstimationError, InvalidInputError
+from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
 from nuno.estimate.pick_result import PickResult
+from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, Comparison, rank
-from nuno.estimate.similarity import Silhouette
+from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
 from nuno.estimate.turns import TURNS, checked_turns
-from nuno.progress import with_bar
+from nuno.progress import with_bar, with_clock
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -37,12 +37,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-IMAGE_SCALE = 0.5
-"""Silhouettes are compared at half the image's resolution: edges are known to no better than a pixel or two."""
-TURNED_SCALE = 0.25
-"""Turned futures are compared at a quarter: they are right to a few degrees only, and it takes a third of the time."""
-HAND_MARGIN = 2
-"""[px] of the full image around the hand that count neither as cloth nor as background."""
+MOST_CANDIDATES = 1024
+"""Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
 
 
 def estimate_pick(
@@ -109,7 +105,8 @@ def estimate_pick(
         progress: Progress bar; None shows one on a terminal.
 
     Raises:
-        InvalidInputError: a value that cannot be used; the hand behind the camera or out of the image.
+        InvalidInputError: a value that cannot be used; the hand behind the camera, out of the image or under the
+            table; two images that are the same.
         ImageError: an image that cannot be read or is not of the camera's size.
         ClothNotFoundError: no cloth in an image.
         EstimationError: no candidate gave a finite future.
@@ -124,7 +121,7 @@ def estimate_pick(
         number("table_thickness", table_thickness, above=0.0),
     )
     hand_at = finite_array("hand", hand, (3,))
-    _check_hand(camera, hand_at)
+    _check_hand(camera, hand_at, table)
     labels, uv, grid = _candidates(candidates)
     number("rest_height", rest_height, above=0.0)
     number("lift_seconds", lift_seconds, above=0.0)
@@ -139,6 +136,8 @@ def estimate_pick(
 
     covered = None if hidden is None else check_mask(hidden, camera, "hidden")
     image_before, image_after = _image(before, camera, "before"), _image(after, camera, "after")
+    if image_before is not None and image_after is not None and np.array_equal(image_before, image_after):
+        raise InvalidInputError("the image after is the image before: nothing was picked up between them")
     wait_for_kernels = compile_ahead(device)
     seconds["read"] = time.perf_counter() - started
     clock = time.perf_counter()
@@ -150,24 +149,17 @@ def estimate_pick(
     if rectangle is None:
         assert mask_before is not None
         rectangle = fit_rectangle(mask_before, image_before, camera, table.height + rest_height)
-    if after_mask is None:
-        if image_after is None or image_before is None or mask_before is None:
-            raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
-        mask_after = segment_after(
-            image_after, camera, table, image_before, mask_before, hand_at, hand_radius=hand_radius, hidden=covered
-        )
-    else:
-        mask_after = check_mask(after_mask, camera, "after_mask")
-    ignored = _hidden(camera, hand_at, hand_radius)
-    if covered is not None:
-        ignored |= covered
-    small, real = _silhouette(mask_after, camera, ignored, IMAGE_SCALE)
-    coarse = _silhouette(mask_after, camera, ignored, TURNED_SCALE)
-    pattern = None
-    if score == "evidence" and image_before is not None and image_after is not None:
-        pattern = find_pattern(image_before, image_after, mask_after & ~ignored, rectangle, camera, hand_at)
+    if after_mask is None and (image_after is None or image_before is None or mask_before is None):
+        raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
+    wait_for_seen = begin_to_see(
+        image_before, image_after, mask_before,
+        None if after_mask is None else check_mask(after_mask, camera, "after_mask"),
+        camera=camera, table=table, rectangle=rectangle, hand=hand_at, hand_radius=hand_radius, hidden=covered,
+        with_pattern=score == "evidence", meanwhile=device != "cpu",
+    )  # fmt: skip
     seconds["see"] = time.perf_counter() - clock
-    wait_for_kernels()
+    with with_clock("compiling kernels, which are kept for later runs", progress):
+        wait_for_kernels()
 
     seconds["imagine"] = seconds["compare"] = 0.0
     comparisons: list[Comparison] = []
@@ -183,10 +175,16 @@ def estimate_pick(
         )  # fmt: skip
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
-        values = score_futures(futures, small, real, table, pattern=pattern, turns=angles, hand=hand_at, coarse=coarse)
+        seen = wait_for_seen()
+        seconds["see"] += time.perf_counter() - clock
+        clock = time.perf_counter()
+        values = score_futures(
+            futures, seen.camera, seen.silhouette, table, pattern=seen.pattern, turns=angles, hand=hand_at,
+            coarse=seen.coarse,
+        )  # fmt: skip
         comparisons.append(Comparison(
             chosen, angles, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
-            None if pattern is None else values["pattern"],
+            None if seen.pattern is None else values["pattern"],
         ))  # fmt: skip
         batches.append(futures)
         seconds["compare"] += time.perf_counter() - clock
@@ -195,14 +193,15 @@ def estimate_pick(
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
     clock = time.perf_counter()
     chosen_batch, best_index, best_turn = _most_alike(comparisons, score, int(ranked.order[0]))
-    masks = _masks(comparisons, batches, score, small, table, hand_at)
+    masks = _masks(comparisons, batches, score, seen.camera, table, hand_at)
     seconds["compare"] += time.perf_counter() - clock
     seconds["total"] = time.perf_counter() - started
     result = PickResult(
         labels=labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name,
         eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds,
         futures=batches[chosen_batch], best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
-        real=real, image_before=image_before, image_after=image_after, mask_before=mask_before, mask_after=mask_after,
+        real=seen.silhouette, image_before=image_before, image_after=image_after, mask_before=mask_before,
+        mask_after=seen.mask, seen_warnings=seen.warnings,
     )  # fmt: skip
     for warning in result.warnings:
         log.warning("%s", warning)
@@ -249,7 +248,7 @@ def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
     return float(a), float(b)
 
 
-def _check_hand(camera: Camera, hand: np.ndarray) -> None:
+def _check_hand(camera: Camera, hand: np.ndarray, table: Table) -> None:
     depth = float(camera.depth_of(hand))
     if depth <= 0:
         raise InvalidInputError(f"the hand at {hand.tolist()} m is {-depth:.3f} m behind the camera")
@@ -259,6 +258,8 @@ def _check_hand(camera: Camera, hand: np.ndarray) -> None:
             f"the hand at {hand.tolist()} m projects to pixel ({u:.0f}, {v:.0f}), far outside of the "
             f"{camera.width} x {camera.height} image"
         )
+    if hand[2] < table.height and (table.half_extents is None or float(table_margin(table, hand[:2])) > 0.0):
+        raise InvalidInputError(f"the hand at {hand.tolist()} m is below the table's top, z = {table.height:g} m")
 
 
 def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
@@ -267,31 +268,13 @@ def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int
         n, m = candidates
         if n < 2 or m < 2:
             raise InvalidInputError(f"a grid of candidates needs at least 2 x 2 points, got {n} x {m}")
+        if n * m > MOST_CANDIDATES:
+            raise InvalidInputError(f"a grid of candidates has at most {MOST_CANDIDATES} points, got {n} x {m}")
         ij = np.stack(np.meshgrid(np.arange(n), np.arange(m), indexing="ij"), axis=-1).reshape(-1, 2)
         return ij, ij / (n - 1, m - 1), (n, m)
     uv = finite_array("candidates", candidates, ("k", 2))
-    if len(uv) < 1 or uv.min() < 0 or uv.max() > 1:
-        raise InvalidInputError("candidates must be fractions (u, v) of the cloth's sides, each from 0 to 1")
+    if len(uv) > MOST_CANDIDATES or uv.min() < 0 or uv.max() > 1:
+        raise InvalidInputError(
+            f"candidates must be up to {MOST_CANDIDATES} fractions (u, v) of the cloth's sides, each from 0 to 1"
+        )
     return uv, uv, (2, 2)
-
-
-def _hidden(camera: Camera, hand: np.ndarray, radius: float) -> np.ndarray:
-    """(h, w) bool, the pixels that the hand may hide."""
-    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    centre = camera.project(hand)
-    reach = radius * max(camera.fx, camera.fy) / camera.depth_of(hand) + HAND_MARGIN
-    return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
-
-
-def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray, scale: float) -> tuple[Camera, Silhouette]:
-    """The camera and the real silhouette, without the hand's pixels, at a share of the image's resolution."""
-    import cv2
-
-    small = camera.scaled(scale)
-
-    def shrink(image: np.ndarray) -> np.ndarray:
-        return cv2.resize(image.astype(np.float32), (small.width, small.height), interpolation=cv2.INTER_AREA)
-
-    if not (mask & ~hidden).any():
-        raise ImageError("the mask after is empty but for the hand, so there is no silhouette to compare with")
-    return small, Silhouette(shrink(mask & ~hidden) >= 0.5, shrink(hidden) > 0.25)

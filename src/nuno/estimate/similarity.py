@@ -8,6 +8,7 @@ so they are exact in order: the same bits for a world alone and anywhere in a ba
 # mypy: disable-error-code="misc, index, attr-defined, operator, call-overload"
 # mypy: disable-error-code="assignment, arg-type, valid-type"
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -271,6 +272,13 @@ def score_masks(
     Raises:
         InvalidInputError: shapes or types do not fit.
     """
+    return begin_scores(keys, real, region=region, with_contour=with_contour)()
+
+
+def begin_scores(
+    keys: wp.array, real: Silhouette, *, region: Region | None = None, with_contour: bool = True
+) -> Callable[[], dict[str, np.ndarray]]:
+    """Begin what :func:`score_masks` does, and return a function that waits for the scores."""
     height, width = real.mask.shape
     region = Region(0, 0, width, height) if region is None else region
     keys = _keys(keys)
@@ -294,7 +302,7 @@ def score_masks(
             _real_to_simulated, dim=(worlds, len(real.contour)), device=device,
             inputs=[points, across, region.x0, region.y0, sums],
         )  # fmt: skip
-    return _from_sums(sums.numpy(), real, with_contour)
+    return lambda: _from_sums(sums.numpy(), real, with_contour)
 
 
 def _keys(masks: wp.array | np.ndarray) -> wp.array:

@@ -10,8 +10,9 @@ import numpy as np
 import warp as wp
 
 from nuno import quaternion as quat
+from nuno.contact.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
 from nuno.contact.led import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
-from nuno.contact.shapes import BOX, CAPSULE, COLUMNS, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
+from nuno.contact.shapes import COLUMNS
 from nuno.errors import BodyStateError
 from nuno.motion import Schedule, is_led
 from nuno.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere

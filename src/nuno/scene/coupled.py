@@ -34,7 +34,7 @@ class RigidPart:
     """A convex part of a rigid body, or a closed mesh.
 
     Attributes:
-        kind: BOX ... SOLID_MESH of `nuno.contact.shapes`.
+        kind: BOX ... SOLID_MESH of `nuno.contact.distances`.
         size: (3,) float [m], as in the tables of static shapes.
         place: (3,) float [m], in the frame of the centre of mass.
         turn: (4,) float, (w, x, y, z) in that frame.
@@ -134,6 +134,8 @@ def make_elements(
     for body, surface in enumerate(particles):
         radius[:, body] = surface.radius
     made.radius = put(radius.ravel(), float)
+    made.party = wp.zeros(worlds * bodies, dtype=int, device=device)
+    made.reach = wp.zeros(worlds * bodies, dtype=float, device=device)
     made.solid = put([*(surface.solid for surface in particles), *(False for _ in rigid)], int)
     made.low = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     made.high = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)

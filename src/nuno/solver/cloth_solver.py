@@ -30,6 +30,15 @@ if TYPE_CHECKING:
 SUSPECTS = 512
 """Pairs of elements that a warp that lists pairs can note at least: more than any two blocks of neighbouring vertices
 have."""
+PAIRS = 6, 16
+"""Room for candidates, vertex-triangle and edge-edge ones, for each vertex; those that do not fit are passed over.
+Crumpled cloths have under 3 and 8, two layers that lie on each other up to 7 and 14."""
+MORE = 4.0
+"""Times that room where memory allows: four layers have 15 and 43 candidates a vertex, many 20 and 56."""
+PAIR_BYTES = 32
+"""[B] A candidate's four vertices, among all and among those that are picked."""
+LISTS = 4.0e9
+"""[B] That the lists of all worlds may take together for this."""
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
@@ -139,10 +148,11 @@ class ClothSolver(ParticleSolver):
         elements = len(blocks.face), len(blocks.edge)
         # spheres of all elements, or on the CPU the room in which one world after the other is listed
         alone = not self._cuda and self.plan != "large"
-        room = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
-        size.middle = room if self.self_contact else 1
-        # candidates seen in crumpled cloths: under 3 a vertex (vertex-triangle) and 8 a vertex (edge-edge)
-        size.vertex_triangle, size.edge_edge = 6 * n + 64, 16 * n + 128
+        middle = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
+        size.middle = middle if self.self_contact else 1
+        least = self.world_count * n * sum(PAIRS) * PAIR_BYTES
+        room = int(min(max(LISTS / least, 1.0), MORE) * n)
+        size.vertex_triangle, size.edge_edge = PAIRS[0] * room + 64, PAIRS[1] * room + 128
         if size.near_blocks > 1:
             # the room in which a list is made: a queue of pairs of blocks, and each warp's suspects
             size.vertex_triangle = max(size.vertex_triangle, -(-size.near_blocks // 4))
@@ -158,19 +168,26 @@ class ClothSolver(ParticleSolver):
         state.bounds = empty(size.blocks, self._number)
         state.listed = empty(size.listed, self._number)
         state.middle = empty(size.middle, self._number)
-        state.vertex_triangle = empty(4 * size.vertex_triangle, self._integer)
-        state.edge_edge = empty(4 * size.edge_edge, self._integer)
+        state.vertex_triangle = self._list(4 * size.vertex_triangle)
+        state.edge_edge = self._list(4 * size.edge_edge)
         state.pair_count = empty(2, self._integer)
         if self.plan == "large":  # solves all listed pairs, which a whole device looks at in no time
             state.touch_triangle, state.touch_edge = state.vertex_triangle, state.edge_edge
             state.touch_count = state.pair_count
         else:
-            state.touch_triangle = empty(4 * size.vertex_triangle, self._integer)
-            state.touch_edge = empty(4 * size.edge_edge, self._integer)
+            state.touch_triangle = self._list(4 * size.vertex_triangle)
+            state.touch_edge = self._list(4 * size.edge_edge)
             state.touch_count = empty(2, self._integer)
         state.near_blocks = empty(size.near_blocks, self._integer)
         state.moved = empty(size.moved, int)
         self._allocate_help()
+
+    def _list(self, count: int) -> wp.array:
+        """Zeros, whole numbers, ``count`` a world or group of lanes; on the CPU they take memory once written to."""
+        if self._cuda:
+            return self._empty(count, self._integer)
+        shape = (self.group_count * count, self.lanes) if self.lanes > 1 else (self.group_count * count,)
+        return wp.array(np.zeros(shape, dtype=np.int32), dtype=self._integer, device=self.device, copy=False)
 
     def _allocate_help(self) -> None:
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""

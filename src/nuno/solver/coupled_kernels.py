@@ -29,7 +29,74 @@ class Layout:
     py: wp.array(dtype=float)
     pz: wp.array(dtype=float)
     w: wp.array(dtype=float)
-    offset: wp.array(dtype=wp.vec3)  # (worlds), from the coupled bodies' origin to the solver's
+    offset: wp.array(dtype=wp.vec3)  # (worlds), from the origin of the body's party to the solver's
+
+
+@wp.struct
+class Passing:
+    """How far the passes have come, by world and body: of a party, the first body's is that of all.
+
+    What goes together in a world ends its passes by itself, so that a party is what it is without the others.
+    """
+
+    bodies: int
+    many: int  # whether any world has more than one party
+    party: wp.array(dtype=int)
+    wrong: wp.array(dtype=float)  # the farthest from where it should be, of this pass [m]
+    done: wp.array(dtype=int)
+
+
+@wp.func
+def party_of(passing: Passing, world: int, body: int):
+    """Where the figures of a body's party are; none are kept where each world has one party."""
+    k = int(-1)
+    if passing.many != 0:
+        k = world * passing.bodies + passing.party[world * passing.bodies + body]
+    return k
+
+
+@wp.func
+def goes_on(passing: Passing, k: int):
+    """Whether a party's passes are not at their end."""
+    on = bool(True)
+    if k >= 0:
+        on = passing.done[k] == 0
+    return on
+
+
+@wp.func
+def note_wrong(passing: Passing, k: int, wrong: float, threads: int):
+    """Raise a party's largest distance."""
+    if k >= 0:
+        if wrong > passing.wrong[k]:
+            if threads > 1:
+                wp.atomic_max(passing.wrong, k, wrong)
+            else:
+                passing.wrong[k] = wrong
+
+
+@wp.func
+def begin_pass(passing: Passing, world: int, first: int, thread: int, threads: int):
+    """Forget distances; before the ``first`` pass of a substep all parties go on."""
+    if passing.many != 0:
+        for b in range(thread, passing.bodies, threads):
+            k = world * passing.bodies + b
+            passing.wrong[k] = 0.0
+            if first != 0:
+                passing.done[k] = 0
+        barrier(threads)
+
+
+@wp.func
+def end_pass(passing: Passing, world: int, thread: int, threads: int):
+    """End the passes of parties that are where they should be."""
+    if passing.many != 0:
+        barrier(threads)
+        for b in range(thread, passing.bodies, threads):
+            k = world * passing.bodies + b
+            if passing.wrong[k] < ENOUGH:
+                passing.done[k] = 1
+        barrier(threads)
 
 
 @wp.func
@@ -66,8 +133,8 @@ def scatter(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)
 
 @wp.kernel(enable_backward=False)
 def solve(
-    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, dt: float, fraction: float,
-    passes: int, threads: int,
+    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, passing: Passing, dt: float,
+    fraction: float, passes: int, threads: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: one after the other, or by many threads at once."""
     tid = wp.tid()
@@ -91,21 +158,36 @@ def solve(
     for k_pass in range(passes + LAST_PASSES):
         if done == 0:
             wrong = float(0.0)
+            begin_pass(passing, world, wp.where(k_pass == 0, 1, 0), thread, threads)
             for k in range(thread, count, threads):
                 r = rows.active[base + k]
-                if k_pass < passes:
-                    wrong = wp.max(wrong, push_row(particles, rigid, first, start, rows, r, threads))
-                wrong = wp.max(wrong, drag_row(particles, rigid, first, start, rows, r, threads))
+                party = party_of(passing, world, rows.bodies[r][0])
+                if goes_on(passing, party):
+                    off = float(0.0)
+                    if k_pass < passes:
+                        off = push_row(particles, rigid, first, start, rows, r, threads)
+                    off = wp.max(off, drag_row(particles, rigid, first, start, rows, r, threads))
+                    note_wrong(passing, party, off, threads)
+                    wrong = wp.max(wrong, off)
             barrier(threads)
             if threads > 1:
                 take_sums(particles, rigid, first, start, thread, threads)
                 barrier(threads)
             if thread == 0:
                 for k in range(ties.count):
-                    wrong = wp.max(wrong, project_tie(particles, rigid, ties, world, k, dt))
+                    party = party_of(passing, world, ties.body[k])
+                    if goes_on(passing, party):
+                        off = project_tie(particles, rigid, ties, world, k, dt)
+                        note_wrong(passing, party, off, threads)
+                        wrong = wp.max(wrong, off)
                 for k in range(holds.count):
-                    wrong = wp.max(wrong, project_hold(rigid, holds, world, k, dt, fraction))
+                    party = party_of(passing, world, holds.body[k])
+                    if goes_on(passing, party):
+                        off = project_hold(rigid, holds, world, k, dt, fraction)
+                        note_wrong(passing, party, off, threads)
+                        wrong = wp.max(wrong, off)
             barrier(threads)
+            end_pass(passing, world, thread, threads)
             if threads == 1 and wrong < ENOUGH:
                 done = 1
             if threads > 1:

@@ -12,7 +12,7 @@ from nuno.contact.coupled_geometry import measure_rows
 from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
 from nuno.contact.coupled_rows import Particles, Rows
 from nuno.contact.coupled_ties import Holds, Ties
-from nuno.solver.coupled_kernels import Layout, collect, scatter, solve
+from nuno.solver.coupled_kernels import Layout, Passing, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PULLS, SHAPES, SPEED, VELOCITIES
@@ -58,12 +58,14 @@ class Coupling:
         self.device, self.world_count = str(first.device), int(first.world_count)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._state = RigidState() if rigid is None else rigid.state
-        self.origin = solvers[0].origin if rigid is None else rigid.origin  # (worlds, 3) [m]
+        self._bodies = int(elements.bodies)
+        self._party = np.zeros((0, 0), dtype=int)
+        self._passing = Passing()
+        for name, kind in (("wrong", float), ("done", int)):
+            setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
+        firsts = np.cumsum([0, *(solver.particle_count for solver in self._solvers)])
+        self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
         self._layouts: list[Layout] = []
-        total = 0
-        for solver in self._solvers:
-            self._layouts.append(self._layout(solver, total))
-            total += solver.particle_count
         self._particles = self._room(total)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
         sizes = [solver._cell_size for solver in self._solvers]
@@ -104,33 +106,54 @@ class Coupling:
             setattr(rows, name, wp.zeros(worlds * room, dtype=dtype, device=self.device))
         return rows
 
-    def _layout(self, solver: ParticleSolver, first: int) -> Layout:
-        made = Layout()
-        made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, first
+    def _layout(self, k: int) -> Layout:
+        solver, made = self._solvers[k], Layout()
+        made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, self._firsts[k]
         for name in PARTICLE_ARRAYS:
             if not name.startswith("v"):
                 setattr(made, name, _floats(getattr(solver._state, name)))
-        offset = (solver.origin - self.origin).astype(np.float32)
+        offset = (solver.origin - self._origins[:, k]).astype(np.float32)
         made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
         return made
 
+    def _set_parties(self, party: np.ndarray) -> None:
+        """Take the first body of each one's party, (bodies, worlds) int, in this group's numbers."""
+        worlds, column = self.world_count, np.arange(self.world_count)
+        if not np.array_equal(party, self._party):
+            self._party = party.copy()
+            self._elements.party = wp.array(party.T.astype(np.int32).ravel(), dtype=int, device=self.device)
+            self._passing.bodies, self._passing.party = self._bodies, self._elements.party
+            self._passing.many = int((party != party[0]).any())
+        # what all places of a party are relative to: the rigid scene's where a rigid body is in it, which has no other
+        own = np.stack([solver.origin for solver in self._solvers] or [np.zeros((worlds, 3))])  # (solvers, worlds, 3)
+        self._origins = np.zeros((worlds, self._bodies, 3))
+        rigid = np.zeros(party.shape, dtype=bool)
+        rigid[party[len(self._solvers) :], column] = True
+        for k in range(self._bodies):
+            origin = own[np.minimum(party[k], len(own) - 1), column]
+            if self._rigid is not None:
+                origin = np.where(rigid[party[k], column][:, None], self._rigid.origin, origin)
+            self._origins[:, k] = origin
+
     # -- running
 
-    def run_frame(self, time: float, duration: float, substeps: int) -> None:
-        """Advance all bodies by ``duration`` [s] in ``substeps`` substeps."""
+    def run_frame(self, time: float, duration: float, substeps: int, party: np.ndarray) -> None:
+        """Advance all bodies by ``duration`` [s] in ``substeps`` substeps; see `_set_parties`."""
         dt = duration / substeps
-        for k, solver in enumerate(self._solvers):
+        for solver in self._solvers:
             solver.open(time, dt, substeps)
-            # a grip or a new state may have replaced what the layout names
-            self._layouts[k] = self._layout(solver, int(self._layouts[k].first))
+        self._set_parties(party)
+        # a grip or a new state may have replaced what a layout names
+        self._layouts = [self._layout(k) for k in range(len(self._solvers))]
         if self._rigid is not None:
             self._rigid.open(time, dt, [*self._slots, *self.led])
         for total in (self._ties.total, self.holds.total, self.holds.total_twist):
             total.zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
-        speed = QUICKER * self._speed() + 10.0 * duration + 0.1
-        reach = 2.0 * speed * dt
+        reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
+        self._elements.reach.assign(reaches.T.astype(np.float32).ravel())
+        reach = float(reaches.max())
         margin = max(min(self._margin, (1 + substeps / 3) * reach), 1.5 * reach)
         every = max(1, int((margin - reach) / reach))
         for k in range(substeps):
@@ -138,7 +161,7 @@ class Coupling:
                 solver.step_parts(k, MOTION | PULLS | LAYERS)
             if self._rigid is not None:
                 self._rigid.predict()
-            self._touch(k, every, margin, reach, dt, (k + 1) / substeps)
+            self._touch(k, every, margin, dt, (k + 1) / substeps)
             if self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
@@ -146,7 +169,7 @@ class Coupling:
             if self._rigid is not None:
                 self._rigid.finish()
 
-    def _touch(self, k: int, every: int, margin: float, reach: float, dt: float, fraction: float) -> None:
+    def _touch(self, k: int, every: int, margin: float, dt: float, fraction: float) -> None:
         worlds, particles, rows, elements = self.world_count, self._particles, self._rows, self._elements
 
         def go(kernel: Any, dim: Any, *inputs: Any) -> None:
@@ -159,11 +182,11 @@ class Coupling:
             rows = self._rows
         if self._listed:
             rows.active_count.zero_()
-            go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt, reach)
+            go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
         if self._listed or self._ties.count or self.holds.count:
             go(
-                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, dt, fraction,
-                PASSES if self._threads == 1 else PASSES_AT_ONCE, self._threads,
+                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self._passing, dt,
+                fraction, PASSES if self._threads == 1 else PASSES_AT_ONCE, self._threads,
             )  # fmt: skip
             for layout in self._layouts:
                 go(scatter, (worlds, layout.particles), layout, particles, self._start)
@@ -195,18 +218,19 @@ class Coupling:
                 return
             self._rows = self._row_room(self._listed + self._listed // 2)
 
-    def _speed(self) -> float:
-        """The largest speed of any particle or rigid body [m/s]."""
-        top = max((float(s._get(s._state.notes, NOTES)[:, SPEED].max()) for s in self._solvers), default=0.0)
-        top = float(np.sqrt(top))
-        if self._rigid is None:
-            return top
+    def _speeds(self) -> np.ndarray:
+        """The largest speed in each one's party, (bodies, worlds) [m/s]."""
+        own = [np.sqrt(s._get(s._state.notes, NOTES)[:, SPEED].astype(float)) for s in self._solvers]
+        if self._rigid is not None:
 
-        def sizes(array: wp.array) -> np.ndarray:
-            return np.linalg.norm(array.numpy().reshape(self.world_count, -1, 3)[:, self._slots], axis=-1)
+            def sizes(array: wp.array) -> np.ndarray:
+                return np.linalg.norm(array.numpy().reshape(self.world_count, -1, 3)[:, self._slots], axis=-1)
 
-        radius = self._rigid.rules.radius.numpy()[self._slots]
-        return max(top, float((sizes(self._state.velocity) + sizes(self._state.spin) * radius).max()))
+            radius = self._rigid.rules.radius.numpy()[self._slots]
+            own += list((sizes(self._state.velocity) + sizes(self._state.spin) * radius).T.astype(float))
+        most, column = np.zeros(self._party.shape), np.arange(self.world_count)
+        np.maximum.at(most, (self._party, column), np.array(own))
+        return most[self._party, column]
 
     # -- what the last frame took
 
@@ -227,7 +251,8 @@ class Coupling:
                     point = share @ place[world * particles.count + corners[r][ours]]
                     force = (push[r] * normal[r] + drag[r]).astype(float) * self._rate
                     pair = (int(bodies[r][0]), int(bodies[r][1]))
-                    found.append((world, pair, point + self.origin[world], normal[r].astype(float), force))
+                    point = point + self._origins[world, pair[0]]
+                    found.append((world, pair, point, normal[r].astype(float), force))
         return found
 
     def tie_forces(self) -> np.ndarray:

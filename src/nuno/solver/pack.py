@@ -1,7 +1,8 @@
-"""Small kernels between the solver's layout and the rest: positions for the renderer, the clock."""
+"""Small kernels between the solver's layout and the rest: positions for the renderer, the clock, what is finite."""
 
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from nuno.solver.lanes import lane
@@ -71,9 +72,44 @@ wp.overload(zero_clock, [wp.array(dtype=float), int, int])
 wp.overload(zero_clock, [wp.array(dtype=lane), int, int])
 
 
-def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str) -> wp.array:
-    """(worlds, n) array of vec3 [m] from a solver's state."""
-    out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
+# A module of its own: only CUDA asks it.
+@wp.kernel(enable_backward=False, module="nuno.solver.finite")
+def find_broken(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    vx: wp.array(dtype=float),
+    vy: wp.array(dtype=float),
+    vz: wp.array(dtype=float),
+    n: int,
+    broken: wp.array(dtype=int),
+):
+    """Note the worlds with a number that is not finite."""
+    world, i = wp.tid()
+    k = world * n + i
+    if not (
+        wp.isfinite(x[k])
+        and wp.isfinite(y[k])
+        and wp.isfinite(z[k])
+        and wp.isfinite(vx[k])
+        and wp.isfinite(vy[k])
+        and wp.isfinite(vz[k])
+    ):
+        broken[world] = 1
+
+
+def finite_worlds(state: Any, worlds: int, n: int, device: str) -> np.ndarray:
+    """(worlds,) bool: whether every position and velocity is finite, found on the device."""
+    broken = wp.zeros(worlds, dtype=int, device=device)
+    arrays = [getattr(state, name) for name in ("x", "y", "z", "vx", "vy", "vz")]
+    wp.launch(find_broken, dim=(worlds, n), inputs=[*arrays, n, broken], device=device)
+    return np.asarray(broken.numpy() == 0)
+
+
+def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None) -> wp.array:
+    """(worlds, n) array of vec3 [m] from a solver's state, or into ``out``."""
+    if out is None:
+        out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
     kernel, count = (pack_lanes, -(-worlds // lanes)) if lanes > 1 else (pack, worlds)
     wp.launch(kernel, dim=(count, n), inputs=[state.x, state.y, state.z, state.scalars, n, out], device=device)
     return out

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 MU = 15
 """Where a row of the table of static shapes has its friction, and that of the pair."""
+KEPT = ("x", "y", "z", "vx", "vy", "vz", "notes")
+"""What a run changes that the next one depends on."""
 GHOST = 2.0e-3
 """Share of its inverse mass that a stiffly held vertex has while constraints pull at it: enough that rounding is 0.1 %
 of a load in the mean of a frame, and too little to give way."""
@@ -87,7 +89,7 @@ class ParticleSolver:
 
     def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set the first state; nothing acts yet."""
-        self._last_dt = 1.0
+        self._last_dt: Any = 1.0  # of the last run [s], one or (worlds,)
         self.set_state(positions, velocities)
         self.set_colliders(None)
         self.set_grips(())
@@ -162,6 +164,10 @@ class ParticleSolver:
         s, n = self._state, self.particle_count
         return np.stack([self._get(a, n) for a in (s.vx, s.vy, s.vz)], axis=-1)
 
+    def velocities_apart(self) -> tuple[np.ndarray, ...]:
+        """The velocities' x, y and z, (worlds, n) float32 each [m/s]."""
+        return tuple(self._get(a, self.particle_count) for a in (self._state.vx, self._state.vy, self._state.vz))
+
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
         positions = np.asarray(positions, dtype=np.float64)
@@ -203,17 +209,33 @@ class ParticleSolver:
         if hasattr(self, "_grips"):
             self.set_grips(self._grips)
 
+    def keep(self) -> tuple[np.ndarray, list[wp.array]]:
+        """What `put_back` takes: the present state, copied on the device, which nobody waits for."""
+        return self._scalars[:, ORIGIN : ORIGIN + 3].copy(), [wp.clone(getattr(self._state, name)) for name in KEPT]
+
+    def put_back(self, kept: tuple[np.ndarray, list[wp.array]]) -> None:
+        """Set the state that `keep` kept, as `load_state` does what `save_state` gave then."""
+        for name, array in zip(KEPT, kept[1], strict=True):
+            wp.copy(getattr(self._state, name), array)
+        self.load_state({**self.save_state(), "origin": kept[0]})
+
     def finite(self) -> np.ndarray:
         """(worlds,) bool: whether every position and velocity is a finite number."""
+        from nuno.solver.pack import finite_worlds
+
         s, n = self._state, self.particle_count
+        if self._cuda:
+            return finite_worlds(s, self.world_count, n, self.device)
         arrays = (s.x, s.y, s.z, s.vx, s.vy, s.vz)
+        if all(np.isfinite(a.numpy()).all() for a in arrays):  # lanes beyond the last world repeat it
+            return np.ones(self.world_count, dtype=bool)
         return np.all([np.isfinite(self._get(a, n)).all(axis=1) for a in arrays], axis=0)
 
-    def positions_on_device(self) -> wp.array:
-        """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy."""
+    def positions_on_device(self, out: wp.array | None = None) -> wp.array:
+        """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy, into ``out`` if given."""
         from nuno.solver.pack import pack_positions
 
-        return pack_positions(self._state, self.world_count, self.particle_count, self.lanes, self.device)
+        return pack_positions(self._state, self.world_count, self.particle_count, self.lanes, self.device, out)
 
     @property
     def arrays(self) -> dict[str, wp.array]:
@@ -328,7 +350,8 @@ class ParticleSolver:
         self._grip_time = put(self._grip_times.ravel(), wp.float64)
         self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
         self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
-        self._grip_soft = np.array([e["compliance"] for e in entries] or [0.0])
+        self._grip_compliance = np.array([e["compliance"] for e in entries] or [0.0])
+        self._grip_soft: dict[float, wp.array] = {}
         self._forget_launches()
 
     def grip_forces(self) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -342,7 +365,7 @@ class ParticleSolver:
         worlds, rows = self.world_count, np.arange(self.world_count)[:, None]
         loads = self._get(self._state.grip_load, LOADS * max(1, self._grip_count)).astype(float)
         loads = loads.reshape(worlds, -1, LOADS)
-        forces = loads[..., :3] / np.maximum(loads[..., 3:], 1.0) / self._last_dt**2
+        forces = loads[..., :3] / np.maximum(loads[..., 3:], 1.0) / np.reshape(self._last_dt, (-1, 1, 1)) ** 2
         result, first = [], 0
         fixed = self._grip_fixed.numpy()
         for grip in self._grips:
@@ -361,7 +384,7 @@ class ParticleSolver:
             The shape's number in the table, the normals (worlds, n, 3) at the particles that it pushes, zero elsewhere,
             and the forces [N] on them, (worlds, n, 3).
         """
-        s, saved, loads = self._state, self.save_state(), wp.clone(self._state.grip_load)
+        s, saved, loads, last = self._state, self.save_state(), wp.clone(self._state.grip_load), self._last_dt
         dt = 1.0 / self.frame_rate / self.substeps
         self.open(time, dt, self.substeps)
         self.step_parts(0, MOTION | PULLS | LAYERS)
@@ -395,6 +418,7 @@ class ParticleSolver:
                 result.append((shape, np.divide(push, size, out=np.zeros_like(push), where=size > 0.0), forces))
         self.load_state(saved)
         wp.copy(s.grip_load, loads)
+        self._last_dt = last
         return result
 
     def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
@@ -453,7 +477,10 @@ class ParticleSolver:
         run.grip_start = wp.array([time], dtype=wp.float64, device=self.device)
         run.grip_time, run.step = self._grip_time, wp.float64(dt)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
-        run.grip_soft = wp.array(self._grip_soft / dt**2, dtype=float, device=self.device)
+        if dt not in self._grip_soft:  # all whole frames have the same
+            soft = self._grip_compliance / dt**2
+            self._grip_soft = {dt: wp.array(soft, dtype=float, device=self.device)}
+        run.grip_soft = self._grip_soft[dt]
         return run
 
     def _reset_clock(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,15 +11,11 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from nuno.contact.manifold import POINTS
-from nuno.contact.rigid_manifolds import COUNTS, LEFT, NOTES, OVERFLOW, Contacts
-from nuno.contact.rigid_pairs import Rules
+from nuno.contact.rigid_manifolds import COUNTS, LEFT, OVERFLOW
 from nuno.quaternion import rotate
 from nuno.scene.rigid_shape import RigidPart
-from nuno.solver.rigid_body import RigidState
+from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED, RigidArrays
 from nuno.solver.rigid_frame import RigidSettings, run_rigid
-from nuno.solver.rigid_parts import PartTable
-
-log = logging.getLogger(__name__)
 
 SUBSTEPS = 10
 """Substeps a frame: at 60 frames a second what rests moves under 1 um, and a sphere's roll is exact to 0.1 %."""
@@ -28,36 +23,14 @@ PASSES = 4
 """Passes over the velocities: with 2, a stack of ten boxes that stand askew sways by millimetres and goes on swaying;
 with 4
 it comes to rest."""
-ROW = 24
-"""Partners a part has room for at first; a box in a heap has up to 12 within reach."""
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 
 DYNAMIC, MOVED = 1, 2
 PHASES = {"all": 0, "predict": 1, "contacts": 2, "finish": 3}
 
-BODY = dict(
-    position=wp.vec3, rotation=wp.quat, position_before=wp.vec3, rotation_before=wp.quat, position_free=wp.vec3,
-    rotation_free=wp.quat, velocity=wp.vec3, spin=wp.vec3, force=wp.vec3, torque=wp.vec3, inverse_mass=float,
-    inertia=wp.mat33, inverse_inertia=wp.mat33, weight=float, give=wp.mat33,
-)  # fmt: skip
-"""Arrays of `RigidState` with a row for each body of each world."""
-SAVED = ("position", "rotation", "velocity", "spin", "force", "torque")
-ENTRY = dict(
-    partner=int, patch=int, count=int, frame=int, friction=float, bounce=float, normal=wp.vec3, clear=float,
-    margin=float, built_place=wp.vec3, built_turn=wp.quat,
-)  # fmt: skip
-"""Arrays of `Contacts` with a row for each pair, which last."""
-POINT = dict(local_a=wp.vec3, local_b=wp.vec3, force=wp.vec3)
-PASSING = dict(
-    normal_now=(wp.vec3, 1), tangent_now=(wp.vec3, 1), order=(int, 1), waiting=(int, 1), bounds=(int, 1),
-    height=(float, 1), arm_a=(wp.vec3, POINTS), arm_b=(wp.vec3, POINTS), mass=(wp.vec3, POINTS),
-    start=(wp.vec4, POINTS), aim=(float, POINTS),
-)  # fmt: skip
-"""Arrays of `Contacts` that every substep fills."""
 
-
-class RigidSolver:
+class RigidSolver(RigidArrays):
     """Rigid bodies that fall, touch, stick, slide, roll and bounce.
 
     A body has a slot. Static and kinematic bodies have one too, with no mass: they are what others meet. Arrays grow by
@@ -86,23 +59,16 @@ class RigidSolver:
         substeps: int | None = None,
         origin: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        self.world_count, self.device, self.frame_rate = int(world_count), str(device), float(frame_rate)
+        super().__init__(int(world_count), str(device))
+        self.frame_rate = float(frame_rate)
         self.gravity = np.asarray(gravity, dtype=float)
         self.substeps = int(substeps) if substeps else SUBSTEPS
         self.passes = PASSES
         self.origin = np.array(np.broadcast_to(np.asarray(origin, dtype=float), (self.world_count, 3)))
         self._cuda = self.device.startswith("cuda")
-        self.table = PartTable(self.device, self.world_count)
-        self.state, self.manifolds, self.rules = RigidState(), Contacts(), Rules()
         self.settings = RigidSettings()
-        self.part_rows: dict[int, list[int]] = {}
         self._mass: dict[int, np.ndarray] = {}
         self._loaded: dict[int, Mapping[str, np.ndarray]] = {}
-        self._roles = np.zeros(0, dtype=np.int32)
-        self.state.capacity, self.state.worlds = 0, self.world_count
-        self.manifolds.parts, self.manifolds.row = 0, ROW
-        self._grow_bodies(8)
-        self._grow_rows(self.table.parts.capacity, ROW)
         self.set_exceptions({})
         self._dt = 0.0
 
@@ -329,10 +295,6 @@ class RigidSolver:
             counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
             counts[:, LEFT] = left
 
-    def _lengthen_rows(self) -> None:
-        log.info("a part has more than %d others near by: making room for twice as many", self.manifolds.row)
-        self._grow_rows(self.manifolds.parts, 2 * self.manifolds.row)
-
     # Contacts
 
     def contacts_of(self, slot: int, world: int = 0) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
@@ -434,86 +396,6 @@ class RigidSolver:
                     partners = self.manifolds.partner.reshape(self._entry_shape("partner"))
                     partners[:, row, width:].fill_(-1)
                     shaped[:, row, width:].fill_(0)
-
-    # Arrays
-
-    def _entry_shape(self, name: str) -> tuple[int, ...]:
-        shape = (self.world_count, self.manifolds.parts, self.manifolds.row)
-        return (*shape, POINTS) if name in POINT else shape
-
-    def _entries(self, name: str) -> np.ndarray:
-        return getattr(self.manifolds, name).reshape(self._entry_shape(name)).numpy()
-
-    def _read(self, name: str, slot: int) -> np.ndarray:
-        array = getattr(self.state, name).reshape((self.world_count, self.state.capacity))
-        return array[:, slot].numpy()
-
-    def _write(self, name: str, slot: int, value: ArrayLike) -> None:
-        self._write_to(getattr(self.state, name), slot, value)
-
-    def _write_to(self, array: wp.array, slot: int, value: ArrayLike) -> None:
-        shape = (self.world_count, *getattr(array.dtype, "_shape_", ()))
-        values = np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=np.float32), shape))
-        array.reshape((self.world_count, self.state.capacity))[:, slot].assign(values)
-
-    def _put_slot(self, name: str, slot: int, value: Any) -> None:
-        getattr(self.rules, name)[slot : slot + 1].assign(np.array([value]))
-
-    def _forget_rows(self, rows: Sequence[int]) -> None:
-        """Drop the pairs in a part's own row, and those of others with it."""
-        partner = self.manifolds.partner
-        table = partner.numpy().reshape(self._entry_shape("partner")).copy()
-        count = self.manifolds.count.numpy().reshape(table.shape).copy()
-        gone = np.isin(table, list(rows))
-        gone[:, list(rows)] = True
-        table[gone], count[gone] = -1, 0
-        partner.assign(table.ravel())
-        self.manifolds.count.assign(count.ravel())
-        self._list_anew()
-
-    def _list_anew(self) -> None:
-        self.manifolds.notes.fill_(-1.0)
-
-    def _grow_bodies(self, capacity: int) -> None:
-        old, worlds = self.state.capacity, self.world_count
-        state, rules, manifolds = self.state, self.rules, self.manifolds
-        kinds: list[tuple[Any, str, Any]] = [(state, name, kind) for name, kind in BODY.items()]
-        kinds += [(rules, "friction", float), (rules, "bounce", float)]
-        kinds += [(manifolds, "listed_position", wp.vec3), (manifolds, "listed_rotation", wp.quat)]
-        kinds += [(manifolds, "winner", wp.uint64)]
-        for owner, name, kind in kinds:
-            wider = wp.zeros((worlds, capacity), dtype=kind, device=self.device)
-            if old:
-                wp.copy(wider[:, :old], getattr(owner, name).reshape((worlds, old)))
-            setattr(owner, name, wider.flatten())
-        for name, kind in (("radius", float), ("group", int), ("collides_with", int)):
-            wider = wp.zeros(capacity, dtype=kind, device=self.device)
-            if name == "radius":
-                wider.fill_(-1.0)
-            if old:
-                wp.copy(wider, getattr(rules, name), count=old)
-            setattr(rules, name, wider)
-        self._roles = np.pad(self._roles, (0, capacity - old))
-        state.active = wp.array(self._roles, dtype=int, device=self.device)
-        state.capacity = capacity
-
-    def _grow_rows(self, parts: int, row: int) -> None:
-        c, worlds = self.manifolds, self.world_count
-        old_parts, old_row = c.parts, c.row
-        for name, kind in (*ENTRY.items(), *POINT.items()):
-            shape: tuple[int, ...] = (worlds, parts, row, POINTS) if name in POINT else (worlds, parts, row)
-            wider = wp.zeros(shape, dtype=kind, device=self.device)
-            if name == "partner":
-                wider.fill_(-1)
-            if old_parts:
-                old = getattr(c, name).reshape((worlds, old_parts, old_row, *shape[3:]))
-                wp.copy(wider[:, :old_parts, :old_row], old)
-            setattr(c, name, wider.flatten())
-        for name, (kind, each) in PASSING.items():
-            setattr(c, name, wp.zeros(worlds * parts * row * each, dtype=kind, device=self.device))
-        c.counts = wp.zeros(worlds * COUNTS, dtype=int, device=self.device)
-        c.notes = wp.full(worlds * NOTES, -1.0, dtype=float, device=self.device)
-        c.parts, c.row = parts, row
 
 
 def _bits(mask: int) -> int:

@@ -1,0 +1,227 @@
+"""How far a point is from a shape, and in which direction: primitive shapes by formula, meshes by a query.
+
+Where the nearest surface is not the one that a point met first, its way, seen from the shape, is followed to where it
+went in.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import (  # noqa: F401
+    add,
+    choose,
+    fill,
+    lane,
+    least,
+    most,
+    mul,
+    over,
+    root,
+    size_of,
+    sub,
+    times,
+)
+from nuno.solver.state import Shapes
+
+BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH, HULL = range(8)
+
+FAR = wp.constant(1.0e6)
+"""[m] The distance of what is too far to matter."""
+MESH_DEPTH = wp.constant(0.05)
+"""[m] What starts deeper in a mesh stays there: a wider search would cost all that is near it, in every substep."""
+TRACE_STEPS = wp.constant(12)
+"""Steps to where a way enters a shape: one for a way straight in, 12 leave 3 % of one that comes in at 75 degrees."""
+
+
+@wp.func
+def distance_box(x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
+    """Signed distance and normal of a box of half sides a, b, c around the origin."""
+    qx = size_of(x) - a
+    qy = size_of(y) - b
+    qz = size_of(z) - c
+    zero = fill(x, 0.0)
+    one = fill(x, 1.0)
+    sx = choose(x, one, -one)
+    sy = choose(y, one, -one)
+    sz = choose(z, one, -one)
+    ox = most(qx, zero)
+    oy = most(qy, zero)
+    oz = most(qz, zero)
+    outside = root(times(ox, ox) + times(oy, oy) + times(oz, oz) + fill(x, 1.0e-24))
+    inside = most(qx, most(qy, qz))
+    # inside, the nearest face gives the normal
+    fz = choose(qz - most(qx, qy), one, zero)
+    fx = times(one - fz, choose(qx - qy, one, zero))
+    fy = one - fz - fx
+    nx = times(sx, choose(inside, over(ox, outside), fx))
+    ny = times(sy, choose(inside, over(oy, outside), fy))
+    nz = times(sz, choose(inside, over(oz, outside), fz))
+    return choose(inside, outside, inside), nx, ny, nz
+
+
+@wp.func
+def distance_cylinder(x: Any, y: Any, z: Any, r: Any, half: Any):
+    """Signed distance and normal of a cylinder of radius r along z, between -half and half."""
+    zero = fill(x, 0.0)
+    one = fill(x, 1.0)
+    rho = root(times(x, x) + times(y, y) + fill(x, 1.0e-24))
+    qr = rho - r
+    qz = size_of(z) - half
+    o = most(qr, zero)
+    oz = most(qz, zero)
+    outside = root(times(o, o) + times(oz, oz) + fill(x, 1.0e-24))
+    inside = most(qr, qz)
+    side = choose(qr - qz, one, zero)
+    nr = choose(inside, over(o, outside), side)
+    nz = times(choose(z, one, -one), choose(inside, over(oz, outside), one - side))
+    return choose(inside, outside, inside), times(nr, over(x, rho)), times(nr, over(y, rho)), nz
+
+
+@wp.func
+def distance_round(x: Any, y: Any, z: Any, r: Any, half: Any):
+    """Signed distance and normal of a capsule along z (half > 0) or a sphere (half = 0)."""
+    d = z - most(least(z, half), -half)
+    length = root(times(x, x) + times(y, y) + times(d, d) + fill(x, 1.0e-24))
+    return length - r, over(x, length), over(y, length), over(d, length)
+
+
+@wp.func
+def distance_solid(kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
+    """Signed distance and normal of a primitive shape of sizes a, b, c."""
+    gap = z
+    nx = fill(z, 0.0)
+    ny = fill(z, 0.0)
+    nz = fill(z, 1.0)
+    if kind == BOX:
+        gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
+    elif kind == CYLINDER:
+        gap, nx, ny, nz = distance_cylinder(x, y, z, a, b)
+    elif kind == SPHERE or kind == CAPSULE:
+        gap, nx, ny, nz = distance_round(x, y, z, a, b)
+    return gap, nx, ny, nz
+
+
+@wp.func
+def way_in(kind: int, x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, a: Any, b: Any, c: Any):
+    """Where a way of the substep that ends at x, y, z and is u long enters a convex shape.
+
+    Returns:
+        The distance of x, y, z from the plane that touches the shape there, its normal, and whether the way enters
+        at all (positive). A way that starts inside enters at the side that is nearest to its start.
+    """
+    one = fill(x, 1.0)
+    zero = fill(x, 0.0)
+    length = root(times(ux, ux) + times(uy, uy) + times(uz, uz) + fill(x, 1.0e-24))
+    part = fill(x, 0.0)  # of the way, from its start
+    gap = zero
+    nx = zero
+    ny = zero
+    nz = one
+    steps = int(TRACE_STEPS)
+    for _k in range(steps):
+        # the shape is at least as far away as its distance says: go that far
+        part = least(part + over(most(gap, zero), length), one)
+        rest = one - part
+        gap, nx, ny, nz = distance_solid(kind, x - times(rest, ux), y - times(rest, uy), z - times(rest, uz), a, b, c)
+    rest = one - part
+    beyond = times(rest, times(ux, nx) + times(uy, ny) + times(uz, nz))
+    return gap + beyond, nx, ny, nz, rest
+
+
+@wp.func
+def mesh_gap(mesh: wp.uint64, kind: int, q: wp.vec3, u: wp.vec3, half: wp.vec3, radius: float):
+    """Distance and normal (4 numbers) from a triangle mesh of a point that came to ``q`` by ``u``, in its frame.
+
+    ``half`` are the half sides of the mesh's bounding box around the frame's origin.
+    """
+    result = wp.vec4(FAR, 0.0, 0.0, 1.0)
+    moved = wp.length(u)
+    beyond = wp.vec3(wp.abs(q[0]) - half[0], wp.abs(q[1]) - half[1], wp.abs(q[2]) - half[2])
+    apart = wp.max(beyond[0], wp.max(beyond[1], beyond[2]))
+    reach = radius + moved
+    if apart < reach:
+        if kind == SOLID_MESH and apart < 0.0:
+            # nothing inside is farther from the surface than half the shortest side
+            reach = reach + wp.min(MESH_DEPTH, wp.min(half[0], wp.min(half[1], half[2])))
+        query = wp.mesh_query_point_sign_normal(mesh, q, reach + 1.0e-6)
+        if query.result:
+            face = wp.mesh_eval_face_normal(mesh, query.face)
+            offset = q - wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+            length = wp.length(offset)
+            toward = face
+            signed = length
+            if length > 1.0e-7:
+                toward = offset / length
+                if kind == SOLID_MESH and query.sign < 0.0:
+                    toward = -toward
+                    signed = -length
+            elif kind == SHELL_MESH and wp.dot(u, face) > 0.0:
+                toward = -face
+            if length <= moved and moved > 1.0e-9:
+                along = u / moved
+                ray = wp.mesh_query_ray(mesh, q - u, along, moved)
+                # out of a solid is no way into it
+                if ray.result and (kind == SHELL_MESH or wp.dot(ray.normal, along) < 0.0):
+                    toward = ray.normal
+                    if wp.dot(toward, along) > 0.0:
+                        toward = -toward
+                    signed = (moved - ray.t) * wp.dot(toward, along)
+            result = wp.vec4(signed, toward[0], toward[1], toward[2])
+    return result
+
+
+@wp.func
+def gap_mesh(
+    shapes: Shapes,
+    s: int,
+    group: int,
+    worlds: int,
+    x: float,
+    y: float,
+    z: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    a: float,
+    b: float,
+    c: float,
+    radius: float,
+):
+    """`mesh_gap` of one world."""
+    mesh = shapes.mesh[s + group * shapes.mesh_stride]
+    r = mesh_gap(mesh, shapes.kind[s], wp.vec3(x, y, z), wp.vec3(ux, uy, uz), wp.vec3(a, b, c), radius)
+    return r[0], r[1], r[2], r[3]
+
+
+@wp.func
+def gap_mesh(
+    shapes: Shapes,
+    s: int,
+    group: int,
+    worlds: int,
+    x: lane,
+    y: lane,
+    z: lane,
+    ux: lane,
+    uy: lane,
+    uz: lane,
+    a: lane,
+    b: lane,
+    c: lane,
+    radius: lane,
+):
+    gap = lane()
+    nx = lane()
+    ny = lane()
+    nz = lane()
+    kind = shapes.kind[s]
+    for k in range(16):
+        mesh = shapes.mesh[s + wp.min(group * 16 + k, worlds - 1) * shapes.mesh_stride]
+        half = wp.vec3(a[k], b[k], c[k])
+        r = mesh_gap(mesh, kind, wp.vec3(x[k], y[k], z[k]), wp.vec3(ux[k], uy[k], uz[k]), half, radius[k])
+        gap[k] = r[0]
+        nx[k] = r[1]
+        ny[k] = r[2]
+        nz[k] = r[3]
+    return gap, nx, ny, nz

@@ -1,0 +1,171 @@
+"""Imagined picks as the camera would see them, compared with the image: silhouettes and pattern, at several turns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike
+
+from nuno.camera import raster
+from nuno.camera.camera import Camera
+from nuno.camera.extent import regions_of
+from nuno.camera.table import Table
+from nuno.camera.view import Region, View, view
+from nuno.estimate import appearance, similarity
+from nuno.estimate.appearance import Pattern, begin_pattern
+from nuno.estimate.futures import DRAWN_THICKNESS, Futures, solver_of
+from nuno.estimate.similarity import Silhouette, begin_scores
+from nuno.estimate.turns import turn, view_of_turned
+
+MARGIN = 4
+"""[px] around a cloth's vertices: it is drawn thicker than they tell."""
+
+Scores = dict[str, np.ndarray]
+
+
+def score_futures(
+    futures: Futures, camera: Camera, real: Silhouette, table: Table, *, pattern: Pattern | None = None,
+    turns: Sequence[float] | np.ndarray = (0.0,), hand: ArrayLike = (0.0, 0.0, 0.0),
+    coarse: tuple[Camera, Silhouette] | None = None,
+) -> Scores:  # fmt: skip
+    """Draw every future's cloth as the camera would see it, and compare it with the real silhouette and pattern.
+
+    Args:
+        futures: The imagined picks.
+        camera: The camera at the silhouette's resolution.
+        real: The real silhouette.
+        table: The table.
+        pattern: The cloth's pattern; None where there are no images: then "pattern" is 0 for all.
+        turns: Angles [rad] by which the futures are turned before they are compared.
+        hand: (3,) the point about whose vertical they are turned [m].
+        coarse: The camera and the silhouette at a lower resolution, with which turned futures are compared; None is
+            the same for all.
+
+    Returns:
+        The scores by name, (turns, hypotheses, candidates) each; "chamfer" in pixels of ``camera``.
+    """
+    shape = (len(futures.discretisation.spread), futures.candidates)
+    device = futures.world.device
+    angles = [float(angle) for angle in turns]
+    positions = solver_of(futures.body).positions_on_device()
+    faces = _on_device(futures.body.faces, wp.vec3i, device)
+    finite = futures.finite.ravel()
+    seen = {angle: (camera, real) if coarse is None or angle == 0.0 else coarse for angle in angles}
+    regions = regions_of(positions, [view_of_turned(seen[a][0], hand, a) for a in angles], margin=MARGIN)
+    around = dict(zip(angles, regions, strict=True))
+
+    def begin(angle: float) -> Callable[[], Scores]:
+        seen_by, silhouette = seen[angle]
+        keys = _drawn(futures, positions, faces, seen_by, around[angle], table, angle, hand)
+        outline = begin_scores(keys, silhouette, region=around[angle])
+        inside = None if pattern is None else _begin_pattern(futures, positions, faces, pattern, table, angle, hand)
+
+        def wait() -> Scores:
+            scores = outline()
+            del scores["centroid"], scores["area"]  # which are in other pixels
+            scores["chamfer"] = scores["chamfer"] * (camera.fx / seen_by.fx)
+            scores["pattern"] = np.zeros(len(finite)) if inside is None else np.where(finite, inside(), 0.0)
+            return {name: value.reshape(shape) for name, value in scores.items()}
+
+        return wait
+
+    for silhouette in (real,) if coarse is None else (real, coarse[1]):
+        silhouette.on(device)  # here, for every thread would do it for itself
+    found = _at_each(begin, angles, device)
+    return {name: np.stack([scores[name] for scores in found]) for name in found[0]}
+
+
+def _at_each(begin: Callable[[float], Callable[[], Scores]], turns: list[float], device: str) -> list[Scores]:
+    """The scores at every turn: on CUDA all are begun before any is waited for, on the CPU each core takes one."""
+    cores = len(os.sched_getaffinity(0))
+    if min(cores, len(turns)) == 1 or not wp.get_device(device).is_cpu:
+        return [wait() for wait in [begin(angle) for angle in turns]]
+    for module in (raster, similarity, appearance):
+        module.load(device)
+    with ThreadPoolExecutor(min(cores, len(turns))) as threads:
+        # 0 takes longest, so it goes first
+        waiting = {angle: threads.submit(lambda a: begin(a)(), angle) for angle in sorted(turns, key=abs)}
+        return [waiting[angle].result() for angle in turns]
+
+
+def _begin_pattern(
+    futures: Futures, positions: wp.array, faces: wp.array, pattern: Pattern, table: Table, angle: float,
+    hand: ArrayLike,
+) -> Callable[[], np.ndarray]:  # fmt: skip
+    """Begin to tell how well the pattern, carried along by every future, explains the image: (worlds,) float."""
+    device: Any = positions.device
+    keys = raster.key_images(positions.shape[0], pattern.region, device, ids=True)
+    _begin_with_table(keys, futures, table, view(pattern.camera, pattern.region), raster.LAST_LABEL)
+    # light is fitted in the frame of the cloth, which is turned as a whole
+    turned = replace(pattern, camera=view_of_turned(pattern.camera, hand, angle))
+    raster.draw(keys, positions, faces, view(turned.camera, pattern.region), None)
+    lay = np.asarray(futures.origin.find(futures.body.name).vertices)
+    return begin_pattern(keys, positions, faces, pattern.rectangle.fractions(lay), turned)
+
+
+def draw_futures(
+    futures: Futures, camera: Camera, table: Table, angle: float = 0.0, hand: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[wp.array, Region]:
+    """Key images of the cloth behind the table's edge, and the part of the image that they hold.
+
+    Args:
+        futures: The imagined picks.
+        camera: The camera.
+        table: The table.
+        angle: By how much the cloth is turned [rad] about the vertical through ``hand`` (3,) [m].
+        hand: That point.
+    """
+    positions = solver_of(futures.body).positions_on_device()
+    faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
+    (region,) = regions_of(positions, [view_of_turned(camera, hand, angle)], margin=MARGIN)
+    return _drawn(futures, positions, faces, camera, region, table, angle, hand), region
+
+
+def masks_of_turned(
+    futures: Futures, worlds: np.ndarray, turns: np.ndarray, camera: Camera, table: Table, hand: ArrayLike
+) -> np.ndarray:
+    """Masks (k, h, w) bool of some worlds (k,) of a batch, each at a turn (k,) [rad] of its own."""
+    positions = solver_of(futures.body).positions_on_device()
+    moved = np.stack([turn(p, hand, a) for p, a in zip(positions.numpy()[worlds], turns, strict=True)])
+    turned = _on_device(moved, wp.vec3, positions.device)
+    (region,) = regions_of(turned, [camera], margin=MARGIN)
+    faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
+    keys = _drawn(futures, turned, faces, camera, region, table)
+    masks = np.zeros((len(worlds), camera.height, camera.width), dtype=bool)
+    part = raster.masks_of(keys).numpy()
+    masks[:, region.y0 : region.y0 + region.height, region.x0 : region.x0 + region.width] = part
+    return masks
+
+
+def _drawn(
+    futures: Futures, positions: wp.array, faces: wp.array, camera: Camera, region: Region, table: Table,
+    angle: float = 0.0, hand: ArrayLike = (0.0, 0.0, 0.0),
+) -> wp.array:  # fmt: skip
+    device: Any = positions.device
+    keys = raster.key_images(positions.shape[0], region, device)
+    _begin_with_table(keys, futures, table, view(camera, region), 1)
+    looking = view(view_of_turned(camera, hand, angle), region)
+    raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
+    return keys
+
+
+def _begin_with_table(keys: wp.array, futures: Futures, table: Table, looking: View, label: int) -> None:
+    """Reset key images to the table, where its extents are known."""
+    device: Any = keys.device
+    layer = raster.key_images(1, Region(0, 0, looking.width, looking.height), device, ids=keys.dtype == wp.int64)
+    if table.half_extents is not None:
+        body = futures.origin.find("table")
+        points = _on_device(np.asarray(body.vertices)[None], wp.vec3, device)
+        raster.draw(layer, points, _on_device(body.faces, wp.vec3i, device), looking, label)
+    raster.clear(keys, layer)
+
+
+def _on_device(values: ArrayLike, dtype: Any, device: Any) -> wp.array:
+    kind = np.int32 if dtype is wp.vec3i else np.float32
+    return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)

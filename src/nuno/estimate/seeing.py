@@ -1,0 +1,129 @@
+"""What the image after shows of a picked cloth: its silhouette at two resolutions, and its pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from nuno.camera.camera import Camera
+from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.segmentation import segment_after
+from nuno.camera.table import Table
+from nuno.errors import ImageError
+from nuno.estimate.appearance import Pattern, find_pattern
+from nuno.estimate.similarity import Silhouette
+
+IMAGE_SCALE = 0.5
+"""Silhouettes are compared at half the image's resolution: edges are known to no better than a pixel or two."""
+TURNED_SCALE = 0.25
+"""Turned futures are compared at a quarter: they are right to a few degrees only, and it takes a third of the time."""
+FAR_FROM_HAND = 10.0
+"""[px] of the full image. A cloth that a hand holds is seen beside it; nearer than this, fine folds may be missed."""
+HAND_MARGIN = 2
+"""[px] of the full image around the hand that count neither as cloth nor as background."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the image after shows.
+
+    Attributes:
+        mask: (h, w) bool, the cloth.
+        camera: The camera at `IMAGE_SCALE`.
+        silhouette: The cloth's silhouette there, without what the hand hides.
+        coarse: The same at `TURNED_SCALE`.
+        pattern: The cloth's pattern; None where it is not asked for, or too little is seen.
+        warnings: What is odd about where the cloth is seen.
+    """
+
+    mask: np.ndarray
+    camera: Camera
+    silhouette: Silhouette
+    coarse: tuple[Camera, Silhouette]
+    pattern: Pattern | None
+    warnings: tuple[str, ...] = ()
+
+
+def begin_to_see(
+    before: np.ndarray | None, after: np.ndarray | None, mask_before: np.ndarray | None, mask_after: np.ndarray | None,
+    *, camera: Camera, table: Table, rectangle: ClothRectangle, hand: np.ndarray, hand_radius: float,
+    hidden: np.ndarray | None, with_pattern: bool, meanwhile: bool,
+) -> Callable[[], Seen]:  # fmt: skip
+    """Look at the image after, and return a function that waits for what it shows, and raises what went wrong.
+
+    Args:
+        before: (h, w, 3) uint8 RGB; may be None, as ``mask_before``, where ``mask_after`` is given.
+        after: The same, of the cloth in the hand.
+        mask_before: (h, w) bool, the cloth before.
+        mask_after: The cloth after, where it is known.
+        camera: The camera of both images.
+        table: The table.
+        rectangle: The cloth before.
+        hand: (3,) the held point [m].
+        hand_radius: Radius of what hides the cloth around it [m].
+        hidden: (h, w) bool, what else is hidden, or None.
+        with_pattern: Whether to look for the pattern.
+        meanwhile: On a thread, while a GPU computes; else at once, since the CPU has nothing to wait for.
+    """
+
+    def look() -> Seen:
+        mask = mask_after
+        if mask is None:
+            assert before is not None and after is not None and mask_before is not None
+            mask = segment_after(
+                after, camera, table, before, mask_before, hand, hand_radius=hand_radius, hidden=hidden
+            )
+        ignored = _hidden(camera, hand, hand_radius)
+        if hidden is not None:
+            ignored |= hidden
+        small, silhouette = _silhouette(mask, camera, ignored, IMAGE_SCALE)
+        coarse = _silhouette(mask, camera, ignored, TURNED_SCALE)
+        pattern = None
+        if with_pattern and before is not None and after is not None:
+            pattern = find_pattern(before, after, mask & ~ignored, rectangle, camera, hand)
+        return Seen(mask, small, silhouette, coarse, pattern, _oddities(mask, ignored))
+
+    if not meanwhile:
+        seen = look()
+        return lambda: seen
+    thread = ThreadPoolExecutor(1, thread_name_prefix="nuno-seeing")
+    looking = thread.submit(look)
+    thread.shutdown(wait=False)
+    return looking.result
+
+
+def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
+    """What is odd about where the cloth (h, w) is seen, with the pixels (h, w) of the hand and of what hides it."""
+    import cv2
+
+    if not mask.any() or not ignored.any():
+        return ()
+    away = float(cv2.distanceTransform((~ignored).astype(np.uint8), cv2.DIST_L2, 5)[mask].min())
+    if away <= max(float(np.sqrt(ignored.sum() / np.pi)), FAR_FROM_HAND):
+        return ()
+    return (f"the cloth found in the image after begins {away:.0f} px away from the hand: does it hold the cloth?",)
+
+
+def _hidden(camera: Camera, hand: np.ndarray, radius: float) -> np.ndarray:
+    """(h, w) bool, the pixels that the hand may hide."""
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    centre = camera.project(hand)
+    reach = radius * max(camera.fx, camera.fy) / camera.depth_of(hand) + HAND_MARGIN
+    return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= reach**2
+
+
+def _silhouette(mask: np.ndarray, camera: Camera, hidden: np.ndarray, scale: float) -> tuple[Camera, Silhouette]:
+    """The camera and the real silhouette, without the hand's pixels, at a share of the image's resolution."""
+    import cv2
+
+    small = camera.scaled(scale)
+
+    def shrink(image: np.ndarray) -> np.ndarray:
+        return cv2.resize(image.astype(np.float32), (small.width, small.height), interpolation=cv2.INTER_AREA)
+
+    if not (mask & ~hidden).any():
+        raise ImageError("the mask after is empty but for the hand, so there is no silhouette to compare with")
+    return small, Silhouette(shrink(mask & ~hidden) >= 0.5, shrink(hidden) > 0.25)

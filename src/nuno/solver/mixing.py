@@ -1,0 +1,84 @@
+"""States of a batch put together from several runs of the same frame, world by world.
+
+Lists of what is near are none of the state: they are forgotten and made anew in the next substep, which changes no bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED
+from nuno.solver.rigid_solver import RigidSolver
+from nuno.solver.state import LOADS, NOTES, PARTICLE_ARRAYS, TRAVEL
+
+PAIRS = (*ENTRY, *POINT, "normal_now", "tangent_now")
+"""Arrays of pairs; the last two are what `RigidSolver.contacts_of` tells of the last substep besides."""
+
+Copied = dict[str, np.ndarray]  # (worlds, ...) each
+
+
+def copy_particles(solver: ParticleSolver) -> Copied:
+    """Return all that a run changes of a cloth or soft body and that outlasts it."""
+    copied = {name: solver._get(getattr(solver._state, name), count).copy() for name, count in _columns(solver).items()}
+    return copied | {"last_dt": np.full(solver.world_count, solver._last_dt)}
+
+
+def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
+    """Set the state to that of each copy in the worlds (worlds,) bool beside it."""
+    for name, count in _columns(solver).items():
+        array = getattr(solver._state, name)
+        values = solver._get(array, count).copy()
+        for copied, worlds in made:
+            values[worlds] = copied[name][worlds]
+        if name == "notes":
+            values[:, TRAVEL] = 1.0e9
+        wp.copy(array, solver._put(values))
+    last = np.full(solver.world_count, solver._last_dt)
+    for copied, worlds in made:
+        last[worlds] = copied["last_dt"][worlds]
+    solver._last_dt = last
+
+
+def _columns(solver: ParticleSolver) -> dict[str, int]:
+    """Numbers a world of each array."""
+    columns = {name: solver.particle_count for name in PARTICLE_ARRAYS if name != "w"}
+    return columns | {"notes": NOTES, "grip_load": LOADS * max(1, solver._grip_count)}
+
+
+def copy_rigid(solver: RigidSolver) -> Copied:
+    """Return all that a run changes of rigid bodies and that outlasts it, with a row for each slot or part."""
+    solver._load_contacts()
+    bodies = {name: _of_bodies(solver, name).numpy().copy() for name in SAVED}
+    return bodies | {f"contact_{name}": _of_pairs(solver, name).numpy().copy() for name in PAIRS}
+
+
+def mix_rigid(solver: RigidSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
+    """Set the state to that of each copy in the worlds and slots (worlds, slots) bool beside it."""
+    for name in SAVED:
+        values = _of_bodies(solver, name).numpy().copy()
+        for copied, rows in made:
+            values[rows] = copied[name][rows]
+        _of_bodies(solver, name).assign(values)
+    slots = solver.table.parts.slot.numpy()
+    for name in PAIRS:
+        values = _of_pairs(solver, name).numpy().copy()
+        for copied, rows in made:
+            # a pair is in the row of the one that moves, or of the smaller of two
+            parts = rows[:, np.maximum(slots, 0)] & (slots >= 0)
+            kept = copied[f"contact_{name}"]
+            width = kept.shape[2]  # rows may have been made longer since
+            values[:, :, :width][parts] = kept[parts]
+            if name in ("partner", "count"):
+                values[:, :, width:][parts] = -1 if name == "partner" else 0
+        _of_pairs(solver, name).assign(values)
+    solver._list_anew()
+
+
+def _of_bodies(solver: RigidSolver, name: str) -> wp.array:
+    return getattr(solver.state, name).reshape((solver.world_count, int(solver.state.capacity)))
+
+
+def _of_pairs(solver: RigidSolver, name: str) -> wp.array:
+    return getattr(solver.manifolds, name).reshape(solver._entry_shape(name))

@@ -1,0 +1,69 @@
+"""What the image after shows: the same at once and meanwhile, with what goes wrong."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.camera.camera import Camera
+from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.table import Table
+from nuno.estimate.seeing import _oddities, begin_to_see
+
+POSE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+CAMERA = Camera(80, 60, 60.0, 60.0, 39.5, 29.5, POSE)
+CORNERS = np.array([(-0.1, -0.1, 0.0), (0.1, -0.1, 0.0), (0.1, 0.1, 0.0), (-0.1, 0.1, 0.0)])
+
+
+def seen(mask_after, meanwhile, hidden=None):
+    """Return what a mask shows under a hand at the image's middle."""
+    rectangle = ClothRectangle(CORNERS, 0.2, 0.2, CORNERS.mean(axis=0), 0.0, 0.0)
+    return begin_to_see(
+        None, None, None, mask_after, camera=CAMERA, table=Table(0.0), rectangle=rectangle,
+        hand=np.array((0.0, 0.0, 0.2)), hand_radius=0.01, hidden=hidden, with_pattern=True, meanwhile=meanwhile,
+    )  # fmt: skip
+
+
+def square():
+    """Return a mask (60, 80) with a square of cloth."""
+    mask = np.zeros((60, 80), dtype=bool)
+    mask[20:50, 20:60] = True
+    return mask
+
+
+@pytest.mark.parametrize("hidden", [None, "right half"])
+def test_the_same_is_seen_at_once_and_meanwhile(hidden):
+    """Silhouettes at half and quarter size, without the hand's and hidden pixels; no pattern without images."""
+    covered = None
+    if hidden:
+        covered = np.zeros((60, 80), dtype=bool)
+        covered[:, 40:] = True
+    now, later = seen(square(), False, covered)(), seen(square(), True, covered)()
+    assert (now.camera.width, now.coarse[0].width) == (40, 20) and now.pattern is later.pattern is None
+    assert now.silhouette.ignore.any() and not (now.silhouette.mask & now.silhouette.ignore).any()
+    assert now.silhouette.mask[:, 20:].any() == (hidden is None)
+    for a, b in ((now.silhouette, later.silhouette), (now.coarse[1], later.coarse[1])):
+        np.testing.assert_array_equal(a.mask, b.mask)
+        np.testing.assert_array_equal(a.ignore, b.ignore)
+
+
+def test_what_goes_wrong_meanwhile_is_raised_by_the_wait():
+    """A mask of nothing but the hand's pixels is raised as it would be at once."""
+    mask = np.zeros((60, 80), dtype=bool)
+    mask[30, 40] = True
+    wait = seen(mask, True)
+    with pytest.raises(nuno.ImageError, match="empty"):
+        wait()
+    with pytest.raises(nuno.ImageError, match="empty"):
+        seen(mask, False)
+
+
+def test_a_cloth_that_is_not_at_the_hand_is_odd():
+    """A silhouette far from what the hand hides gets a warning, one beside it none."""
+    ignored, near, far = np.zeros((3, 60, 80), dtype=bool)
+    ignored[10:16, 10:16] = True
+    near[17:40, 10:30] = True
+    far[40:55, 40:70] = True
+    assert _oddities(near, ignored) == ()
+    (warning,) = _oddities(far, ignored)
+    # 25 px both ways between the hand's last pixel and the cloth's first; OpenCV's 5 x 5 distance is right to 2 %
+    assert "away from the hand" in warning and 33 <= int(warning.split(" px")[0].split()[-1]) <= 36
