@@ -1,7 +1,8 @@
 """What a robot's sensors cost: ``python benchmarks/sensors.py [--json FILE]``.
 
 A tick of all sensors but the cameras, called again and again and between frames of a world (when a processor's caches
-hold the world's numbers), with a towel in a hand; one by contacts that the solver is asked for; and pictures.
+hold the world's numbers), with a towel in a hand and while walking; one by contacts that the solver is asked for; and
+pictures.
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ def ticks(name: str, repeats: int) -> dict[str, float]:
     other = Sensors(robot)
     found["between_frames_without_world"] = median_ms(lambda: other.read(state), repeats // 4, world.step)
     found["contacts_asked"] = median_ms(lambda: world.contacts(towel), repeats // 20, world.step)
+    walker = nuno.SimulatedRobot(nuno.Humanoid(name), nuno.World(device="cpu"))
+    walker.go_pos(1.0, wait=False)
+    walker.sleep(0.5)
+    found["walking"] = median_ms(walker.read, min(repeats // 4, 100), walker.world.step)
     return found
 
 

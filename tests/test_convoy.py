@@ -3,7 +3,7 @@
 import numpy as np
 
 import nuno
-from nuno.motion import Convoy, arrive, convoys_of, make_schedule
+from nuno.motion import Company, Convoy, arrive, convoys_of, make_schedule
 
 
 def convoy_of(bodies, seed=0):
@@ -53,3 +53,32 @@ def test_a_convoy_with_one_gone_is_taken_apart():
     assert convoys_of(swapped) == ([], swapped)
     bodies[2]._path = nuno.Path([0.0], [[0, 0, 0]])
     assert convoys_of(bodies) == ([], bodies)
+
+
+def test_a_company_goes_where_its_last_convoy_goes():
+    """Paths for good lead the bodies as those of each convoy would, to the bit; what was kept of them stays."""
+    world = nuno.World(device="cpu")
+    bodies = [world.add(nuno.box((0.1, 0.1, 0.1), name=str(k))) for k in range(5)]
+    company = Company(tuple(body.key for body in bodies))
+    kept = []
+    for seed in range(2):
+        company.convoy = convoy_of(bodies, seed)
+        expected = make_schedule(bodies, 0.03, 0.09, 1 / 60)
+        for body, path in zip(bodies, company.paths, strict=True):
+            body._path = path
+        found = make_schedule(bodies, 0.03, 0.09, 1 / 60)
+        assert len(found.convoys) == 1
+        for key, pose in expected.poses.items():
+            for a, b in zip(found.poses[key], pose, strict=True):
+                np.testing.assert_array_equal(a, b)
+        kept.append((company.convoy, [path.as_it_is() for path in company.paths]))
+    for convoy, paths in kept:
+        np.testing.assert_array_equal([path.positions for path in paths], convoy.positions)
+    # a snapshot keeps where they went when it was taken
+    saved = world.save()
+    company.convoy = convoy_of(bodies, 7)
+    for body, path in zip(bodies, company.paths, strict=True):
+        body._path = path
+    world.restore(saved)
+    assert [body._path for body in bodies] == kept[1][1]
+    assert convoys_of(bodies)[0][0][0] is kept[1][0]

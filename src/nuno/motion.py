@@ -58,6 +58,61 @@ class Convoy:
         return a + s[..., None] * (b - a), quat.slerp(self.quaternions[:, first], self.quaternions[:, last], s)
 
 
+class Company:
+    """Bodies that are sent on one convoy after another, as a robot's links in every frame.
+
+    Each stays on one path, which leads where the convoy does: paths need not be made for every frame.
+
+    Args:
+        keys: Of the bodies.
+
+    Attributes:
+        keys: Of the bodies.
+        convoy: The last one, None before the first.
+        paths: One for each body.
+    """
+
+    def __init__(self, keys: tuple[str, ...]) -> None:
+        self.keys = keys
+        self.convoy: Convoy | None = None
+        self.paths: list[Path] = [CompanyPath(self, k) for k in range(len(keys))]
+
+
+class CompanyPath(Path):
+    """The path of the k-th body of a company, which is another one when that is sent on another convoy."""
+
+    company: Company
+    k: int
+
+    def __init__(self, company: Company, k: int) -> None:
+        self.__dict__.update(company=company, k=k)
+
+    @property
+    def times(self) -> np.ndarray:  # type: ignore[override]
+        """(keys,) float [s]."""
+        return self._convoy.times
+
+    @property
+    def positions(self) -> np.ndarray:  # type: ignore[override]
+        """(keys, 3) float [m]."""
+        return self._convoy.positions[self.k]
+
+    @property
+    def quaternions(self) -> np.ndarray:  # type: ignore[override]
+        """(keys, 4) float."""
+        return self._convoy.quaternions[self.k]
+
+    def as_it_is(self) -> Path:
+        """Return what it is now as a path that stays so."""
+        return self._convoy.paths[self.k]
+
+    @property
+    def _convoy(self) -> Convoy:
+        convoy = self.company.convoy
+        assert convoy is not None, "nothing follows the path before the first convoy"
+        return convoy
+
+
 @dataclass(frozen=True, eq=False)
 class Schedule:
     """Where led bodies are in a run: at its start, and in the middle and at the end of each frame.
@@ -112,12 +167,14 @@ def convoys_of(bodies: Iterable[Body]) -> tuple[list[tuple[Convoy, Path]], list[
     k = 0
     while k < len(bodies):
         path = bodies[k]._path
-        convoy: Convoy | None = None if path is None else path.__dict__.get("convoy")
-        if convoy is not None:
-            after = k + len(convoy.keys)
+        fields = {} if path is None else path.__dict__
+        led: Company | Convoy | None = fields.get("company") or fields.get("convoy")
+        if led is not None:
+            after = k + len(led.keys)
             near = bodies[k:after]
-            if [body._path for body in near] == convoy.paths and tuple([body.key for body in near]) == convoy.keys:
-                assert path is not None
+            if [body._path for body in near] == led.paths and tuple([body.key for body in near]) == led.keys:
+                convoy = led.convoy if isinstance(led, Company) else led
+                assert path is not None and convoy is not None
                 whole.append((convoy, path))
                 k = after
                 continue

@@ -17,7 +17,7 @@ from nuno.dynamics import Dynamics, Push, State, make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip, GripSpec
 from nuno.materials import Material
-from nuno.motion import of_world
+from nuno.motion import CompanyPath, of_world
 from nuno.path import Path
 from nuno.shape import Shape
 from nuno.tie import HoldSpec, TieSpec, spread_spec
@@ -85,6 +85,11 @@ class Snapshot:
     ignored: tuple[tuple[str, str], ...]
     from_file: bool = field(default=False)
     drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
+
+    def __repr__(self) -> str:
+        batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
+        dynamic = sum(body.dynamics is not None for body in self.bodies)
+        return f"<Snapshot at t = {self.time:.3f} s, {len(self.bodies)} bodies, {dynamic} of them dynamic{batch}>"
 
     def spread(self, world_count: int) -> Snapshot:
         """Return a batch of equal copies of this one world."""
@@ -217,7 +222,8 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
         key=body.key, name=body.name, shape=body.shape, color=body.color, friction=body.friction,
         thickness=body.thickness, group=body.group, collides_with=body.collides_with, position=pose[0],
         quaternion=pose[1], parent=None if parent is None else parent.key, deformed=deformed,
-        deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics, path=body._path,
+        deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics,
+        path=body._path.as_it_is() if isinstance(body._path, CompanyPath) else body._path,
     )  # fmt: skip
 
 

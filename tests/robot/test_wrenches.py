@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 import nuno
 from nuno.robot.ground import Soles, zero_moment_point
@@ -134,6 +135,37 @@ def test_feet_share_the_ground_reaction(point):
         if forces[k, 2] > 1.0:
             own = zero_moment_point(forces[k], torques[k], 0.0)
             assert abs(own[0]) <= 0.1 + 1e-6 and abs(own[1]) <= 0.05 + 1e-6
+
+
+def test_corners_push_as_the_least_squares_of_another_solver():
+    """SciPy's non-negative least squares, the balance 1e6 times as heavy; of two feet and of one."""
+    random = np.random.default_rng(9)
+    for both in (True, False):
+        corners = soles() if both else soles()[:1]
+        shared, flat = Soles(corners), corners.reshape(-1, 3)
+        for _ in range(40):
+            point = random.uniform((-0.095, -0.145) if both else (-0.095, 0.055), (0.095, 0.145))
+            force = np.array((0.0, 0.0, random.uniform(10.0, 900.0)))
+            balance = np.vstack([np.ones(len(flat)), flat[:, :2].T])
+            rows = np.vstack([1e6 * balance, np.eye(len(flat))])
+            right = np.append(1e6 * force[2] * np.array([1.0, *point]), np.zeros(len(flat)))
+            pushes = nnls(rows, right)[0].reshape(-1, 4)
+            forces, torques = shared.share(force, np.cross((*point, 0.0), force))
+            # [N], [N m]: the heavy balance leaves 1e-12 of the force, and the solver rounds numbers of 1e6
+            np.testing.assert_allclose(forces[:, 2], pushes.sum(axis=1), atol=1e-6)
+            arms = corners - corners.mean(axis=1)[:, None]
+            moments = np.cross(arms, pushes[..., None] * (0.0, 0.0, 1.0)).sum(axis=1)
+            np.testing.assert_allclose(torques[:, :2], moments[:, :2], atol=1e-6)
+
+
+def test_feet_without_a_size_share_by_the_lever():
+    """Two points on the ground, 0.4 m apart: at a quarter of the way one bears three quarters."""
+    corners = np.repeat([[(0.0, 0.2, 0.0)], [(0.0, -0.2, 0.0)]], 4, axis=1)
+    force = np.array((0.0, 0.0, 400.0))
+    forces, torques = Soles(corners).share(force, np.cross((0.0, 0.1, 0.0), force))
+    # [N], [N m]: in the least squares of that case the balance counts 1e8 times as much as an even spread
+    np.testing.assert_allclose(forces, [(0, 0, 300), (0, 0, 100)], atol=1e-5)
+    np.testing.assert_allclose(torques, 0.0, atol=1e-5)
 
 
 def test_a_point_in_the_middle_is_shared_evenly_and_one_under_a_foot_mostly_not():

@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import nnls
 
+GUESSES = 10
+"""Of which corners push, before the search is given up; two or three are usual."""
+FLAT = 1e-12
+"""[m4] Determinant of the balance of corners that lie on a line: that of soles of a millimetre."""
 HEAVY = 1e4
 """How much more the balance counts than an even spread, in the search for corner forces that only push."""
 
@@ -29,9 +33,11 @@ def zero_moment_point(force: np.ndarray, torque: np.ndarray, height: float) -> n
         torque: (3,) [N m], about the world's origin.
         height: [m].
     """
-    if not force[2] > 1e-9:
+    along_x, along_y, upward = force.tolist()
+    about_x, about_y, _ = torque.tolist()
+    if not upward > 1e-9:
         return np.full(2, np.nan)
-    return np.array([height * force[0] - torque[1], torque[0] + height * force[1]]) / force[2]
+    return np.array([height * along_x - about_y, about_x + height * along_y]) / upward
 
 
 class Soles:
@@ -53,13 +59,16 @@ class Soles:
         flat = corners.reshape(-1, 3)
         self._height, self._origin = float(flat[:, 2].mean()), self.middles[:, :2].mean(axis=0).tolist()
         self._balance = np.vstack([np.ones(len(flat)), (flat[:, :2] - self._origin).T])
-        self._spread = self._balance.T @ np.linalg.inv(self._balance @ self._balance.T)
         # of a foot's four pushes: their sum, and their moments about the sole's middle along x and y
         arms = corners[..., :2] - self.middles[:, None, :2]
         self._sums = np.zeros((feet, 3, 4 * feet))
         for k in range(feet):
             own = slice(4 * k, 4 * k + 4)
             self._sums[k, 0, own], self._sums[k, 1, own], self._sums[k, 2, own] = 1.0, arms[k, :, 1], -arms[k, :, 0]
+        # which corners push when nothing is known, and nothing of how much where feet have no size
+        everywhere = np.ones(4 * feet, dtype=bool)
+        self._pushing, self._levels, self._spread = everywhere, np.zeros((4 * feet, 3)), np.zeros((3 * feet, 3))
+        self._take_as_pushing(everywhere)
 
     def share(self, force: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Share a ground reaction.
@@ -72,25 +81,48 @@ class Soles:
             Forces (feet, 3) [N], and torques (feet, 3) [N m] about the middle of each sole.
         """
         feet = len(self.middles)
-        upward = max(float(force[2]), 0.0)
-        pushes = np.zeros(4 * feet)
+        along_x, along_y, upward = force.tolist()
+        about_x, about_y, _ = torque.tolist()
+        borne = np.zeros((feet, 3))
         if upward > 0.0:
-            x, y = zero_moment_point(force, torque, self._height).tolist()
-            wanted = np.array([upward, upward * (x - self._origin[0]), upward * (y - self._origin[1])])
-            pushes = self._spread @ wanted
-            if pushes.min() < 0.0:
-                rows = np.vstack([HEAVY * self._balance, np.eye(len(pushes))])
-                pushes = nnls(rows, np.append(HEAVY * wanted, np.zeros(len(pushes))))[0]
-        borne = self._sums @ pushes
-        total = float(borne[:, 0].sum())
-        share = borne[:, :1] / total if total > 0.0 else np.full((feet, 1), 1.0 / feet)
-        forces = share * force
+            x, y = self._origin
+            lever_x = self._height * along_x - about_y - x * upward
+            lever_y = self._height * along_y + about_x - y * upward
+            borne = self._borne(np.array([upward, lever_x, lever_y]))
+        total = sum(borne[:, 0].tolist())
+        share = borne[:, 0] / total if total > 0.0 else np.full(feet, 1.0 / feet)
         torques = np.zeros((feet, 3))
         torques[:, :2] = borne[:, 1:]
-        missing = torque - torques.sum(axis=0)
-        for middle, own in zip(self.middles, forces, strict=True):
-            missing -= moment(middle, own)
-        return forces, torques + share * missing
+        missing = torque - torques.sum(axis=0) - moment(share @ self.middles, force)
+        return share[:, None] * force, torques + share[:, None] * missing
+
+    def _borne(self, wanted: np.ndarray) -> np.ndarray:
+        """Return the upright force of each foot and its moments along x and y about the sole's middle, (feet, 3).
+
+        The least squares of pushes p in balance, B p = w, are p = max(0, B^T y): which corners push is guessed, most
+        often rightly as at the last call, and y follows; B^T y tells which ones push then.
+        """
+        for _ in range(GUESSES):
+            pushing = self._levels @ wanted > 0.0
+            if (pushing == self._pushing).all():
+                return (self._spread @ wanted).reshape(-1, 3)
+            if not self._take_as_pushing(pushing):
+                break
+        self._take_as_pushing(np.ones(len(pushing), dtype=bool))
+        # nothing that only pushes is in balance, or just so: as nearly as it goes
+        rows = np.vstack([HEAVY * self._balance, np.eye(len(pushing))])
+        return self._sums @ nnls(rows, np.append(HEAVY * wanted, np.zeros(len(pushing))))[0]
+
+    def _take_as_pushing(self, pushing: np.ndarray) -> bool:
+        """Let some corners (4 feet,) push, and no others; return whether those can be in balance."""
+        some = self._balance[:, pushing]
+        square = some @ some.T
+        if np.linalg.det(square) < FLAT:
+            return False
+        inverse = np.linalg.inv(square)
+        self._pushing, self._levels = pushing, self._balance.T @ inverse
+        self._spread = (self._sums[:, :, pushing] @ some.T @ inverse).reshape(-1, 3)
+        return True
 
 
 def share_among_feet(force: np.ndarray, torque: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

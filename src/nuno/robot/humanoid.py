@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from nuno.robot.reach import Reach
     from nuno.world import World
 
+IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""A base at the origin, as a configuration has it."""
 LIMIT_SLACK = 1e-6
 """[rad] What an angle may be beyond its limit and is moved back by: the rounding of those who compute it."""
 
@@ -64,6 +66,7 @@ class Humanoid(Coordinates):
         self._index = {joint: k for k, joint in enumerate(self.joint_names)}
         self._rows = np.array([self.model.joints[j].idx_q for j in joints], dtype=int)
         self._turns_freely = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
+        self._free = np.flatnonzero(self._turns_freely)
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
         self._angles = np.zeros(len(self.joint_names))
@@ -244,14 +247,18 @@ class Humanoid(Coordinates):
         position, quaternion = self._pose()
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InvalidInputError("a robot has one pose, not one for each world")
-        return self.configuration_of(self._angles, np.concatenate([position, quaternion[1:], quaternion[:1]]))
+        q = self.configuration_of(self._angles, IDENTITY)
+        q[:3], q[3:6], q[6] = position, quaternion[1:], quaternion[0]
+        return q
 
     def configuration_of(self, angles: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Return the configuration (nq,) with angles (n,) and a base (7,): position, quaternion (x, y, z, w)."""
-        q = np.zeros(self.model.nq)
+        q = np.empty(self.model.nq)
         q[:7] = base
-        q[self._rows] = np.where(self._turns_freely, np.cos(angles), angles)
-        q[self._rows[self._turns_freely] + 1] = np.sin(angles[self._turns_freely])
+        q[self._rows] = angles
+        if len(self._free):
+            first = self._rows[self._free]
+            q[first], q[first + 1] = np.cos(angles[self._free]), np.sin(angles[self._free])
         return q
 
     def take_configuration(self, q: np.ndarray) -> None:
@@ -267,8 +274,8 @@ class Humanoid(Coordinates):
     def angles_of(self, q: np.ndarray) -> np.ndarray:
         """Return the joints' angles (n,) in a configuration (nq,)."""
         angles = q[self._rows]
-        if (free := self._turns_freely).any():
-            angles[free] = np.arctan2(q[self._rows[free] + 1], angles[free])
+        if len(self._free):
+            angles[self._free] = np.arctan2(q[self._rows[self._free] + 1], angles[self._free])
         return angles
 
     def move_to(self, angles: np.ndarray, base: np.ndarray | None = None) -> None:

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import itertools
 import logging
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import InvalidInputError, RobotTimeoutError, UnknownNameError
+from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
-from nuno.robot.readings import JointState
+from nuno.robot.known_joints import KnownJoints
 from nuno.robot.trajectory import JointTrajectory
 from nuno.validation import finite_array, number
 
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-TICK = 0.01
-"""[s] Between two looks at what is waited for."""
-STATE_TIMEOUT = 3.0
-"""[s] How long a fresh joint state is waited for."""
 STILL = (np.deg2rad(0.1), 0.01)
 """[rad], [m] Changes of hinges and slides that count as none when the shortest time is worked out."""
 INTERPOLATIONS = ("linear", "minjerk")
@@ -39,7 +35,7 @@ MOST_POINTS = 100_000
 """That an interpolation makes; a minute at 1 kHz has 60,000."""
 
 
-class JointInterface(ABC):
+class JointInterface(KnownJoints):
     """The joints of a robot and the controllers that move them.
 
     Angle vectors are (n,) [rad; m for slides] in the order of ``robot.joint_names``; where one is sent, a mapping from
@@ -56,34 +52,14 @@ class JointInterface(ABC):
         self, robot: Humanoid, default_controller: str = "default_controller", *,
         controller_timeout: float | None = 3.0, namespace: str | None = None,
     ) -> None:  # fmt: skip
-        self.robot = robot.copy()
+        super().__init__(robot)
         self.controller_timeout, self.namespace = controller_timeout, namespace
         self.controller_table: dict[str, list[ControllerClient]] = {}
         self.controller_param_table: dict[str, list[Controller]] = {}
         self.controller_type = default_controller
-        self.joint_state: JointState | None = None
-        self._joints = frozenset(self.robot.joint_names)
-        self._velocities = np.zeros(len(self.robot.joint_names))
-        self._efforts = np.zeros(len(self.robot.joint_names))
         self.controller_actions = self.add_controller(default_controller, create_actions=True)
 
     # What a robot must bring
-
-    @abstractmethod
-    def now(self) -> float:
-        """Return the time of the robot's clock [s]."""
-
-    @abstractmethod
-    def sleep(self, seconds: float) -> None:
-        """Let the robot's clock go on by ``seconds`` [s]; the place of ``time.sleep`` in a program for robots."""
-
-    @abstractmethod
-    def read_joint_state(self) -> JointState | None:
-        """Return the newest joint state there is, None before the first; it may lack joints."""
-
-    @abstractmethod
-    def read_reference(self) -> JointState | None:
-        """Return where the controllers want the joints now, None where that is not known; it may lack joints."""
 
     @abstractmethod
     def send_trajectory(
@@ -104,19 +80,6 @@ class JointInterface(ABC):
 
     def has_controller(self, controller: Controller) -> bool:
         """Return whether the robot has a controller, once that is known or ``controller_timeout`` has passed."""
-        return True
-
-    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
-        """Wait until a condition holds, up to ``timeout`` [s] of the robot's clock, None or 0 for ever.
-
-        Returns:
-            Whether it holds.
-        """
-        end = None if not timeout else self.now() + timeout
-        while not condition():
-            if end is not None and self.now() >= end:
-                return False
-            self.sleep(TICK)
         return True
 
     # Controllers
@@ -164,69 +127,6 @@ class JointInterface(ABC):
             {own["controller_type"]: [own] for own in controllers if own["controller_type"] in made}
         )
         return self.controller_table[controller_type]
-
-    # State
-
-    def update_robot_state(self, wait_until_update: bool | float = False) -> bool:
-        """Bring ``robot`` to the newest joint state.
-
-        Args:
-            wait_until_update: Wait for one that is newer than now, or than a time [s] of the robot's clock.
-
-        Returns:
-            Whether there is one.
-        """
-        if wait_until_update is not False and wait_until_update is not None:
-            since = self.now() if wait_until_update is True else number("wait_until_update", wait_until_update)
-            if not self.wait_until(lambda: self._newer_than(since), STATE_TIMEOUT):
-                return False
-        state = self.read_joint_state()
-        if state is None:
-            return False
-        self.joint_state = state
-        angles = self.robot.angle_vector()
-        rows = [(k, self.robot.joint_index(name)) for k, name in enumerate(state.names) if name in self._joints]
-        of_state, of_robot = np.array(rows, dtype=int).reshape(-1, 2).T
-        angles[of_robot] = state.positions[of_state]
-        self._show(angles)
-        self._velocities[of_robot] = state.velocities[of_state]
-        self._efforts[of_robot] = state.efforts[of_state]
-        return True
-
-    def potentio_vector(self) -> np.ndarray:
-        """Return the angles (n,) that were last known or sent, without asking the robot."""
-        return self.robot.angle_vector()
-
-    def velocity_vector(self) -> np.ndarray:
-        """Return the joints' velocities (n,) [rad/s; m/s], fresh."""
-        self._refresh()
-        return self._velocities.copy()
-
-    def torque_vector(self) -> np.ndarray:
-        """Return the joints' torques (n,) [N m; N for slides], fresh."""
-        self._refresh()
-        return self._efforts.copy()
-
-    def reference_vector(self) -> np.ndarray:
-        """Return where the controllers want the joints now, (n,).
-
-        Raises:
-            RobotTimeoutError: the controllers do not tell.
-        """
-        if not self.wait_until(lambda: self.read_reference() is not None, STATE_TIMEOUT):
-            raise RobotTimeoutError(f"the controllers told no reference within {STATE_TIMEOUT:g} s")
-        state = self.read_reference()
-        assert state is not None
-        angles = self.robot.angle_vector()
-        for name, position in zip(state.names, state.positions, strict=True):
-            if name in self._joints:
-                angles[self.robot.joint_index(name)] = position
-        return angles
-
-    def error_vector(self) -> np.ndarray:
-        """Return how far the joints are from where the controllers want them, (n,), reference less measured."""
-        self._refresh()
-        return self.sub_angle_vector(self.reference_vector(), self.robot.angle_vector())
 
     # Motions
 
@@ -402,42 +302,7 @@ class JointInterface(ABC):
             return list(zip(times.tolist(), self.robot.joint_names, strict=True))
         return float(times.max(initial=0.0))
 
-    def sub_angle_vector(self, v0: ArrayLike, v1: ArrayLike) -> np.ndarray:
-        """Return v0 - v1, (n,); of joints that turn freely the shorter way round."""
-        change = self._checked_vector("v0", v0) - self._checked_vector("v1", v1)
-        lower, upper = self.robot.joint_limits
-        turns = np.isinf(lower) & np.isinf(upper)
-        change[turns] = (change[turns] + np.pi) % (2.0 * np.pi) - np.pi
-        return change
-
     # Inside
-
-    def _newer_than(self, time: float) -> bool:
-        state = self.read_joint_state()
-        return state is not None and state.time > time
-
-    def _refresh(self) -> None:
-        if not self.update_robot_state(wait_until_update=True):
-            raise RobotTimeoutError(f"no fresh joint state came within {STATE_TIMEOUT:g} s")
-
-    def _present(self) -> np.ndarray:
-        """Return the angles as they are now, to plan from: no time is let pass where a state is known."""
-        if not self.update_robot_state():
-            self._refresh()
-        return self.robot.angle_vector()
-
-    def _show(self, angles: np.ndarray) -> None:
-        """Let ``robot`` show angles; encoders may tell a little more than the limits, and goals may be beyond them."""
-        lower, upper = self.robot.joint_limits
-        self.robot.angle_vector(np.clip(angles, lower, upper))
-
-    def _checked_vector(self, what: str, av: Any) -> np.ndarray:
-        if not isinstance(av, Mapping):
-            return finite_array(what, av, (len(self.robot.joint_names),))
-        angles = self._present()
-        for joint, angle in av.items():
-            angles[self.robot.joint_index(joint)] = number(f"the angle of {joint!r}", angle)
-        return angles
 
     def _checked_time(
         self, time: Any, start: np.ndarray, end: np.ndarray, controller_type: str | None, time_scale: float

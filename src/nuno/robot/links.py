@@ -11,7 +11,8 @@ from nuno import quaternion as quat
 from nuno.body import Body
 from nuno.coordinates import Pose
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.motion import Convoy
+from nuno.motion import Company, Convoy
+from nuno.robot.spatial_arrays import placement_arrays
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -58,8 +59,12 @@ class Links:
         self._joints = np.array([own.joint for own in shapes], dtype=int)
         self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
+        # by which the quaternion of its joint is multiplied for that of a shape
+        self._turned_by = np.stack([quat.multiply(row, self._turns) for row in np.eye(4)], axis=2)
+        self._placements = robot.data.oMi.tolist()
+        self._joint_axes, self._joint_places = placement_arrays(self._placements)
         self._inside = True
-        self._convoy: Convoy | None = None  # on which they are under way
+        self._company = Company(self._keys)
         for body in self.bodies:
             body._links = self  # a viewer draws the robot's visual meshes in their place
         positions, quaternions = self.poses()
@@ -78,10 +83,11 @@ class Links:
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
-        placements = self.robot.update().oMi
-        places = np.array([pin.SE3ToXYZQUAT(placement) for placement in placements])
-        turns = places[self._joints][:, [6, 3, 4, 5]]
-        return places[self._joints, :3] + quat.rotate(turns, self._offsets), quat.multiply(turns, self._turns)
+        self.robot.update()
+        joints = self._joints
+        places = self._joint_places[joints] + np.einsum("kij,kj->ki", self._joint_axes[joints], self._offsets)
+        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
+        return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
 
     def follow(self, seconds: float) -> None:
         """Let the bodies move from where they are to where the robot is now, in ``seconds`` [s] from the world's time.
@@ -100,21 +106,26 @@ class Links:
                 times, places, turns = np.array([now]), positions[:, None], quaternions[:, None]
             else:
                 times = np.array([now, now + duration])
-                places = np.stack([start[0], positions], axis=1)
-                turns = np.stack([start[1], quaternions], axis=1)
-            self._convoy = Convoy(self._keys, times, places, turns)
-            paths = self._convoy.paths
-            for body, path, place, turn in zip(self.bodies, paths, places, turns, strict=True):
-                if body._path is None:  # the first time, and after anything else took the body elsewhere
-                    self.world.move(body, path)
-                else:  # what ``World.move`` does to a body that follows a path already
-                    body._path, body._position, body._quaternion = path, place[0], turn[0]
+                places, turns = np.empty((len(positions), 2, 3)), np.empty((len(positions), 2, 4))
+                places[:, 0], places[:, 1] = start[0], positions
+                turns[:, 0], turns[:, 1] = start[1], quaternions
+            company = self._company
+            company.convoy = Convoy(self._keys, times, places, turns)
+            if [body._path for body in self.bodies] != company.paths:
+                for body, path in zip(self.bodies, company.paths, strict=True):
+                    if body._path is None:  # the first time, and after anything else took the body elsewhere
+                        self.world.move(body, path)
+                    else:  # what ``World.move`` does to a body that follows a path already
+                        body._path = path
+            if duration == 0.0:
+                for body, place, turn in zip(self.bodies, positions, quaternions, strict=True):
+                    body._position, body._quaternion = place, turn
 
     def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
-        convoy = self._convoy
+        convoy = self._company.convoy
         if convoy is not None and convoy.arrived is not None and convoy.arrived[0] == self.world.time:
-            if [body._path for body in self.bodies] == convoy.paths:
+            if [body._path for body in self.bodies] == self._company.paths:
                 return convoy.arrived[1:]
         return np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
 

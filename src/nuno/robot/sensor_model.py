@@ -59,6 +59,9 @@ class Channel:
         size: Components.
         seed: Of the noise.
 
+    Attributes:
+        is_exact: Whether it tells nothing but the truth, at once.
+
     Raises:
         InvalidInputError: noise or bias for another number of components.
     """
@@ -71,7 +74,7 @@ class Channel:
         self.model, self._size, self._start = model, size, [int(seed), crc32(name.encode())]
         self._noise, self._bias = np.asarray(model.noise, dtype=float), np.asarray(model.bias, dtype=float)
         self._noisy, self._biased = bool(self._noise.any()), bool(self._bias.any())
-        self._plain = not self._noisy and not self._biased and model.rate is None and model.latency == 0.0
+        self.is_exact = not self._noisy and not self._biased and model.rate is None and model.latency == 0.0
         self.forget()
 
     def forget(self) -> None:
@@ -90,7 +93,7 @@ class Channel:
             time: Now [s]; one before the last makes it begin anew, as in a world that was restored.
             truth: (size,) float.
         """
-        if self._plain:
+        if self.is_exact:
             return time, truth
         if time < self._last - EARLY:
             self.forget()

@@ -12,9 +12,10 @@ import pinocchio as pin
 from nuno import quaternion as quat
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.ground import Soles, lowest_corners, moment, zero_moment_point
-from nuno.robot.imu import read_imu
+from nuno.robot.imu import InertialUnit
 from nuno.robot.loads import LinkLoads, Load
 from nuno.robot.sensor_model import Channel, SensorModel
+from nuno.robot.spatial_arrays import placement_arrays, spatial_array
 from nuno.robot.state import RobotState
 from nuno.robot.wrenches import WrenchSensor
 from nuno.validation import number
@@ -95,22 +96,32 @@ class Sensors:
         if links is not None:
             self._model.gravity.linear = np.array(links.world.gravity)
         self._data = self._model.createData()
+        self._shapes = ((self._model.nq,), (self._model.nv,), (self._model.nv,))
         self._external = pin.StdVec_Force()
         for _ in range(self._model.njoints):
             self._external.append(pin.Force.Zero())
+        self._acting = spatial_array(self._external)
+        self._axes, self._places = placement_arrays(self._data.oMi)
+        self._lacking = self._data.f[1].vector  # at the base, after ``rnea``
         self._stood: Soles | None = None  # the feet that stood last, most often where they stand now
-        self._borne: set[int] = set()  # joints on which something acts
         frames = robot.description.frames
-        self._wrenches = {name: WrenchSensor(robot, name) for name in WRENCHES if name in frames}
+        self._wrenches = {name: WrenchSensor(robot, name, self._data) for name in WRENCHES if name in frames}
         self._feels = {name: self._felt_links(sensor) for name, sensor in self._wrenches.items()}
         self._loads = None if links is None else LinkLoads(links, self._groups())
-        self._imu = robot.frame_index("imu") if "imu" in frames else None
+        self._imu = InertialUnit(robot, "imu", self._data) if "imu" in frames else None
         self._feet = tuple(robot.description.feet)
-        self._soles = np.array([_corners(frames[foot]) for foot in self._feet]).reshape(-1, 4, 3)
-        self._foot_frames = [robot.frame_index(foot) for foot in self._feet]
-        self._foot_joints = [int(robot.model.frames[frame].parentJoint) for frame in self._foot_frames]
-        self._weight = robot.mass * float(np.linalg.norm(self._model.gravity.linear))
+        carried = [robot.model.frames[robot.frame_index(foot)] for foot in self._feet]
+        self._foot_joints = np.array([frame.parentJoint for frame in carried], dtype=int)
+        self._soles = np.zeros((len(self._feet), 4, 3))  # corners in the frames of the joints
+        for k, (foot, frame) in enumerate(zip(self._feet, carried, strict=True)):
+            placement = frame.placement
+            self._soles[k] = _corners(frames[foot]) @ placement.rotation.T + placement.translation
+        # forces and torques about the soles' middles, as they are about the origins of the joints
+        middles = [pin.SE3(np.eye(3), sole.mean(axis=0)) for sole in self._soles]
+        self._from_middles = np.array([own.toDualActionMatrix() for own in middles]).reshape(-1, 6, 6)
+        self._firmly = CONTACT * robot.mass * float(np.linalg.norm(self._model.gravity.linear))
         self._channels = self._make_channels(dict(models or {}), seed)
+        self._inexact = {name: channel for name, channel in self._channels.items() if not channel.is_exact}
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -130,30 +141,35 @@ class Sensors:
         """
         state = self.state_at_rest() if state is None else state
         model, data = self._model, self._data
-        if state.q.shape != (model.nq,) or state.v.shape != (model.nv,) or state.a.shape != (model.nv,):
+        if (state.q.shape, state.v.shape, state.a.shape) != self._shapes:
             raise InvalidInputError(
                 f"a state of {self.robot.name!r} has q ({model.nq},), v and a ({model.nv},), got "
                 f"{state.q.shape}, {state.v.shape}, {state.a.shape}"
             )
-        pin.forwardKinematics(model, data, state.q, state.v, state.a)
+        torques = pin.rnea(model, data, state.q, state.v, state.a)
+        pin.updateGlobalPlacements(model, data)
+        self._acting[:] = 0.0
+        base = self._axes[1]
+        force, torque = base @ self._lacking[:3], base @ self._lacking[3:]
+        torque += moment(self._places[1], force)
         loads = () if self._loads is None else self._loads.read()
-        beyond = self._bear(loads)
-        torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
-        point, pressed = np.full(2, np.nan), dict.fromkeys(self._feet, 0.0)
+        before = self._bear(loads, force, torque)
+        point, pressed = None, np.zeros(len(self._feet))
         standing = self._standing(stance)
         if standing:
-            point, pressed = self._stand(standing, beyond)
+            point = self._stand(standing, force, torque, pressed)
+        if standing or loads:
             torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
-        read = {"positions": self._angles(state.q), "velocities": state.v[6:].copy(), "torques": torques[6:].copy()}
-        turn = quat.IDENTITY
+        read = {
+            "positions": self.robot.angles_of(state.q), "velocities": state.v[6:].copy(),
+            "torques": torques[6:].copy(), "contacts": pressed,
+            "zero_moment_point": np.full(2, np.nan) if point is None else point,
+        }  # fmt: skip
         if self._imu is not None:
-            turn, spin, specific = read_imu(model, data, self._imu)
-            read |= {"orientation": np.zeros(3), "angular_velocity": spin, "specific_force": specific}
+            read["orientation"], read["angular_velocity"], read["specific_force"] = self._imu.read()
         for name, sensor in self._wrenches.items():
-            read[name] = sensor.read(data, beyond[name])
-        read["zero_moment_point"] = point
-        read["contacts"] = np.array(list(pressed.values()))
-        return self._told(state.time, read, turn)
+            read[name] = sensor.read(before.get(name, 0.0))
+        return self._told(state.time, read)
 
     def state_at_rest(self) -> RobotState:
         """Return the state of the robot at rest where it is now, at the world's time."""
@@ -163,62 +179,65 @@ class Sensors:
 
     # -- forces
 
-    def _bear(self, loads: Sequence[Load]) -> dict[str, Any]:
-        """Set what acts on each joint from outside, and return what of that each wrench sensor has beyond it."""
-        for j in self._borne:
-            self._external[j] = pin.Force.Zero()
-        self._borne.clear()
-        beyond = {name: pin.Force.Zero() for name in self._wrenches}
+    def _bear(self, loads: Sequence[Load], force: np.ndarray, torque: np.ndarray) -> dict[str, np.ndarray]:
+        """Let loads act on the joints, and take them off what is lacking at the base.
+
+        Args:
+            loads: What bodies do to the links.
+            force: (3,) [N], changed here.
+            torque: (3,) [N m], about the world's origin, changed here.
+
+        Returns:
+            By wrench sensor, what acts on links that its joint carries before it, (6,) in the joint's frame.
+        """
+        before: dict[str, np.ndarray] = {}
         for load in loads:
             assert self.links is not None
             joint = self.links.joint_of(load.link)
-            acting = self._in_joint(joint, load.point, load.force, load.torque)
-            self._external[joint] += acting
-            self._borne.add(joint)
+            turning = load.torque + moment(load.point, load.force)
+            force -= load.force
+            torque -= turning
+            acting = self._act(joint, load.force, turning)
             for name, sensor in self._wrenches.items():
-                if sensor.joint == joint and self._feels[name][load.link]:
-                    beyond[name] += acting
-        return beyond
+                if sensor.joint == joint and not self._feels[name][load.link]:
+                    before[name] = before.get(name, 0.0) + acting
+        return before
 
-    def _in_joint(self, joint: int, point: np.ndarray, force: np.ndarray, torque: np.ndarray) -> Any:
-        """Return a force at a point of the world as Pinocchio has it in a joint's frame."""
-        placement = self._data.oMi[joint]
-        return placement.actInv(pin.Force(force, torque + moment(point, force)))
+    def _act(self, joint: int, force: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        """Let a force and a torque about the world's origin act on a joint, and return both (6,) in its frame."""
+        axes, acting = self._axes[joint], np.empty(6)
+        acting[:3] = force @ axes
+        acting[3:] = (torque - moment(self._places[joint], force)) @ axes
+        self._acting[joint] += acting
+        return acting
 
     def _standing(self, stance: Sequence[str] | None) -> list[int]:
         """The numbers of the feet that stand."""
         if not self._feet:
             return []
-        self._corners = np.empty_like(self._soles)
-        for k, frame in enumerate(self._foot_frames):
-            placement = pin.updateFramePlacement(self._model, self._data, frame)
-            self._corners[k] = self._soles[k] @ placement.rotation.T + placement.translation
+        axes, places = self._axes[self._foot_joints], self._places[self._foot_joints]
+        self._corners = self._soles @ axes.swapaxes(1, 2) + places[:, None]
         if stance is None:
-            return np.flatnonzero(lowest_corners(self._corners) < self.ground + LIFTED).tolist()
+            heights = lowest_corners(self._corners).tolist()
+            return [k for k, height in enumerate(heights) if height < self.ground + LIFTED]
         for foot in stance:
             if foot not in self._feet:
                 raise UnknownNameError("foot", str(foot), list(self._feet))
         return [k for k, foot in enumerate(self._feet) if foot in stance]
 
-    def _stand(self, standing: list[int], beyond: dict[str, Any]) -> tuple[np.ndarray, dict[str, float]]:
-        """Add what the ground does to the feet; return the zero moment point and how hard each foot presses [N]."""
-        needed = self._data.oMi[1].act(self._data.f[1])
-        force, torque = np.array(needed.linear), np.array(needed.angular)
-        corners = self._corners[standing]
-        if self._stood is None or not np.array_equal(self._stood.corners, corners):
-            self._stood = Soles(corners)
-        forces, torques = self._stood.share(force, torque)
-        pressed = dict.fromkeys(self._feet, 0.0)
-        for k, own_force, own_torque, middle in zip(standing, forces, torques, self._stood.middles, strict=True):
-            joint = self._foot_joints[k]
-            acting = self._in_joint(joint, middle, own_force, own_torque)
-            self._external[joint] += acting
-            self._borne.add(joint)
-            for name, sensor in self._wrenches.items():
-                if sensor.joint == joint:
-                    beyond[name] += acting
-            pressed[self._feet[k]] = float(own_force[2])
-        return zero_moment_point(force, torque, self.ground), pressed
+    def _stand(self, standing: list[int], force: np.ndarray, torque: np.ndarray, pressed: np.ndarray) -> np.ndarray:
+        """Let the ground act on the feet; tell how hard each presses [N], and return the zero moment point."""
+        corners, stood = self._corners[standing], self._stood
+        if stood is None or len(stood.corners) != len(corners) or (stood.corners != corners).any():
+            stood = self._stood = Soles(corners)
+        forces, torques = stood.share(force, torque)
+        pressed[standing] = forces[:, 2]
+        joints = self._foot_joints[standing]
+        axes, shares = self._axes[joints], np.empty((len(joints), 6, 1))
+        shares[:, :3, 0] = (forces[:, None] @ axes)[:, 0]
+        shares[:, 3:, 0] = (torques[:, None] @ axes)[:, 0]
+        self._acting[joints] += (self._from_middles[standing] @ shares)[:, :, 0]
+        return zero_moment_point(force, torque, self.ground)
 
     def _felt_links(self, sensor: WrenchSensor) -> list[bool]:
         """Which of the bodies in the world are links beyond a sensor, of those that its joint carries."""
@@ -255,32 +274,24 @@ class Sensors:
         exact = SensorModel()
         return {name: Channel(name, models.get(name, exact), size, seed) for name, size in sizes.items()}
 
-    def _told(self, time: float, read: dict[str, np.ndarray], turn: np.ndarray) -> Readings:
-        told: dict[str, Any] = {}
-        sampled: dict[str, float] = {}
-        for name, channel in self._channels.items():
+    def _told(self, time: float, read: dict[str, Any]) -> Readings:
+        sampled = dict.fromkeys(self._channels, time)
+        for name, channel in self._inexact.items():
             if name == "orientation":
                 # the true turn goes along: what is told late is how it was turned then
-                sampled[name], error = channel.read(time, _Turned(turn))
-                told[name] = error.told()
+                sampled[name], turned = channel.read(time, _Turned(read[name]))
+                read[name] = turned.told()
             else:
-                sampled[name], told[name] = channel.read(time, read[name])
-        pressed = told.get("contacts", ())
-        nothing = np.full(3, np.nan)
+                sampled[name], read[name] = channel.read(time, read[name])
+        if self._imu is None:
+            read |= {"orientation": np.full(4, np.nan)}
+            read |= {name: np.full(3, np.nan) for name in ("angular_velocity", "specific_force")}
         return Readings(
-            time, told["positions"], told["velocities"], told["torques"],
-            told.get("orientation", np.full(4, np.nan)), told.get("angular_velocity", nothing),
-            told.get("specific_force", nothing), {name: told[name] for name in self._wrenches},
-            {foot: bool(force > CONTACT * self._weight) for foot, force in zip(self._feet, pressed, strict=True)},
-            told.get("zero_moment_point", np.full(2, np.nan)), sampled,
+            time, read["positions"], read["velocities"], read["torques"], read["orientation"],
+            read["angular_velocity"], read["specific_force"], {name: read[name] for name in self._wrenches},
+            dict(zip(self._feet, (read["contacts"] > self._firmly).tolist(), strict=True)),
+            read["zero_moment_point"], sampled,
         )  # fmt: skip
-
-    def _angles(self, q: np.ndarray) -> np.ndarray:
-        rows, free = self.robot._rows, self.robot._turns_freely
-        angles = q[rows]
-        if free.any():
-            angles[free] = np.arctan2(q[rows[free] + 1], angles[free])
-        return angles
 
 
 class _Turned:

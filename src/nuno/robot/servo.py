@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
+from scipy.linalg.lapack import dgesv
 
 from nuno.errors import InvalidInputError
 from nuno.robot.state import RobotState
@@ -90,6 +91,9 @@ class Servo:
         self._model.gravity.linear = np.array(gravity)
         self._data = self._model.createData()
         self._columns = self.rows + 6
+        # of Pinocchio's inertia matrix only the upper half is filled
+        self._upper = np.minimum.outer(self._columns, self._columns), np.maximum.outer(self._columns, self._columns)
+        self._diagonal = np.diag_indices(len(self.rows))
         lower, upper = robot.joint_limits
         self._limits = lower[self.rows], upper[self.rows]
         self._effort = robot.effort_limits[self.rows]
@@ -117,6 +121,8 @@ class Servo:
         own, speed = start[rows], before.v[columns].copy()
         v[columns], a[columns] = speed, 0.0
         acceleration = np.zeros(len(rows))
+        command: Any = self.command
+        stiff = command.kp * dt**2 + command.kd * dt
         end = before.q[:7] if base is None else base
         for k in range(count):
             angles = start + way * (k * dt)
@@ -124,10 +130,8 @@ class Servo:
             q = robot.configuration_of(angles, before.q[:7] if k < count // 2 else end)
             v[columns] = speed
             needed = pin.rnea(model, data, q, v, a) if external is None else pin.rnea(model, data, q, v, a, external)
-            bias = needed[columns].copy()
-            inertia = pin.crba(model, data, q, pin.Convention.WORLD)
-            inertia = np.triu(inertia) + np.triu(inertia, 1).T
-            acceleration = self._accelerations(inertia[np.ix_(columns, columns)], bias, own, speed, dt)
+            inertia = pin.crba(model, data, q, pin.Convention.WORLD)[self._upper]
+            acceleration = self._accelerations(inertia, needed[columns], own, speed, dt, stiff)
             speed = speed + dt * acceleration
             own = own + dt * speed
             stopped = (own < self._limits[0]) | (own > self._limits[1])
@@ -137,19 +141,25 @@ class Servo:
         return own, speed, acceleration
 
     def _accelerations(
-        self, inertia: np.ndarray, bias: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float
+        self, inertia: np.ndarray, bias: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float, stiff: np.ndarray
     ) -> np.ndarray:
         own: Any = self.command
-        # tau(end of the period) = now - (kp dt^2 + kd dt) a: the joint moves on by dt (v + dt a)
+        # tau(end of the period) = now - stiff a, with stiff = kp dt^2 + kd dt: the joint moves on by dt (v + dt a)
         now = own.tau + own.kp * (own.q - q - dt * v) + own.kd * (own.dq - v)
-        stiff = own.kp * dt**2 + own.kd * dt
-        found = np.linalg.solve(inertia + np.diag(stiff), now - bias)
+        found = self._solve(inertia, stiff, now - bias)
         torque = now - stiff * found
         over = np.abs(torque) > self._effort
         if over.any():
             now = np.where(over, np.clip(torque, -self._effort, self._effort), now)
-            found = np.linalg.solve(inertia + np.diag(np.where(over, 0.0, stiff)), now - bias)
-        return np.asarray(found)
+            found = self._solve(inertia, np.where(over, 0.0, stiff), now - bias)
+        return found
+
+    def _solve(self, inertia: np.ndarray, more: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Return the accelerations (m,) under torques ``right``, with ``more`` on the diagonal of the inertia."""
+        matrix = inertia.copy()
+        matrix[self._diagonal] += more
+        # LAPACK itself: at seven joints NumPy's solve takes longer around it than in it
+        return np.asarray(dgesv(matrix, right)[2])
 
 
 def external_forces(links: Links, loads: Sequence[Load]) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nuno.errors import InvalidInputError
 from nuno.robot.goal import Goal, Tolerances
-from nuno.robot.trajectory import JointTrajectory, Motion, evaluate
+from nuno.robot.trajectory import JointTrajectory, Motion, evaluate, resting_at, with_derivatives
 from nuno.robot.trajectory_controller import TrajectoryController
 
 if TYPE_CHECKING:
@@ -49,8 +49,7 @@ class SimulatedJoints:
         self.positions = robot.angle_vector()
         self.velocities, self.accelerations = np.zeros(count), np.zeros(count)
         self.desired: Motion = (self.positions, self.velocities, self.accelerations)
-        self._polynomials = np.zeros((6, count))
-        self._polynomials[0] = self.positions
+        self._polynomials = with_derivatives(resting_at(self.positions))
         self._begin = np.zeros(count)
         self.controllers: dict[str, TrajectoryController] = {}
         self.rows: dict[str, np.ndarray] = {}
@@ -141,7 +140,7 @@ class SimulatedJoints:
 
     def _follow(self, name: str) -> None:
         rows, piece = self.rows[name], self.controllers[name].piece
-        self._polynomials[:, rows] = piece.coefficients
+        self._polynomials[:, :, rows] = with_derivatives(piece.coefficients)
         self._begin[rows] = piece.start
 
     def _limited(self, desired: Motion, duration: float) -> Motion:

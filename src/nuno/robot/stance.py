@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from nuno.robot.humanoid import IDENTITY
+
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.trajectory import Motion
@@ -29,9 +31,14 @@ class Stance:
 
     def __init__(self, robot: Humanoid) -> None:
         self._robot, model = robot, robot.model
-        self._frames = [robot.frame_index(foot) for foot in robot.description.feet]
-        self._joints = [int(model.frames[frame].parentJoint) for frame in self._frames]
-        self._rows = [np.array([j - 2 for j in model.supports[joint] if j >= 2], dtype=int) for joint in self._joints]
+        frames = [robot.frame_index(foot) for foot in robot.description.feet]
+        joints = [int(model.frames[frame].parentJoint) for frame in frames]
+        self._rows = [np.array([j - 2 for j in model.supports[joint] if j >= 2], dtype=int) for joint in joints]
+        self._placements = [model.frames[frame].placement.copy() for frame in frames]
+        # Pinocchio's own: where the soles are now, and how the feet would move with a base that rests
+        self._soles = [robot.data.oMf[frame] for frame in frames]
+        data = robot.scratch
+        self._carriers = [(data.oMi[joint], data.v[joint], data.a[joint]) for joint in joints]
 
     def base(self, present: np.ndarray, motion: Motion) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
         """Return where the base goes and how it moves, None where it stays.
@@ -46,19 +53,19 @@ class Stance:
         """
         robot, (positions, velocities, accelerations) = self._robot, motion
         moving = (positions != present) | (velocities != 0.0) | (accelerations != 0.0)
-        if not any([moving[rows].any() for rows in self._rows]):
+        legs_move = [moving[rows].any() for rows in self._rows]
+        if not any(legs_move):
             return None
-        places = robot.update().oMf
-        heights = np.array([places[frame].translation[2] for frame in self._frames])
-        k = int(heights.argmin()) if heights.min() < heights[0] - LOWER else 0
-        if not moving[self._rows[k]].any():
+        robot.update()
+        heights = [float(sole.translation[2]) for sole in self._soles]
+        k = heights.index(min(heights)) if min(heights) < heights[0] - LOWER else 0
+        if not legs_move[k]:
             return None
-        model, data = robot.model, robot.scratch
+        model = robot.model
         v, a = np.zeros(model.nv), np.zeros(model.nv)
         v[6:], a[6:] = velocities, accelerations
-        pin.forwardKinematics(model, data, robot.configuration_of(positions, np.eye(7)[6]), v, a)
+        pin.forwardKinematics(model, robot.scratch, robot.configuration_of(positions, IDENTITY), v, a)
         # seen from the base the foot moves; as it stands, the base moves against that
-        carrier, frame = data.oMi[self._joints[k]], model.frames[self._frames[k]]
-        placed = places[self._frames[k]] * (carrier * frame.placement).inverse()
-        own = carrier.act(data.v[self._joints[k]]), carrier.act(data.a[self._joints[k]])
-        return pin.SE3ToXYZQUAT(placed), (-own[0].vector, -own[1].vector)
+        carrier, velocity, acceleration = self._carriers[k]
+        placed = self._soles[k] * (carrier * self._placements[k]).inverse()
+        return pin.SE3ToXYZQUAT(placed), (-carrier.act(velocity).vector, -carrier.act(acceleration).vector)

@@ -103,7 +103,7 @@ class Piece:
 
     def at(self, time: float) -> Motion:
         """Return the motion of the joints at a time [s]."""
-        return evaluate(self.coefficients, time - self.start)
+        return evaluate(with_derivatives(self.coefficients), time - self.start)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,11 +195,19 @@ def coefficients(a: Motion, b: Motion, span: float, order: int) -> np.ndarray:
     return found
 
 
+def with_derivatives(polynomials: np.ndarray) -> np.ndarray:
+    """Return the coefficients (6, 3, m) of polynomials (6, m) and of their first and second derivatives."""
+    found = np.zeros((6, 3, polynomials.shape[1]))
+    found[:, 0] = polynomials
+    found[:5, 1] = np.arange(1.0, 6.0)[:, None] * polynomials[1:]
+    found[:4, 2] = np.array([2.0, 6.0, 12.0, 20.0])[:, None] * polynomials[2:]
+    return found
+
+
 def evaluate(polynomials: np.ndarray, t: float | np.ndarray) -> Motion:
-    """Return the motion on polynomials (6, m) at a time [s] since they began, one for all or (m,)."""
-    c0, c1, c2, c3, c4, c5 = polynomials
-    return (
-        c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
-        c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
-        2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
-    )
+    """Return the motion on polynomials ``with_derivatives`` (6, 3, m) at a time [s] since they began, or (m,) times."""
+    motion = polynomials[5].copy()
+    for coefficients in polynomials[4::-1]:
+        motion *= t
+        motion += coefficients
+    return motion[0], motion[1], motion[2]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +19,7 @@ SOON = 1e-9
 """[s] Rounding of sums of frames."""
 
 
-@dataclass(frozen=True, eq=False)
-class Feedback:
+class Feedback(NamedTuple):
     """How a trajectory is being followed.
 
     Attributes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -62,10 +63,7 @@ class Walk:
 
     def configuration_at(self, time: float) -> np.ndarray:
         """Return the configuration (nq,) at a time [s]; before and after the walk that of its ends."""
-        k, share = self._tick(time)
-        if share == 0.0:
-            return self.configurations[k].copy()
-        return np.array(pin.interpolate(self.plan.model, self.configurations[k], self.configurations[k + 1], share))
+        return self._configuration(*self._tick(time))
 
     def state_at(self, time: float) -> RobotState:
         """Return configuration, velocity and acceleration at a time [s]; before and after the walk at rest."""
@@ -73,11 +71,16 @@ class Walk:
         parts = []
         for part in (self.velocities, self.accelerations):
             parts.append(part[k].copy() if share == 0.0 else (1.0 - share) * part[k] + share * part[k + 1])
-        return RobotState(float(time), self.configuration_at(time), *parts)
+        return RobotState(float(time), self._configuration(k, share), *parts)
+
+    def _configuration(self, k: int, share: float) -> np.ndarray:
+        if share == 0.0:
+            return self.configurations[k].copy()
+        return np.array(pin.interpolate(self.plan.model, self.configurations[k], self.configurations[k + 1], share))
 
     def _tick(self, time: float) -> tuple[int, float]:
-        at = (number("time", time) - self.times[0]) / self.dt
-        k = int(np.clip(np.floor(at + 1e-9), 0, len(self.times) - 1))
+        at = (number("time", time) - float(self.times[0])) / self.dt
+        k = min(max(math.floor(at + 1e-9), 0), len(self.times) - 1)
         if k == len(self.times) - 1 or at <= k + 1e-9:
             return k, 0.0
         return k, float(at - k)

@@ -78,7 +78,11 @@ class ArmTracks:
         )  # fmt: skip
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file (npz) from which ``load`` makes the same tracks, to the bit, where there is no robot model."""
+        """Write a file (npz) from which ``load`` makes the same tracks, to the bit, where there is no robot model.
+
+        Raises:
+            InvalidInputError: arms of shapes other than boxes and hulls.
+        """
         arrays = {name: getattr(self, name) for name in (*BY_WALK, "sides")}
         kinds = []
         for k, part in enumerate(self.parts):

@@ -11,7 +11,7 @@ from types import TracebackType
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
-from nuno.robot.joint_interface import TICK
+from nuno.robot.known_joints import TICK
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.bridge_client import UNANSWERED, Client
