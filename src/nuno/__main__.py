@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
+import os
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
@@ -44,7 +48,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )  # fmt: skip
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
-    _quiet_warp()
     try:
         return {"pick": _pick, "fold": _fold, "serve": _serve}[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
@@ -69,13 +72,14 @@ def _pick(options: argparse.Namespace) -> int:
     from nuno.estimate.case import read_case
 
     case = read_case(options.case)
+    _start_warp()
     grid = (int(parts[0]), int(parts[1]))
     result = case.estimate(candidates=grid, device=options.device, progress=options.progress)
     result.save(options.out)
     i, j = result.best
     sys.stdout.write(
         f"picked at ({i}, {j}), confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
-        f"see {options.out}/result.json and result.png\n"
+        f"see {Path(options.out) / 'result.json'} and result.png\n"
     )
     return ANSWERED
 
@@ -85,13 +89,14 @@ def _fold(options: argparse.Namespace) -> int:
     from nuno.estimate.fold_case import read_fold_case
 
     case = read_fold_case(options.case)
+    _start_warp()
     result = case.replay(device=options.device, progress=options.progress)
     result.save(options.out, names=case.names)
     agreement = list(result.agreement.values())
     told = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
     sys.stdout.write(
         f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
-        f"see {options.out}/result.json, strip.png, layers.png and replay.glb\n"
+        f"see {Path(options.out) / 'result.json'}, strip.png, layers.png and replay.glb\n"
     )
     return ANSWERED
 
@@ -102,9 +107,11 @@ def _serve(options: argparse.Namespace) -> int:
     from nuno.robot.wire.server import RobotServer
     from nuno.world import World
 
+    _start_warp()
     robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))
     factor = None if options.stepped else options.factor
     with RobotServer(robot, options.host, options.port, real_time_factor=factor) as server:
+        gc.freeze()  # else one message in many thousands waits until all that was loaded is looked through for garbage
         sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
         sys.stdout.flush()
         while not server.join(1.0):
@@ -115,16 +122,50 @@ def _serve(options: argparse.Namespace) -> int:
 def _check_out(name: str) -> None:
     from nuno.errors import InvalidInputError
 
-    out = Path(name)
-    if out.exists() and not out.is_dir():  # now, and not when the work is done
-        raise InvalidInputError(f"--out must be a folder, or the name of one to make; {out} is a file")
+    if not name or "\0" in name:
+        raise InvalidInputError(f"--out must be the name of a folder, got {name!r}")
+    # now, and not when the work is done
+    there = Path(name).absolute()
+    while not os.path.lexists(there):
+        there = there.parent
+    if not there.is_dir():
+        raise InvalidInputError(f"--out must be a folder, or the name of one to make; {there} is a file")
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise InvalidInputError(f"--out must be a folder to write to; {there} is none: {error.strerror}") from error
 
 
-def _quiet_warp() -> None:
+def _start_warp() -> None:
     """Let Warp say nothing but errors: a command's output is its answer."""
     import warp as wp
 
     wp.config.log_level = wp.LOG_ERROR
+    with _without_lines(b"Warp CUDA warning: Could not find or load"):  # most machines have no such driver
+        wp.init()
+
+
+@contextmanager
+def _without_lines(beginning: bytes) -> Iterator[None]:
+    """Leave out lines of standard error that begin so, also where a library's own code writes them."""
+    sys.stderr.flush()
+    try:
+        terminal = os.dup(2)
+    except OSError:  # there is no standard error
+        yield
+        return
+    with tempfile.TemporaryFile() as said:
+        os.dup2(said.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(terminal, 2)
+            said.seek(0)
+            for line in said:
+                if not line.startswith(beginning):
+                    os.write(terminal, line)
+            os.close(terminal)
 
 
 def _failed(error: BaseException, status: int) -> int:

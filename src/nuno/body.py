@@ -82,7 +82,9 @@ class Body(Coordinates):
 
     def __repr__(self) -> str:
         state = "dynamic" if self.is_dynamic else "static"
-        return f"<{self._shape.kind} {self._name!r}, {state}>"
+        place = np.asarray(self.position)
+        where = f"at {_millimetres(place)} m" if place.ndim == 1 else f"in {len(place)} worlds"
+        return f"<{self._shape.kind} {self._name!r} {where}, {state}>"
 
     @property
     def name(self) -> str:
@@ -229,7 +231,11 @@ class Body(Coordinates):
         return sheet_points(self._shape.cells, np.atleast_1d(us), np.atleast_1d(vs))
 
     def closest(self, points: ArrayLike) -> SurfacePoints:
-        """Return the surface points closest to ``points`` (3,), (k, 3) or (worlds, k, 3) [m] of the world."""
+        """Return the surface points closest to ``points`` (3,), (k, 3) or (worlds, k, 3) [m] of the world.
+
+        Raises:
+            InvalidInputError: points that are not finite, or of another shape.
+        """
         asked = finite_array("points", points, (3,), ("k", 3), ("worlds", "k", 3))
         asked = asked[None] if asked.ndim == 1 else asked
         vertices, faces = self.vertices, self._shape.mesh()[1]
@@ -333,3 +339,7 @@ def _mask(name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= ALL_GROUPS:
         raise InvalidInputError(f"{name} must be a bit mask from 0 to {ALL_GROUPS:#x}, got {value!r}")
     return int(value)
+
+
+def _millimetres(place: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.3f}" for value in np.round(place, 3) + 0.0) + ")"

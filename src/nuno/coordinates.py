@@ -90,6 +90,9 @@ class Coordinates:
             angle: Scalar or (worlds,) [rad].
             axis: (3,), any length but zero, or "x", "y", "z".
             wrt: Whether ``axis`` is given in this frame ("local") or in the world's.
+
+        Raises:
+            InvalidInputError: an axis of length zero, a frame that is neither, or a value that is not finite.
         """
         turn = finite_array("angle", angle, (), ("worlds",))
         if isinstance(axis, str):
@@ -107,7 +110,11 @@ class Coordinates:
         return self
 
     def transform(self: Self, other: Coordinates, wrt: Frame = "local") -> Self:
-        """Move by another frame's pose, given in this frame ("local") or in the world."""
+        """Move by another frame's pose, given in this frame ("local") or in the world.
+
+        Raises:
+            InvalidInputError: what is given is no ``Coordinates``, or the frame neither "local" nor "world".
+        """
         if not isinstance(other, Coordinates):
             raise InvalidInputError(f"transform needs Coordinates, got {type(other).__name__}")
         own, motion = self._pose(), other._pose()

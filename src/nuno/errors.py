@@ -5,6 +5,8 @@ Every message says what was received and what is valid; the data that a program 
 
 from __future__ import annotations
 
+from difflib import get_close_matches
+
 
 class NunoError(Exception):
     """Root of all errors that Nuno raises on purpose."""
@@ -25,7 +27,9 @@ class UnknownNameError(NunoError, KeyError):
 
     def __init__(self, kind: str, name: str, valid: list[str]) -> None:
         self.kind, self.name, self.valid = kind, name, sorted(valid)
-        super().__init__(f"no {kind} named {name!r}; there are: {', '.join(self.valid) or 'none'}")
+        alike = get_close_matches(str(name), self.valid, n=1)
+        hint = f" (did you mean {alike[0]!r}?)" if alike else ""
+        super().__init__(f"no {kind} named {name!r}; there are: {', '.join(self.valid) or 'none'}{hint}")
 
     def __str__(self) -> str:
         return str(self.args[0])

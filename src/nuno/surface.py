@@ -42,7 +42,11 @@ class SurfacePoints:
         return int(self.faces.shape[-1])
 
     def per_world(self) -> SurfacePoints:
-        """Return these k points as one point for each of k worlds."""
+        """Return these k points as one point for each of k worlds.
+
+        Raises:
+            InvalidInputError: they differ by world already.
+        """
         if self.faces.ndim != 1:
             raise InvalidInputError(f"the points are by world already: faces has shape {self.faces.shape}")
         return SurfacePoints(self.faces[:, None], self.barycentric[:, None])

@@ -27,9 +27,12 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         InvalidInputError: (or ``error``) not numbers, not finite, or of another shape.
     """
     try:
-        array = np.array(value, dtype=np.float64)
+        array = np.array(value)
+        if array.dtype.kind in "SU":
+            raise ValueError("text is no number")
+        array = array.astype(np.float64)
     except (TypeError, ValueError) as problem:
-        raise error(f"{name} must be numbers of shape {_listed(shapes)}, got {value!r}") from problem
+        raise error(f"{name} must be numbers of shape {_listed(shapes)}, got {_short(value)}") from problem
     if not any(_fits(array.shape, shape) for shape in shapes):
         raise error(f"{name} must have shape {_listed(shapes)}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -67,9 +70,12 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     if high < np.inf:
         valid += f" and <= {high:g}"
     try:
+        if isinstance(value, str | bytes | bool):
+            raise TypeError("no number")
         result = float(value)
-    except (TypeError, ValueError) as problem:
-        raise InvalidInputError(f"{name} must be a number {valid}, got {value!r}") from problem
+    except (TypeError, ValueError, OverflowError) as problem:
+        wanted = "a finite number" if valid == "finite" else f"a number {valid}"
+        raise InvalidInputError(f"{name} must be {wanted}, got {_short(value)}") from problem
     if not np.isfinite(result) or result < low or result <= above or result > high:
         raise InvalidInputError(f"{name} must be {valid}, got {result}")
     return result
@@ -84,6 +90,11 @@ def count(name: str, value: Any, *, low: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
         raise InvalidInputError(f"{name} must be a whole number of at least {low}, got {value!r}")
     return int(value)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 200 else f"{text[:200]}..."
 
 
 def _fits(actual: tuple[int, ...], wanted: Shape) -> bool:

@@ -211,3 +211,5 @@ def test_bad_arguments_are_refused():
         render_ids(world, DOWN, region=Region(0, 0, 161, 10))
     with pytest.raises(InvalidInputError, match="thickness"):
         render_ids(world, DOWN, cloth_thickness=-0.1)
+    with pytest.raises(InvalidInputError, match="a Camera is needed to draw with, got dict"):
+        render_depth(world, {"width": 160})

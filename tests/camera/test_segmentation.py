@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import LOOKS, Pair, make_pair
@@ -91,6 +93,29 @@ def test_table_of_unknown_size(name: str) -> None:
     scene = pair(name, lift=False)
     found = segment_before(scene.before, scene.camera, Table(scene.table.height))
     assert overlap(found, scene.mask_before) > 0.98
+
+
+@pytest.mark.parametrize("half_extents", [(2.0, 2.0), (100.0, 100.0)])
+@pytest.mark.parametrize("name", ["red on brown", "navy on dark grey"])
+def test_table_said_to_be_larger_than_it_is_seen(name: str, half_extents: tuple[float, float]) -> None:
+    """A table whose edge is not where it is said to be does not keep the cloth from being found."""
+    scene = pair(name, lift=False)
+    found = segment_before(scene.before, scene.camera, Table(scene.table.height, half_extents))
+    assert overlap(found, scene.mask_before) > 0.98
+
+
+@pytest.mark.parametrize("name", ["red on brown", "blue stripes on wood", "grey checks on brown"])
+def test_an_image_that_is_little_more_than_the_cloth(name: str) -> None:
+    """Sixteen pixels of table around the cloth are enough."""
+    scene = pair(name, lift=False)
+    rows, columns = np.nonzero(scene.mask_before)
+    left, top = max(columns.min() - 16, 0), max(rows.min() - 16, 0)
+    window = (slice(top, rows.max() + 17), slice(left, columns.max() + 17))
+    image = np.ascontiguousarray(scene.before[window])
+    camera = replace(
+        scene.camera, width=image.shape[1], height=image.shape[0], cx=scene.camera.cx - left, cy=scene.camera.cy - top
+    )
+    assert overlap(segment_before(image, camera, scene.table), scene.mask_before[window]) > 0.98
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
+from nuno.validation import finite_array, number
+
+_DISTORTIONS = (4, 5, 8, 12, 14)  # how many coefficients OpenCV's models have
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +40,28 @@ class Camera:
     distortion: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        pose = np.asarray(self.camera_to_world, dtype=float)
-        if pose.shape != (4, 4) or not np.isfinite(pose).all():
-            raise InvalidInputError(f"camera_to_world must be a finite (4, 4) matrix, got shape {pose.shape}")
+        pose = finite_array("camera_to_world", self.camera_to_world, (4, 4))
         rotation = pose[:3, :3]
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-            raise InvalidInputError("the upper left (3, 3) of camera_to_world must be a rotation matrix")
-        if int(self.width) <= 0 or int(self.height) <= 0:
-            raise InvalidInputError(f"an image needs pixels, got {self.width} x {self.height}")
-        intrinsics = np.array([self.fx, self.fy, self.cx, self.cy], dtype=float)
-        if not np.isfinite(intrinsics).all() or self.fx <= 0 or self.fy <= 0:
-            raise InvalidInputError(f"fx, fy must be positive and finite, got fx={self.fx}, fy={self.fy}")
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3:
+            raise InvalidInputError("the upper left (3, 3) of camera_to_world must be a rotation, which this is not")
+        if np.linalg.det(rotation) < 0:
+            raise InvalidInputError("the upper left (3, 3) of camera_to_world must be a rotation, got a reflection")
+        if np.abs(pose[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-6:
+            raise InvalidInputError(
+                f"the last row of camera_to_world must be 0, 0, 0, 1, got {pose[3].tolist()}; is it transposed?"
+            )
+        for name in ("width", "height"):
+            object.__setattr__(self, name, _pixels(name, getattr(self, name)))
+        for name in ("fx", "fy"):
+            number(name, getattr(self, name), above=0.0)
+        for name in ("cx", "cy"):
+            number(name, getattr(self, name))
         object.__setattr__(self, "camera_to_world", pose)
         if self.distortion is not None:
-            object.__setattr__(self, "distortion", np.asarray(self.distortion, dtype=float).ravel())
+            distortion = np.asarray(self.distortion)
+            if distortion.size:
+                distortion = finite_array("distortion", distortion.ravel(), *((n,) for n in _DISTORTIONS))
+            object.__setattr__(self, "distortion", distortion if distortion.size else None)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Camera:
@@ -66,13 +77,9 @@ class Camera:
         if missing:
             raise InvalidInputError(f"the camera lacks {', '.join(missing)}; it needs {', '.join(names)}")
         try:
-            fx, fy, cx, cy = (float(data[k]) for k in ("fx", "fy", "cx", "cy"))
-            return cls(
-                int(data["width"]), int(data["height"]), fx, fy, cx, cy,
-                camera_to_world=np.asarray(data["camera_to_world"], dtype=float), distortion=data.get("distortion"),
-            )  # fmt: skip
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"the camera's entries are not numbers: {error}") from error
+            return cls(**{name: data[name] for name in names}, distortion=data.get("distortion"))
+        except InvalidInputError as error:
+            raise InvalidInputError(f"camera: {error}") from error
 
     @property
     def matrix(self) -> np.ndarray:
@@ -137,3 +144,10 @@ class Camera:
         if not (np.isfinite(distance) & (distance > 0)).all():
             raise InvalidInputError(f"a pixel's ray does not meet the plane z = {height} in front of the camera")
         return origin + distance[..., None] * rays
+
+
+def _pixels(name: str, value: Any) -> int:
+    pixels = number(f"{name} in pixels", value, low=1.0)
+    if pixels != int(pixels):
+        raise InvalidInputError(f"{name} must be a whole number of pixels, got {value!r}")
+    return int(pixels)

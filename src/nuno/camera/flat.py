@@ -15,6 +15,7 @@ _STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture
 _DIFFERENT = 4.0  # standard deviations of the table's own colour
 _CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a stain
 _SMALLEST = 20  # [blocks] of a region that may be a cloth
+_RECTANGLE = 0.8  # share of the smallest rectangle around it that a flat cloth fills; a disc has 0.785
 
 
 def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +65,24 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     found = cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     found = cv2.morphologyEx(found, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     pixel = None if box is not None else hint
-    return _choose(found, distance, pixel, xy if hint is None else None), surface
+    if box is not None:
+        return _choose(found, distance, pixel, None), surface
+    # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
+    # surface surrounds is looked for, as where the table's extents are not known.
+    try:
+        blob = _choose(found, distance, pixel, xy if hint is None else None)
+    except ClothNotFoundError:
+        try:
+            return _surrounded(small, xy, hint)
+        except ClothNotFoundError:
+            pass
+        raise
+    if _likeness(blob, xy) < _RECTANGLE:
+        try:
+            return _surrounded(small, xy, hint)
+        except ClothNotFoundError:
+            pass
+    return blob, surface
 
 
 def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.ndarray:
@@ -153,7 +171,7 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
                 if blob.sum() < _SMALLEST or (pixel is not None and _label_near(blob.astype(int), pixel) == 0):
                     continue
                 size, likeness = _size_on_plane(contour[:, 0], xy)
-                if likeness < 0.8 or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:
+                if likeness < _RECTANGLE or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:
                     continue
                 if likeness * np.sqrt(blob.sum()) > best:
                     best, answer = (
@@ -166,6 +184,12 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
             "the table's half_extents, or a box around the cloth as a hint, would help"
         )
     return answer
+
+
+def _likeness(blob: np.ndarray, xy: np.ndarray) -> float:
+    """How full a region (h, w) bool makes the smallest rectangle around it on the plane; 0 if it leaves the plane."""
+    contours, _ = cv2.findContours(blob.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return _size_on_plane(max(contours, key=len)[:, 0], xy)[1]
 
 
 def _size_on_plane(outline: np.ndarray, xy: np.ndarray) -> tuple[tuple[float, float], float]:

@@ -26,11 +26,17 @@ def read_image(path: str | Path) -> np.ndarray:
     import cv2
 
     path = Path(path)
-    if not path.is_file():
-        raise ImageError(f"no image file at {path}")
     # imdecode instead of imread: imread prints its own warning and cannot open every path on Windows.
-    data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    try:
+        if not path.is_file():
+            raise ImageError(f"no image file at {path}")
+        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise ImageError(f"an image file cannot be read: {error}") from error
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    except cv2.error as error:
+        raise ImageError(f"{path} ({data.size} bytes) cannot be decoded: {error.err or error}") from error
     if image is None:
         raise ImageError(f"{path} ({data.size} bytes) holds no image that OpenCV can decode (PNG, JPEG, TIFF ...)")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)

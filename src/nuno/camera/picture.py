@@ -74,6 +74,10 @@ class Picture:
     ids: Any
     bodies: tuple[Any, ...] = field(repr=False)
 
+    def __repr__(self) -> str:
+        size = f"{self.camera.width} x {self.camera.height} px"
+        return f"<Picture of {size} at t = {self.time:.3f} s, {len(self.bodies)} bodies>"
+
     def mask(self, *bodies: Any) -> np.ndarray:
         """Return where any of the bodies, or of their names, is seen: bool (h, w), in a batch (worlds, h, w).
 

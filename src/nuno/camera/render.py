@@ -125,6 +125,8 @@ def _render(
     world: Any, camera: Camera, region: Region | None, labels: list[int], hidden: set[int],
     cloth_thickness: float, dtype: Any, read: Callable[..., wp.array],
 ) -> wp.array:  # fmt: skip
+    if not isinstance(camera, Camera):
+        raise InvalidInputError(f"a Camera is needed to draw with, got {type(camera).__name__}")
     region = Region.full(camera) if region is None else region
     seen = view(camera, region)
     device, worlds = world.device, int(world.world_count)

@@ -12,9 +12,10 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
 from nuno.errors import InvalidInputError
-from nuno.estimate.case_file import read_case_file
+from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
+from nuno.validation import finite_array
 
 NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_position_m")
 
@@ -43,6 +44,10 @@ class PickCase:
     table_centre: tuple[float, float] | None
     table_thickness: float
 
+    def __repr__(self) -> str:
+        size = f"{self.camera.width} x {self.camera.height} px"
+        return f"<PickCase: two images of {size}, table at {self.table_height:g} m, hand at {self.hand} m>"
+
     def estimate(self, **options: Any) -> PickResult:
         """Call `nuno.estimate_pick` on this case; ``options`` are that function's keyword arguments."""
         return estimate_pick(
@@ -67,7 +72,6 @@ def read_case(folder: str | os.PathLike[str]) -> PickCase:
         if not isinstance(data[name], str):
             raise InvalidInputError(f"{name} in {path} must be a file name, got {data[name]!r}")
         images.append(read_image(folder / data[name]))
-    return PickCase(
-        Camera.from_dict(data["camera"]), images[0], images[1], data["table_height_m"], data["hand_position_m"],
-        data.get("table_half_extents_xy_m"), data.get("table_centre_xy_m"), data.get("table_thickness_m", 0.04),
-    )  # fmt: skip
+    height, extents, centre, thickness = read_table(path, data)
+    hand = finite_array(f"hand_position_m in {path}", data["hand_position_m"], (3,))
+    return PickCase(Camera.from_dict(data["camera"]), images[0], images[1], height, hand, extents, centre, thickness)

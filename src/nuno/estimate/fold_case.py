@@ -13,7 +13,7 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, read_image
 from nuno.errors import InvalidInputError
-from nuno.estimate.case_file import read_case_file
+from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.fold import replay_fold
 from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.hand_path import HandPath
@@ -21,6 +21,8 @@ from nuno.validation import finite_array
 
 NEEDED = ("camera", "table_height_m", "frames")
 NEEDED_OF_A_FRAME = ("t", "hands_m", "held")
+LONGEST = 600.0
+"""[s] Of a fold: a replay keeps the state of every frame. Times in milliseconds are longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,10 @@ class FoldCase:
     table_half_extents: tuple[float, float] | None
     table_centre: tuple[float, float] | None
     table_thickness: float
+
+    def __repr__(self) -> str:
+        size = f"{self.camera.width} x {self.camera.height} px"
+        return f"<FoldCase: {len(self.times)} frames, {len(self.images)} images of {size}, {len(self.hands)} hands>"
 
     def replay(self, **options: Any) -> FoldResult:
         """Call `nuno.replay_fold` on this case; ``options`` are that function's keyword arguments."""
@@ -80,16 +86,20 @@ def read_fold_case(folder: str | os.PathLike[str]) -> FoldCase:
     images, names = _images(frames, folder, camera)
     if 0 not in images:
         raise InvalidInputError(f"the first frame in {path} has no rgb; the cloth's model comes from it")
-    return FoldCase(
-        camera, times, hands, images, names, data["table_height_m"], data.get("table_half_extents_xy_m"),
-        data.get("table_centre_xy_m"), data.get("table_thickness_m", 0.04),
-    )  # fmt: skip
+    return FoldCase(camera, times, hands, images, names, *read_table(path, data))
 
 
 def _hands(frames: list[dict[str, Any]], path: FilePath) -> tuple[np.ndarray, tuple[HandPath, ...]]:
     times = finite_array(f"t of the frames in {path}", [frame["t"] for frame in frames], ("k",))
+    if times[-1] - times[0] > LONGEST:
+        raise InvalidInputError(
+            f"t of the frames in {path} must be seconds, over {LONGEST:g} s at most; got {times[-1] - times[0]:g} s"
+        )
     try:
-        positions = np.array([frame["hands_m"] for frame in frames], dtype=float)
+        given = np.array([frame["hands_m"] for frame in frames])
+        if given.dtype.kind in "SUb":
+            raise ValueError("text is no number")
+        positions = given.astype(float)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"hands_m in {path} must be as many positions (x, y, z) in every frame") from error
     if positions.ndim != 3 or positions.shape[1] < 1 or positions.shape[2] != 3:

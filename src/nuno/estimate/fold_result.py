@@ -78,6 +78,12 @@ class FoldResult:
     images: dict[int, np.ndarray] = field(repr=False)
     first_image: np.ndarray | None = field(default=None, repr=False)
 
+    def __repr__(self) -> str:
+        agreement = list(self.agreement.values())
+        told = f", agreement {np.mean(agreement):.3f}" if agreement else ""
+        odd = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"<FoldResult: {len(self.times)} frames as {self.material_name}{told}{odd}>"
+
     @property
     def final(self) -> np.ndarray:
         """(n, 3) float [m], the cloth at the last frame."""

@@ -51,6 +51,7 @@ class PickResult:
         hand: (3,) where the held point is [m].
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
+        seen_warnings: What was odd about how it was seen.
     """
 
     labels: np.ndarray
@@ -72,6 +73,11 @@ class PickResult:
     image_after: np.ndarray | None = field(default=None, repr=False)
     mask_before: np.ndarray | None = field(default=None, repr=False)
     mask_after: np.ndarray | None = field(default=None, repr=False)
+    seen_warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        odd = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"<PickResult: {self.best} of {len(self.labels)}, confidence {self.confidence:.2f}{odd}>"
 
     @property
     def best(self) -> tuple[Any, Any]:
@@ -94,7 +100,7 @@ class PickResult:
     @cached_property
     def warnings(self) -> list[str]:
         """What a reader of the answer should know, in plain words."""
-        found = list(self.rectangle.warnings)
+        found = [*self.rectangle.warnings, *self.seen_warnings]
         if self.confidence < LOW_CONFIDENCE:
             second = self._label(int(self.order[1]))
             found.append(

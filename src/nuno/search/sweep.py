@@ -42,6 +42,11 @@ class SweepResult:
     trials: list[Trial | None]
     stopped: bool = False
 
+    def __repr__(self) -> str:
+        finished = sum(trial is not None for trial in self.trials)
+        told = f"{finished} of {len(self)} trials, {len(self.failures)} failed"
+        return f"<SweepResult: {told}; {', '.join(self.params)} -> {', '.join(self.names) or 'nothing'}>"
+
     def __len__(self) -> int:
         return len(self.trials)
 

@@ -66,6 +66,9 @@ class CarryResult:
     device: str
     seconds: dict[str, float]
 
+    def __repr__(self) -> str:
+        return f"<CarryResult: {len(self.trials)} trials, the mat fell in {int(self.failed.sum())}>"
+
     @property
     def values(self) -> np.ndarray:
         """(trials,) float [m s], F of each; NaN where the mat fell."""
@@ -133,6 +136,9 @@ class CarryResult:
 
         Returns:
             (k, n, 3) float [m].
+
+        Raises:
+            InvalidInputError: there is no such trial, or a time outside of it.
         """
         self._check(trial)
         frames = [round((time + self.plan.settle) * FRAME_RATE) for time in times]
@@ -204,7 +210,11 @@ class CarryResult:
 
     @property
     def telling_failure(self) -> int:
-        """The number of the trial in which the mat fell last: the one that the walk itself brought down, if any."""
+        """The number of the trial in which the mat fell last: the one that the walk itself brought down, if any.
+
+        Raises:
+            InvalidInputError: it fell in none.
+        """
         times = [-np.inf if trial.failed_at is None else trial.failed_at for trial in self.trials]
         if not self.failed.any():
             raise InvalidInputError("the mat fell in no trial")

@@ -1,0 +1,74 @@
+"""What README and docs show is Python, uses names that there are, and the first program that they show runs."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import nuno
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCKS = {
+    f"{page.stem}-{number}": text
+    for page in PAGES
+    for number, text in enumerate(re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S))
+}
+# what the docs call things of these classes, on every page; a robot is its model on some and its driver on others
+CALLED = {
+    "world": (nuno.World,),
+    "futures": (nuno.World,),
+    "towel": (nuno.Body,),
+    "table": (nuno.Body,),
+    "grip": (nuno.Grip,),
+    "recording": (nuno.Recording,),
+    "robot": (nuno.SimulatedRobot, nuno.Humanoid),
+    "viewer": (nuno.Viewer,),
+    "path": (nuno.Path,),
+}
+
+
+def test_there_are_blocks():
+    """The pages were found, and programs in them."""
+    assert len(BLOCKS) > 20
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_names_are_there(name):
+    """Every block compiles; ``nuno.X`` is public, and what is asked of a world, body or robot is a member."""
+    for node in ast.walk(ast.parse(BLOCKS[name])):
+        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name):
+            continue
+        if node.value.id == "nuno":
+            assert node.attr in nuno.__all__, f"nuno.{node.attr}"
+        elif node.value.id in CALLED:
+            members = set().union(*(members_of(owner) for owner in CALLED[node.value.id]))
+            assert node.attr in members, f"{node.value.id}.{node.attr}"
+
+
+def members_of(owner):
+    """Return what a class has, with the attributes that its modules set of an object."""
+    found = set(dir(owner))
+    for part in owner.__mro__[:-1]:
+        for node in ast.walk(ast.parse(Path(sys.modules[part.__module__].__file__).read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+                found.add(node.attr)
+    return found | set(getattr(owner, "__dataclass_fields__", ()))
+
+
+def test_links_lead_somewhere():
+    """Every relative link of a page is a file."""
+    for page in PAGES:
+        for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_the_first_program_runs(tmp_path):
+    """That of docs/getting-started.md, as it is, in a process of its own."""
+    (tmp_path / "first.py").write_text(BLOCKS["getting-started-0"])
+    done = subprocess.run([sys.executable, "first.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "(425, 3)" in done.stdout
