@@ -68,12 +68,13 @@ def test_scalar_vector_and_lanes_give_the_same_bits(kind, self_contact):
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
+@pytest.mark.parametrize("plan", ["large", "grid"])
 @pytest.mark.parametrize("worlds", [1, 3])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
-def test_the_large_plan_gives_the_bits_of_the_fused_one(kind, worlds):
+def test_the_large_plans_give_the_bits_of_the_fused_one(kind, worlds, plan):
     """Promise: without self-contact, whose sums are in fixed point, the colours' order is all that counts."""
     expected = outcome(solver(kind, "fused", worlds))
-    np.testing.assert_array_equal(outcome(solver(kind, "large", worlds)), expected)
+    np.testing.assert_array_equal(outcome(solver(kind, plan, worlds)), expected)
 
 
 @pytest.mark.parametrize("worlds", [1, 3])
@@ -88,6 +89,18 @@ def test_the_large_plan_lists_the_pairs_of_the_fused_one(worlds):
     assert made[0].pair_counts.min() > 0
     np.testing.assert_array_equal(made[0].pair_counts[:, 1], made[1].pair_counts[:, 1])
     np.testing.assert_allclose(made[0].pair_counts[:, 0], made[1].pair_counts[:, 0], rtol=0.5)
+
+
+def test_pairs_of_blocks_that_were_not_noted_are_found(monkeypatch):
+    """Promise: where there is no room to note all near pairs of blocks, all are gone through, and as many listed."""
+    counts = []
+    for room in (24, 0.1):
+        monkeypatch.setattr("nuno.contact.team_listing.ROOM", room)
+        made = solver("sheet", "large", 2, self_contact=True)
+        made.run(0.0, 1.0 / 60.0 / 12.0)
+        counts.append(made.pair_counts)
+    assert counts[0].min() > 0
+    np.testing.assert_array_equal(*counts)
 
 
 def test_the_large_plan_keeps_layers_apart():
@@ -214,7 +227,7 @@ def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large"])
+@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
     """The same phases; fused multiply-adds round otherwise, and a swinging cloth makes 1e-7 m grow to millimetres."""
@@ -224,11 +237,11 @@ def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large"])
+@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     """Promise: same input, same bits, in any place of a batch, self-contact included.
 
-    Many worlds run with fewer threads each than few do.
+    Many worlds run with fewer threads, or fewer blocks, each than few do.
     """
     alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
     for worlds in (1, 5, 300) if plan == "fused" else (1, 5):

@@ -28,13 +28,32 @@ GROUP = 8
 """Consecutive blocks that are passed over together where their common box is far."""
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+int* at = count.data + which;
+if (__isShared(at)) return atomicAdd(at, 1);
+// a hundred thousand threads that count on one number of the device's memory queue up: one counts for those beside it
+const unsigned beside = __activemask();
+const int leader = __ffs(beside) - 1, lane = threadIdx.x % 32;
+int first = 0;
+if (lane == leader) first = atomicAdd(at, __popc(beside));
+return __shfl_sync(beside, first, leader) + __popc(beside & ((1u << lane) - 1u));
+#else
+return count.data[which]++;
+#endif
+""")
+def next_place(count: wp.array(dtype=int), which: int) -> int:
+    """Raise a count by one; what it was before."""
+    ...
+
+
 @wp.func
 def append(
     hit: float, count: wp.array(dtype=int), which: int, pairs: wp.array(dtype=int), a: int, b: int, c: int, d: int
 ):
     """Add a candidate to the list where ``hit`` is positive; what does not fit is counted but not kept."""
     if hit > 0.0:
-        k = wp.atomic_add(count, which, 1)
+        k = next_place(count, which)
         if 4 * k + 3 < pairs.shape[0]:
             pairs[4 * k] = a
             pairs[4 * k + 1] = b

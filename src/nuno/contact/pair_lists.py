@@ -133,6 +133,27 @@ def swept(t: Any, run: Settings):
 
 
 @wp.func
+def pick_near(t: Any, far: Any, thread: int, threads: int):
+    """Add those of the listed pairs that are nearer than ``far`` to those that may touch."""
+    far2 = times(far, far)
+    none = fill(far, -1.0)
+    for k in range(thread, wp.min(highest(t.pair_count[0]), t.vertex_triangle.shape[0] / 4), threads):
+        a = t.vertex_triangle[4 * k]
+        b = t.vertex_triangle[4 * k + 1]
+        c = t.vertex_triangle[4 * k + 2]
+        d = t.vertex_triangle[4 * k + 3]
+        hit = choose(within(far, k, t.pair_count[0]), near_triangle(t, a, b, c, d, far2), none)
+        append(hit, t.touch_count, 0, t.touch_triangle, a, b, c, d)
+    for k in range(thread, wp.min(highest(t.pair_count[1]), t.edge_edge.shape[0] / 4), threads):
+        a = t.edge_edge[4 * k]
+        b = t.edge_edge[4 * k + 1]
+        c = t.edge_edge[4 * k + 2]
+        d = t.edge_edge[4 * k + 3]
+        hit = choose(within(far, k, t.pair_count[1]), near_edges(t, a, b, c, d, far2), none)
+        append(hit, t.touch_count, 1, t.touch_edge, a, b, c, d)
+
+
+@wp.func
 def pick_touching(t: Any, run: Settings, fresh: int, thread: int, threads: int):
     """Pick the listed pairs that may touch within the next few substeps, each world as many as its speed asks for.
 
@@ -149,21 +170,5 @@ def pick_touching(t: Any, run: Settings, fresh: int, thread: int, threads: int):
             t.notes[PICKED] = fill(like, 0.0)
             t.notes[PICK_REACH] = ahead
         barrier(threads)
-        far = t.scalars[THICKNESS] + ahead * 1.01
-        far2 = times(far, far)
-        none = fill(like, -1.0)
-        for k in range(thread, wp.min(highest(t.pair_count[0]), t.vertex_triangle.shape[0] / 4), threads):
-            a = t.vertex_triangle[4 * k]
-            b = t.vertex_triangle[4 * k + 1]
-            c = t.vertex_triangle[4 * k + 2]
-            d = t.vertex_triangle[4 * k + 3]
-            hit = choose(within(like, k, t.pair_count[0]), near_triangle(t, a, b, c, d, far2), none)
-            append(hit, t.touch_count, 0, t.touch_triangle, a, b, c, d)
-        for k in range(thread, wp.min(highest(t.pair_count[1]), t.edge_edge.shape[0] / 4), threads):
-            a = t.edge_edge[4 * k]
-            b = t.edge_edge[4 * k + 1]
-            c = t.edge_edge[4 * k + 2]
-            d = t.edge_edge[4 * k + 3]
-            hit = choose(within(like, k, t.pair_count[1]), near_edges(t, a, b, c, d, far2), none)
-            append(hit, t.touch_count, 1, t.touch_edge, a, b, c, d)
+        pick_near(t, t.scalars[THICKNESS] + ahead * 1.01, thread, threads)
         barrier(threads)

@@ -9,16 +9,20 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.nearness import GROUP
+from nuno.contact.team_listing import make_lists
 from nuno.contact.world_room import listing_room
 from nuno.scene.cloth import ClothTopology
+from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.frame import run_lanes, run_worlds
+from nuno.solver.grid import FEWEST_BLOCKS, GridPlan, team_blocks
 from nuno.solver.groups import run_groups
-from nuno.solver.large import CELLS, LINES, PATCHES, TRIANGLES, TWISTS, YARNS, LargePlan
+from nuno.solver.large import LargePlan
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import FEW_THREADS, MANY_THREADS, run_blocks, run_blocks_partly, run_blocks_shared
 from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES
-from nuno.solver.state import HELP, ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
+from nuno.solver.stages import divide, make_work
+from nuno.solver.state import HELP, LISTINGS, NOTES, ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
 from nuno.solver.substeps import default_substeps
 from nuno.solver.upload import upload
 from nuno.solver.warps import WARP
@@ -42,7 +46,14 @@ LISTS = 4.0e9
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
-"""Above this a world does not fit a block well and runs a launch per phase in a captured graph."""
+"""Above this a world does not fit a block well and takes a device's blocks together."""
+LARGE = ("grid", "large")
+"""Plans in which many blocks work on a world."""
+GRID_MARGIN = 0.45
+"""Margin of the lists of the plan "grid" over the size of a cell: lists are few. With the largest thickness, half a
+cell, it is less than a cell, so that flat cloth still has no candidates."""
+CPU_SHARES = 5
+"""Blocks of such a plan on the CPU, one after the other: enough to test how work is shared."""
 
 
 class ClothSolver(ParticleSolver):
@@ -60,7 +71,8 @@ class ClothSolver(ParticleSolver):
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
         self_contact: Whether the cloth collides with itself.
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
-            the CPU by sixteen elements at a time) or "large" (a launch per phase).
+            the CPU by sixteen elements at a time), "grid" (all blocks of a CUDA device together) or "large" (a launch
+            per phase).
 
     Limitations: one pass a substep, so that what is stiffer than m / dt^2 comes out softer than stated, except along
     a sheet's yarns, which are solved exactly; damping acts on bending alone.
@@ -81,8 +93,8 @@ class ClothSolver(ParticleSolver):
         self_contact: bool = True,
         plan: str = "auto",
     ) -> None:
-        # the large plan keeps one world after the other, also where it is tried out on the CPU
-        self._prepare(positions, device, gravity, frame_rate, lanes=plan != "large")
+        # the large plans keep one world after the other, also where it is tried out on the CPU
+        self._prepare(positions, device, gravity, frame_rate, lanes=plan not in LARGE)
         self.topology, self._cell_size = topology, topology.cell_size
         down = float(np.linalg.norm(self.gravity))
         values = material.resolved(self.world_count, topology.element_count)
@@ -93,10 +105,14 @@ class ClothSolver(ParticleSolver):
         self.shared_memory = True
         if plan == "auto":
             one = "vector" if not self._cuda and self.world_count == 1 else "fused"
-            plan = "large" if self._cuda and self.particle_count > BLOCK_PARTICLES else one
+            plan = one
+            if self._cuda and self.particle_count > BLOCK_PARTICLES:
+                plan = "grid" if team_blocks(self.world_count, self.device) >= FEWEST_BLOCKS else "large"
         self.plan = plan
-        self._large: LargePlan | None = None
+        self._large: LargePlan | GridPlan | None = None
         self._wide: Any = None
+        # what the large plans share out, and their room for listing pairs
+        self._shared: tuple[Any, Any] | None = None
         self._build(values, friction)
         self._start(positions, velocities)
 
@@ -116,6 +132,7 @@ class ClothSolver(ParticleSolver):
             table = getattr(soft, kind)
             setattr(state, f"{kind}_soft", self._put(table))
             setattr(size, f"{kind}_soft", table.shape[1])
+        self._soft = soft
         for kind in ("edge", "cell", "line", "twist", "patch"):
             setattr(topo, f"{kind}_soft", wp.array(getattr(soft, kind), dtype=int, device=self.device))
         topo.triangle_soft = wp.array(soft.triangle, dtype=wp.vec3i, device=self.device)
@@ -141,13 +158,15 @@ class ClothSolver(ParticleSolver):
         size.blocks = 6 * (blocks.count + -(-blocks.count // GROUP))
         size.listed = 3 * n + 8 if self.self_contact else 1
         size.near_blocks = 1
-        if self._cuda and self.plan != "large" and self.self_contact:
+        if self.plan in LARGE:
+            size.blocks = bounds_room(blocks.count)
+        elif self._cuda and self.self_contact:
             # and boxes of what each block moved; pairs of blocks: all, or of many 128 each
             size.blocks += 6 * blocks.count
             size.near_blocks = 1 + min(blocks.count * (blocks.count + 1) // 2, 128 * blocks.count)
         elements = len(blocks.face), len(blocks.edge)
         # spheres of all elements, or on the CPU the room in which one world after the other is listed
-        alone = not self._cuda and self.plan != "large"
+        alone = not self._cuda and self.plan not in LARGE
         middle = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
         size.middle = middle if self.self_contact else 1
         least = self.world_count * n * sum(PAIRS) * PAIR_BYTES
@@ -159,7 +178,7 @@ class ClothSolver(ParticleSolver):
             size.edge_edge = max(size.edge_edge, SUSPECTS * FEW_THREADS // WARP // 2)
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
-        size.moved = 4 * n if self._cuda or self.plan == "large" else 1
+        size.moved = 4 * n if self._cuda or self.plan in LARGE else 1
 
         self._allocate_particles()
         size.edges = max(1, len(self.topology.edges))
@@ -192,7 +211,7 @@ class ClothSolver(ParticleSolver):
     def _allocate_help(self) -> None:
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
         state, worlds, cores = self._state, self.world_count, 0
-        if self._cuda and self.plan != "large" and self.self_contact:
+        if self._cuda and self.plan not in LARGE and self.self_contact:
             cores = wp.get_device(self.device).sm_count
         state.helpers = max(0, min(cores - worlds, MOST_HELPERS * worlds))
         room = state.helpers * 4 * self._size.edge_edge
@@ -204,8 +223,15 @@ class ClothSolver(ParticleSolver):
         """(worlds, 2) int: listed vertex-triangle and edge-edge candidates, those that did not fit included."""
         return self._get(self._state.pair_count, 2)
 
+    @property
+    def listings(self) -> np.ndarray:
+        """(worlds,) float, how often pairs were listed since the state was set."""
+        return self._get(self._state.notes, NOTES)[:, LISTINGS]
+
     def _advance(self, run: Settings, substeps: int) -> None:
-        if self.plan == "large":
+        if self.plan in LARGE:
+            if self.plan == "grid":
+                run.margin = GRID_MARGIN * self._cell_size
             if self._large is None:
                 self._large = self._large_plan()
             self._large.run(run, substeps)
@@ -241,10 +267,14 @@ class ClothSolver(ParticleSolver):
     def _forget_launches(self) -> None:
         self._large = None
 
-    def _large_plan(self) -> LargePlan:
-        topology = self.topology
-        kinds = {PATCHES: topology.patches, TWISTS: topology.twists, LINES: topology.lines, CELLS: topology.cells}
-        colours = {kind: elements.offsets for kind, elements in kinds.items()}
-        colours |= {TRIANGLES: topology.triangles.offsets, YARNS: self._topology.yarn_kind.numpy()}
+    def _large_plan(self) -> LargePlan | GridPlan:
+        grid = self.plan == "grid"
+        blocks = team_blocks(self.world_count if grid else 1, self.device)
+        stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES)
+        if self._shared is None:
+            work = make_work(self.topology, self._soft, stages, self.device)
+            self._shared = work, make_lists(self._topology, self.world_count, self.device)
+        work, lists = self._shared
         parts = (self._state, self._topology, self._size, self._shapes)
-        return LargePlan(*parts, self.device, self.world_count, colours)
+        launches = LargePlan(*parts, self.device, self.world_count, work, stages.first, lists)
+        return GridPlan(launches, *parts, self.device, self.world_count, work, lists) if grid else launches

@@ -1,9 +1,10 @@
-"""The plan for scenes too large for a block: a launch per phase and colour over the whole device.
+"""The plan for scenes too large for a block: a launch per stage over the whole device.
 
-A launch's end is the barrier between phases. On CUDA a substep's launches are captured once as a graph and replayed;
-everything that changes from run to run (the clock, what was listed, the grips' times) lives in arrays that keep
-their place. The phases are those of `nuno.solver.frame`, so that colours come in the same order and give the same
-bits; only self-contact is summed in fixed point, as in a block.
+A launch's end is the wait between stages (`nuno.scene.stages`). On CUDA a substep's launches are captured once as a
+graph and replayed; everything that changes from run to run (the clock, what was listed, the grips' times) lives in
+arrays that keep their place. The phases are those of `nuno.solver.frame`, so that colours come in the same order and
+give the same bits; only self-contact is summed in fixed point, as in a block. Where all blocks fit a device at once,
+`nuno.solver.grid` goes through the same phases in one launch a frame.
 """
 
 from __future__ import annotations
@@ -16,17 +17,11 @@ import warp as wp
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.solver.broad import PairFinder
-from nuno.solver.frame import (
-    bend_lines,
-    bend_patches,
-    bend_twists,
-    meet_shapes,
-    shear_cells,
-    strain_triangles,
-    stretch_yarns,
-)
-from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.frame import meet_shapes
+from nuno.solver.grips import forget_loads, pull_points, read_loads
+from nuno.solver.integrate import read_velocities, reset_speed, tick
+from nuno.solver.lanes import barrier
+from nuno.solver.stages import Work, go_through, steps_of
 from nuno.solver.state import (
     LAYERS,
     MOTION,
@@ -40,15 +35,17 @@ from nuno.solver.state import (
     Topology,
     view,
 )
+from nuno.solver.team import team_of
 from nuno.solver.warps import WARP
 
-PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS = range(6)
 RESET, MEASURE, SELECT, SORT = range(4)
 
 FEW = 1024
 """Threads a world where each ends in an atomic on one number."""
 MANY = 1 << 16
 """Threads a world that look through the listed pairs."""
+THREADS = 512
+"""Threads of a block that has its share of the steps of all stages."""
 CPU_THREADS = 64
 """Shares of a phase on the CPU, where they run one after the other: enough to test what many threads do."""
 
@@ -77,50 +74,22 @@ def start(s: StateFloat, topo: Topology, size: Sizes, run: Settings):
 
 
 @wp.kernel(enable_backward=False)
-def begin(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
-    """The predicted positions."""
+def unload(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
+    """The sums of the loads of stiff grips set to zero."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
-    predict(t, topo.particles, run, tid % threads, threads)
+    forget_loads(t, run, tid % threads, threads)
 
 
-@wp.kernel(enable_backward=False)
-def hold(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
-    """Stiff grips on vertices."""
-    tid = wp.tid()
-    t = view(s, tid / threads, topo.particles, size)
-    hold_vertices(t, run, tid % threads, threads)
-
-
-@wp.kernel(enable_backward=False)
-def project(s: StateFloat, topo: Topology, size: Sizes, run: Settings, kind: int, first: int, last: int, threads: int):
-    """The elements first to last of one kind, which share no vertex."""
-    tid = wp.tid()
-    t = view(s, tid / threads, topo.particles, size)
-    thread = tid % threads
-    if kind == PATCHES:
-        bend_patches(t, topo, run, first, last, thread, threads)
-    elif kind == TWISTS:
-        bend_twists(t, topo, run, first, last, thread, threads)
-    elif kind == LINES:
-        bend_lines(t, topo, run, first, last, thread, threads)
-    elif kind == CELLS:
-        shear_cells(t, topo, run, first, last, thread, threads)
-    elif kind == TRIANGLES:
-        strain_triangles(t, topo, run, first, last, thread, threads)
-    else:
-        stretch_yarns(t, topo, run, first, last, thread, threads)
-
-
-@wp.kernel(enable_backward=False)
-def unload(s: StateFloat, topo: Topology, size: Sizes, run: Settings, start: int, threads: int):
-    """The loads of stiff grips: what this substep's were, or the sums set to zero."""
-    tid = wp.tid()
-    t = view(s, tid / threads, topo.particles, size)
-    if start != 0:
-        forget_loads(t, run, tid % threads, threads)
-    else:
-        read_loads(t, run, tid % threads, threads)
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
+def project(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, work: Work, gate: wp.array(dtype=int), begin: int,
+    end: int, blocks: int, threads: int,
+):  # fmt: skip
+    """The steps of one stage, a share a block."""
+    world, team = team_of(wp.tid(), gate, 0, s.worlds, blocks, threads)
+    t = view(s, world, topo.particles, size)
+    go_through(t, topo, work, steps_of(work, team.block), run, run.grips, begin, end, team)
 
 
 @wp.kernel(enable_backward=False)
@@ -140,24 +109,56 @@ def touch(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: in
 
 
 @wp.kernel(enable_backward=False)
-def settle(s: StateFloat, topo: Topology, size: Sizes, run: Settings, last: int, threads: int):
-    """Apply the sums; in the end the old speed has served."""
+def settle(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
+    """Apply the sums."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     take_moves(t, topo.particles, tid % threads, threads)
-    if last != 0:
-        reset_speed(t, tid % threads)
 
 
 @wp.kernel(enable_backward=False)
-def finish(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, threads: int):
-    """Shapes and velocities, particle by particle."""
-    tid = wp.tid()
-    t = view(s, tid / threads, topo.particles, size)
+def calm(s: StateFloat, topo: Topology, size: Sizes):
+    """The old speed has served; one thread a world."""
+    t = view(s, wp.tid(), topo.particles, size)
+    reset_speed(t, 0)
+
+
+@wp.func
+def come_to_rest(
+    t: StateFloat, n: int, run: Settings, shapes: Shapes, grips: int, first: int, last: int, thread: int, threads: int
+):
+    """What ends a substep of the particles first to last: sums of contact, stiff grips, shapes, velocities.
+
+    ``grips`` is none where no stiff grip is on one of these.
+    """
+    if run.parts & LAYERS != 0 and run.touching != 0:
+        for i in range(first + thread, last, threads):
+            take_moves(t, n, i, n)
     if run.parts & SHAPES != 0:
-        meet_shapes(t, topo.particles, shapes, run.dt, tid % threads, threads)
+        if grips > 0:
+            barrier(threads)
+            for g in range(thread, grips, threads):
+                i = t.grip_corner[3 * g]
+                if i >= first and i < last:
+                    read_loads(t, run, g, grips)
+            barrier(threads)
+        meet_shapes(t, last, shapes, run.dt, first + thread, threads)
     if run.parts & VELOCITIES != 0:
-        read_velocities(t, topo.particles, run, tid % threads, threads)
+        read_velocities(t, last, run, first + thread, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
+def finish(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, gate: wp.array(dtype=int), blocks: int,
+    threads: int,
+):  # fmt: skip
+    """What ends a substep, particle by particle."""
+    n = topo.particles
+    world, team = team_of(wp.tid(), gate, 0, s.worlds, blocks, threads)
+    t = view(s, world, n, size)
+    first = n * team.block / blocks
+    last = n * (team.block + 1) / blocks
+    come_to_rest(t, n, run, shapes, run.grips, first, last, team.thread, threads)
 
 
 class LargePlan:
@@ -170,23 +171,26 @@ class LargePlan:
         shapes: Static shapes.
         device: "cpu" or "cuda:0" ...
         worlds: How many.
-        colours: Where each colour starts, by kind (PATCHES ... YARNS).
+        work: The elements' `Work`.
+        stages: The step at which each stage begins, and the number of steps.
+        lists: Room for listing pairs, from `nuno.contact.team_listing.make_lists`.
     """
 
     def __init__(
-        self, state: Any, topology: Any, size: Any, shapes: Any, device: str, worlds: int, colours: dict[int, Any]
-    ) -> None:
-        self._state, self._topology, self._size, self._shapes = state, topology, size, shapes
-        self._device, self._worlds = device, worlds
-        self._colours = [
-            (kind, int(first), int(last))
-            for kind in (PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS)
-            for first, last in pairwise(colours[kind])
-            if last > first
-        ]
+        self, state: Any, topology: Any, size: Any, shapes: Any, device: str, worlds: int, work: Any, stages: Any,
+        lists: Any,
+    ) -> None:  # fmt: skip
+        # all listed pairs are solved, which a whole device looks at in no time
+        self._state = picking_nothing(state)
+        self._topology, self._size, self._shapes = topology, size, shapes
+        self._device, self._worlds, self._work = device, worlds, work
+        self._stages = [(int(first), int(last)) for first, last in pairwise(stages)]
         self._cuda = device.startswith("cuda")
-        few, many = (FEW, topology.particles) if self._cuda else (CPU_THREADS, CPU_THREADS)
-        self._finder = PairFinder(topology, worlds, device, few, many)
+        self._blocks, self._threads = work.step.shape[0] // (4 * work.steps), THREADS if self._cuda else 1
+        self._gate = wp.zeros(1, dtype=int, device=device)
+        # whole warps, which look through the boxes together
+        many = -(-topology.particles // WARP) * WARP if self._cuda else CPU_THREADS
+        self._finder = PairFinder(topology, lists, worlds, device, many)
         self._graphs: dict[tuple[Any, ...], Any] = {}
 
     def run(self, run: Any, substeps: int) -> None:
@@ -196,7 +200,7 @@ class LargePlan:
             if run.parts & MOTION and (run.first + k) % run.frame == 0:
                 self._survey(run)
                 if run.grips:
-                    self._launch(unload, run.grips, run, 1)
+                    self._launch(unload, run.grips, run)
             if graph is None:
                 self._substep(run)
             else:
@@ -219,6 +223,7 @@ class LargePlan:
         if found is None:
             run.grip_start, run.grip_soft = wp.clone(run.grip_start), wp.clone(run.grip_soft)
             wp.load_module(survey.module, device=self._device)
+            wp.load_module(survey.module, device=self._device, block_dim=THREADS)
             self._finder.load()
             with wp.ScopedCapture(device=self._device, force_module_load=False) as capture:
                 self._substep(run)
@@ -229,10 +234,15 @@ class LargePlan:
         wp.copy(kept.grip_soft, run.grip_soft)
         return found[0]
 
-    def _launch(self, kernel: Any, count: int, *inputs: Any, most: int = 1 << 30) -> None:
-        threads = max(1, min(count, most if self._cuda else CPU_THREADS))
+    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
+        threads = max(1, min(count, MANY if self._cuda else CPU_THREADS))
         common = [self._state, self._topology, self._size]
         wp.launch(kernel, dim=self._worlds * threads, inputs=[*common, *inputs, threads], device=self._device)
+
+    def _launch_blocks(self, kernel: Any, *inputs: Any) -> None:
+        inputs = (self._state, self._topology, self._size, *inputs, self._blocks, self._threads)
+        dim = self._worlds * self._blocks * self._threads
+        wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=THREADS)
 
     def _survey(self, run: Any) -> None:
         shapes, particles = self._shapes, self._topology.particles
@@ -240,29 +250,31 @@ class LargePlan:
             self._launch(survey, count, run, shapes, phase)
 
     def _substep(self, run: Any) -> None:
-        n = self._topology.particles
-        common = [self._state, self._topology, self._size, run]
+        common = [self._state, self._topology, self._size]
         if run.parts & MOTION:
-            wp.launch(start, dim=self._worlds, inputs=common, device=self._device)
+            wp.launch(start, dim=self._worlds, inputs=[*common, run], device=self._device)
             if run.touching:
                 self._finder.launch(self._state, self._size, run)
-            self._launch(begin, n, run)
-            if run.grips:
-                self._launch(hold, run.grips, run)
-            for kind, first, last in self._colours:
-                # a yarn is a warp's work
-                count = (last - first) * (WARP if kind == YARNS and self._cuda else 1)
-                self._launch(project, count, run, kind, first, last)
+            for first, last in self._stages:
+                self._launch_blocks(project, run, self._work, self._gate, first, last)
         if run.parts & PULLS and run.pulled:
-            wp.launch(pull, dim=self._worlds, inputs=common, device=self._device)
-        if run.parts & LAYERS:
-            if run.touching:
-                for again in range(PASSES):
-                    self._launch(touch, MANY, run)
-                    self._launch(settle, n, run, int(again + 1 == PASSES))
-            else:
-                self._launch(settle, 1, run, 1)
-        if run.parts & SHAPES and run.grips:
-            self._launch(unload, run.grips, run, 0)
-        if run.parts & (SHAPES | VELOCITIES):
-            self._launch(finish, n, run, self._shapes)
+            wp.launch(pull, dim=self._worlds, inputs=[*common, run], device=self._device)
+        if run.parts & LAYERS and run.touching:
+            for again in range(PASSES):
+                if again:
+                    self._launch(settle, self._topology.particles, run)
+                self._launch(touch, MANY, run)
+        if run.parts & VELOCITIES:
+            wp.launch(calm, dim=self._worlds, inputs=common, device=self._device)
+        if run.parts & (LAYERS | SHAPES | VELOCITIES):
+            self._launch_blocks(finish, run, self._shapes, self._gate)
+
+
+def picking_nothing(state: Any) -> Any:
+    """The same state, in which the listed pairs are those that may touch."""
+    made = StateFloat()
+    for name in state._cls.vars:
+        setattr(made, name, getattr(state, name))
+    made.touch_triangle, made.touch_edge = state.vertex_triangle, state.edge_edge
+    made.touch_count = state.pair_count
+    return made

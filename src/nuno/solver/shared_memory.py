@@ -7,6 +7,8 @@ SHARED_FLOATS = 11500
 figures."""
 SHARED_PARTICLES = wp.constant(SHARED_FLOATS // 4)
 """Particles whose coordinates and inverse masses fit."""
+MOST_STEPS = wp.constant(128)
+"""Steps that there is room for in `program`."""
 ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(SHARED_FLOATS // 10)
 """Particles whose velocities fit too, and those whose positions at the substep's start do besides."""
 
@@ -51,4 +53,17 @@ return {};
 """)
 def counts(first: int) -> wp.array(dtype=int):  # type: ignore[valid-type]
     """Four counts in the block's own memory, from number ``first`` on."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__shared__ int steps[512];
+return wp::array_t<wp::int32>(steps + first, 0);
+#else
+return {};
+#endif
+""")
+def program(first: int) -> wp.array(dtype=int):  # type: ignore[valid-type]
+    """What a block does step by step in the block's own memory, four numbers a step, from number ``first`` on."""
     ...

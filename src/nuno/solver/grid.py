@@ -1,0 +1,189 @@
+"""The CUDA plan for scenes that take the whole device: all its blocks go through a frame together, in one launch.
+
+The phases are those of `nuno.solver.large`, but blocks wait for each other inside of the launch (`nuno.solver.team`),
+which takes half as long as beginning another, and lists that still hold cost nothing. Every block keeps the figures
+that all threads read in shared memory, its own copy. Where the device has no room for all blocks at once, the launches
+of `nuno.solver.large` take over.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
+from nuno.contact.team_listing import Lists, renew_by_team
+from nuno.solver.grips import forget_loads, pull_points
+from nuno.solver.integrate import reset_speed, tick
+from nuno.solver.lanes import barrier
+from nuno.solver.large import THREADS, LargePlan, come_to_rest
+from nuno.solver.shared_memory import MOST_STEPS, figures, program
+from nuno.solver.stages import Work, go_through, grips_on, steps_of
+from nuno.solver.state import ALL_PARTS, SPEED, Settings, Shapes, Sizes, StateFloat, Topology, view
+from nuno.solver.team import ARRIVED, COUNT, VERDICT, Team, begin_to_meet, call_roll, counts_of, meet, team_of
+from nuno.solver.warps import in_warps
+
+FEWEST_BLOCKS = 8
+"""Blocks that a world must have for itself; where worlds are too many for that, each phase of all is a launch."""
+
+log = logging.getLogger(__name__)
+
+wp.get_module("nuno.solver.run_grid").options["fast_math"] = True  # as in the plans for a block
+
+
+@wp.func
+def near_shapes(t: StateFloat, n: int, run: Settings, shapes: Shapes, team: Team):
+    """Choose the shapes that matter for the next frame."""
+    reset_box(t, team.turn)
+    meet(team)
+    measure_box(t, n, team.turn, team.turns)
+    meet(team)
+    select_shapes(t, shapes, float(run.frame) * run.dt, team.turn, team.turns)
+    meet(team)
+    sort_shapes(t, team.turn)
+    meet(team)
+
+
+@wp.func
+def share_speed(t: StateFloat, speeds: wp.array(dtype=float), own: int, other: int, team: Team):
+    """Raise a speed of all blocks to the block's, wait, and take it; the one of the substep before has served."""
+    barrier(team.threads)
+    if team.thread == 0:
+        wp.atomic_max(speeds, own, t.notes[SPEED])
+    if team.turn == 0:
+        speeds[other] = 0.0
+    meet(team)
+    if team.thread == 0:
+        t.notes[SPEED] = speeds[own]
+    barrier(team.threads)
+
+
+@wp.func
+def advance_by_team(
+    t: StateFloat, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, shapes: Shapes, lists: Lists,
+    speeds: wp.array(dtype=float), world: int, substeps: int, team: Team,
+):  # fmt: skip
+    """The phases of ``substeps`` substeps, the first of which begins a frame."""
+    n = topo.particles
+    first = n * team.block / team.blocks
+    last = n * (team.block + 1) / team.blocks
+    # the first step is that of the particles
+    led = grips_on(t, run, steps[2], steps[3])
+    held = grips_on(t, run, first, last)
+    forget_loads(t, run, team.turn, team.turns)
+    if team.turn == 0:
+        speeds[2 * world] = 0.0
+    near_shapes(t, n, run, shapes, team)
+    for k in range(substeps):
+        tick(t, run, team.thread)
+        barrier(team.threads)
+        if run.touching != 0:
+            renew_by_team(t, topo, run, lists, world, team)
+        go_through(t, topo, work, steps, run, led, 0, work.steps, team)
+        meet(team)
+        if run.pulled != 0:
+            pull_points(t, run, team.turn, 1)
+            meet(team)
+        if run.touching != 0:
+            passes = int(PASSES)  # a variable: the loop stays a loop, and there is less code to fetch
+            for again in range(passes):
+                if again > 0:
+                    for i in range(first + team.thread, last, team.threads):
+                        take_moves(t, n, i, n)
+                    meet(team)
+                touch_edge_edge(t, n, run, team.turn, team.turns)
+                touch_vertex_triangle(t, n, run, team.turn, team.turns)
+                meet(team)
+        reset_speed(t, team.thread)
+        barrier(team.threads)
+        come_to_rest(t, n, run, shapes, held, first, last, team.thread, team.threads)
+        share_speed(t, speeds, 2 * world + k % 2, 2 * world + (k + 1) % 2, team)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.run_grid")
+def run_grid(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, work: Work, lists: Lists,
+    speeds: wp.array(dtype=float), gate: wp.array(dtype=int), call: int, substeps: int, blocks: int, threads: int,
+):  # fmt: skip
+    """A frame, or the beginning of one, of every world by a team of blocks; nothing where not all are there."""
+    world, team = team_of(wp.tid(), gate, call, s.worlds, blocks, threads)
+    if call_roll(gate, call, s.worlds, s.worlds * blocks):
+        begin_to_meet(team)
+        t = view(s, world, topo.particles, size)
+        notes = t.notes
+        steps = steps_of(work, team.block)
+        if in_warps(threads):
+            scalars = t.scalars
+            t.scalars = figures(0)
+            t.notes = figures(8)
+            if team.thread == 0:
+                for k in range(7):
+                    t.scalars[k] = scalars[k]
+                for k in range(6):
+                    t.notes[k] = notes[k]
+            if work.steps <= MOST_STEPS:
+                steps = program(0)
+                listed = steps_of(work, team.block)
+                for k in range(team.thread, 4 * work.steps, threads):
+                    steps[k] = listed[k]
+        barrier(threads)
+        advance_by_team(t, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
+        if team.turn == 0:
+            for k in range(6):
+                notes[k] = t.notes[k]
+
+
+class GridPlan:
+    """A launch a frame of as many blocks as there are multiprocessors.
+
+    Args:
+        launches: The plan that does what a launch of this one cannot: parts of a substep, and all where not all blocks
+            find room on the device.
+        state: `StateFloat` of all worlds.
+        topology: The cloth's elements.
+        size: Numbers a world in each array.
+        shapes: Static shapes.
+        device: "cuda:0" ..., or "cpu", where one thread does everything.
+        worlds: How many.
+        work: The elements' `Work`, whose shares say how many blocks a world has.
+        lists: Room for listing pairs, from `nuno.contact.team_listing.make_lists`.
+    """
+
+    def __init__(
+        self, launches: LargePlan, state: Any, topology: Any, size: Any, shapes: Any, device: str, worlds: int,
+        work: Any, lists: Any,
+    ) -> None:  # fmt: skip
+        self._launches, self._device, self._worlds = launches, device, worlds
+        self._inputs = [state, topology, size, shapes, work, lists]
+        self._blocks = work.step.shape[0] // (4 * work.steps)
+        self._threads = THREADS if device.startswith("cuda") else 1
+        self._speeds = wp.zeros(2 * worlds, dtype=float, device=device)
+        self._crowded = False
+
+    def run(self, run: Any, substeps: int) -> None:
+        """Advance by ``substeps`` substeps under the settings ``run``."""
+        if run.parts != ALL_PARTS or self._crowded:
+            self._launches.run(run, substeps)
+            return
+        frames = range(0, substeps, run.frame)
+        gate = wp.zeros(len(frames) * counts_of(self._worlds), dtype=int, device=self._device)
+        state, topology, size, shapes, work, lists = self._inputs
+        for call, first in enumerate(frames):
+            inputs = [state, topology, size, run, shapes, work, lists, self._speeds, gate, call]
+            inputs += [min(run.frame, substeps - first), self._blocks, self._threads]
+            dim = self._worlds * self._blocks * self._threads
+            wp.launch(run_grid, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
+        verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._worlds, COUNT)[:, VERDICT, 0]
+        if (verdicts != 1).any():
+            self._crowded = True
+            log.warning("a CUDA device is too busy for a launch of %d blocks: smaller ones go on", self._blocks)
+            run.first = int((verdicts == 1).sum()) * run.frame
+            self._launches.run(run, substeps - run.first)
+
+
+def team_blocks(worlds: int, device: str) -> int:
+    """Blocks that each world has for itself: all multiprocessors of a device are shared out; 1 on the CPU."""
+    return wp.get_device(device).sm_count // worlds if device.startswith("cuda") else 1

@@ -1,0 +1,86 @@
+"""The plan in which all blocks of a CUDA device go through a frame together."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+import nuno
+from nuno.scene.cloth import ClothTopology
+from nuno.scene.colliders import Colliders
+from nuno.solver.cloth_solver import ClothSolver
+
+SIDE = 70  # cells: more particles than one block takes
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+unsigned long long start, now;
+asm volatile("mov.u64 %0, %globaltimer;" : "=l"(start));
+do { asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now)); } while (now - start < nanoseconds);
+#endif
+""")
+def stay(nanoseconds: int):
+    """Keep a thread running."""
+    ...
+
+
+@wp.kernel(enable_backward=False, module="tests.solver.keep_busy")
+def keep_busy(nanoseconds: int):
+    """A multiprocessor is taken for so long."""
+    stay(nanoseconds)
+
+
+def folded(plan="auto"):
+    """A sheet whose one half lies above the other, over a table."""
+    cloth = ClothTopology.sheet((SIDE, SIDE), (0.4, 0.4))
+    x = cloth.rest.copy()
+    over = x[:, 0] > 0
+    x[:, 2] = np.where(over, 0.012, 0.004)
+    x[over, 0] *= -1
+    made = ClothSolver(
+        cloth, nuno.Cloth(thickness=0.003), x[None], np.zeros((1, *x.shape)), device="cuda:0", substeps=40, plan=plan
+    )
+    made.set_colliders(Colliders.from_bodies([nuno.plane()], 1, "cuda:0"))
+    return made
+
+
+@pytest.mark.cuda
+def test_a_large_cloth_takes_all_blocks_and_repeats():
+    """Promise: same input, same bits; layers in contact, lists made at several times."""
+    ends = []
+    for _ in range(2):
+        made = folded()
+        assert made.plan == "grid"
+        made.run(0.0, 0.2)
+        ends.append(made.local_positions())
+    assert made.pair_counts.min() > 0 and made.finite().all()
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.cuda
+def test_pieces_of_a_run_change_no_bit():
+    """Invariant: a launch a frame, so that frames one at a time are the run in one."""
+    whole, pieces = folded(), folded()
+    whole.run(0.0, 0.1)
+    for k in range(6):
+        pieces.run(k / 60.0, 1.0 / 60.0)
+    np.testing.assert_array_equal(pieces.local_positions(), whole.local_positions())
+
+
+@pytest.mark.cuda
+def test_blocks_that_find_no_room_leave_the_work_to_launches():
+    """Promise: whatever else the device does, nothing hangs and no substep is lost: the launches' bits from there on.
+
+    Half of the multiprocessors are kept for a second, five times as long as blocks wait for each other.
+    """
+    busy, launches = folded(), folded("large")
+    busy.run(0.0, 1.0 / 60.0)
+    launches.load_state(busy.save_state())
+    wp.load_module(keep_busy.module, device="cuda:0")
+    wp.synchronize()
+    half = wp.get_device("cuda:0").sm_count // 2
+    wp.launch(keep_busy, dim=half * 256, inputs=[1_000_000_000], stream=wp.Stream("cuda:0"), device="cuda:0")
+    for made in (busy, launches):
+        made.run(1.0 / 60.0, 5.0 / 60.0)
+    assert busy._large._crowded
+    np.testing.assert_array_equal(busy.local_positions(), launches.local_positions())
