@@ -54,25 +54,41 @@ FRICTIONS = (0.25, 0.5)
 """How far the part on the table slides after the hand changes the silhouette as much as the rigidity does."""
 
 
-def spread(stretch_stiffness: float, shear_stiffness: float) -> tuple[Hypothesis, ...]:
+def spread(
+    stretch_stiffness: float, shear_stiffness: float, rigidities: tuple[float, ...] = RIGIDITIES
+) -> tuple[Hypothesis, ...]:
     """One hypothesis for each friction and bending rigidity."""
     return tuple(
         Hypothesis(rigidity, friction, stretch_stiffness=stretch_stiffness, shear_stiffness=shear_stiffness)
         for friction in FRICTIONS
-        for rigidity in RIGIDITIES
+        for rigidity in rigidities
     )
 
 
 SPREAD = spread(1000.0, 300.0)
 """Guesses for a mesh of one's own choice."""
 
+FIRM = spread(1000.0, 40.0)
+"""Guesses for a coarse mesh."""
+
+
+def loose(*rigidities: float) -> tuple[Hypothesis, ...]:
+    """Guesses at a cloth that gives in its plane, for a coarse mesh.
+
+    A coarse mesh that hardly stretches cannot fold in two directions at once and holds a lifted cloth open. One that
+    gives falls into pleats, as a limp cloth on a finer mesh does (docs/performance.md).
+    """
+    return spread(150.0, 15.0, rigidities)
+
+
 DISCRETISATIONS = (
-    Discretisation(20, 14, spread(1000.0, 40.0)),
-    Discretisation(25, 20, spread(3000.0, 1200.0), best=8),
+    Discretisation(20, 14, FIRM[::2] + loose(1e-4, 1e-3)),
+    Discretisation(20, 14, FIRM[1::2] + loose(5e-6, 3e-5, 3e-4), best=8),
+    Discretisation(25, 20, spread(3000.0, 1200.0), best=4),
 )
-"""A coarse cloth that shears easily tells for every candidate, then a finer and stiffer weave for the best of them. How
-a lifted cloth buckles depends on how it shears and on the mesh: two that differ in both had more right answers than
-either, on cases made for choosing (docs/performance.md)."""
+"""Half of the guesses at firm and loose coarse cloths tell for every candidate, the other half for the best, and a
+finer and stiffer weave for the best of these. How a lifted cloth buckles depends on how it stretches and shears and on
+the mesh: those that differ in all three had more right answers than any one (docs/performance.md)."""
 
 
 def cell_counts(long_m: float, short_m: float, cells: int, grid: tuple[int, int]) -> tuple[int, int]:

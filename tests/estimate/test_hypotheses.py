@@ -1,0 +1,31 @@
+"""Guesses at the material: what is tried, and how the stages share it out."""
+
+from nuno.estimate.hypotheses import DISCRETISATIONS, FIRM, FRICTIONS, cell_counts, loose
+
+
+def test_stages_share_out_every_guess_once() -> None:
+    """Both coarse stages together hold all firm and loose guesses, none twice: evidence is a mean over them."""
+    first, rest = (stage.spread for stage in DISCRETISATIONS[:2])
+    guesses = [*first, *rest]
+    assert len(set(guesses)) == len(guesses)
+    assert set(guesses) == {*FIRM, *loose(5e-6, 3e-5, 1e-4, 3e-4, 1e-3)}
+
+
+def test_stages_narrow_down() -> None:
+    """The first stage looks at every candidate, as an estimate demands, and each after it at fewer."""
+    bests = [stage.best for stage in DISCRETISATIONS]
+    assert bests[0] is None
+    assert bests[1:] == sorted(bests[1:], reverse=True)
+
+
+def test_every_stage_tries_both_frictions() -> None:
+    """How far the cloth slides is as unknown as how it bends, so no stage may take one friction alone."""
+    for stage in DISCRETISATIONS:
+        assert {guess.friction for guess in stage.spread} == set(FRICTIONS)
+
+
+def test_cells_are_multiples_of_the_grid() -> None:
+    """Candidates of a 6 x 6 grid lie on vertices, also of a cloth whose sides are far from equal."""
+    assert cell_counts(0.8, 0.4, 20, (6, 6)) == (20, 10)
+    assert cell_counts(0.45, 0.41, 25, (6, 6)) == (25, 25)
+    assert cell_counts(0.8, 0.1, 20, (6, 6)) == (20, 5)
