@@ -93,7 +93,8 @@ def over_executor(
     """Run trials over an executor, and yield those that finish, as they do.
 
     Where a worker dies, the tasks that were in flight are run again, one at a time, so that the one that kills its
-    worker is known; it fails when it has done so ``repeats`` times. A process pool that broke is made anew.
+    worker is known; it fails when it has done so ``repeats`` times, once at least. A process pool that broke is made
+    anew.
 
     Args:
         trial: The trial.
@@ -134,7 +135,7 @@ def over_executor(
                     break
             for task, error in lost:
                 log.warning("%d trials lost their worker: %s", len(task.indices), error or type(error).__name__)
-                if task.lost < repeats:
+                if task.lost < repeats or (task.lost == 0 and len(parts) > 1):  # others may have killed it
                     suspects.append(task.again())
                 elif len(task.indices) > 1:
                     suspects.extend(task.singles())

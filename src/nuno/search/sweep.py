@@ -149,7 +149,7 @@ def sweep(
         seed: Of the sampler.
         stop: Is told every finished trial, those in the results file included; where it returns True, no more are
             started. Those of the same batch are still recorded.
-        repeats: How often a trial is run again whose worker died.
+        repeats: How often a trial is run again whose worker died; once in any case where others ran beside it.
         device: Where batches run; None is the world's device. Of several CUDA devices each worker takes its own.
         progress: Progress bar; None shows one in a terminal after two seconds.
 
