@@ -19,6 +19,7 @@ from nuno.camera.regions import grow, shrink
 
 _BLUR = 0.8  # [px] both images are smoothed by this before they are compared pixel by pixel
 _SHADE = (0.2, 0.93)  # a shadow leaves between these shares of the light
+_ODDS = 3.0  # [nats] 20 to 1 that coarse texture is the table's, or is not
 _UNKNOWN = 0.01 / COLOUR_VOLUME  # density of something else entirely: a reflection, a cable
 
 
@@ -112,7 +113,8 @@ def compare(
     inside = shrink(mask, 3)
     grain = _grain(first, view, scene, hidden, ring, inside if inside.any() else mask)
     darkest = float(colours[shares > 0.03].mean(axis=-1).min(initial=1.0))
-    shade = _shade(view, scene, grain, table, noise, np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9)))
+    limit = np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9))
+    shade = _shade(view, scene, grain, table, noise, limit, table & ~hidden)
     return Background(view, scene, hidden, table, colours, shares, noise, grain, shade)
 
 
@@ -202,14 +204,17 @@ def _roughness_ratio(found: np.ndarray, noise: np.ndarray, table: np.ndarray, cl
 
 
 def _shade(
-    view: np.ndarray, scene: np.ndarray, grain: np.ndarray, where: np.ndarray, noise: float, limit: np.ndarray
-) -> float | None:
+    view: np.ndarray, scene: np.ndarray, grain: np.ndarray, where: np.ndarray, noise: float, limit: np.ndarray,
+    seen: np.ndarray,
+) -> float | None:  # fmt: skip
     """The share of light in the cloth's shadow on the table, or None.
 
     A lamp's shadow is equally dark all over an even table and leaves its texture; a cloth of the table's
     colour has its own shading and not the table's texture. So the ratios of the pixels that got darker are
-    counted for a shadow where the texture is the table's, and against it where it is not. Only ratios under
-    ``limit`` (h, w) count: a speckle of the table is no shadow.
+    counted for a shadow where the fine texture is the table's, and against it where it is not. Only ratios
+    under ``limit`` (h, w) count: a speckle of the table is no shadow. Coarse texture, of the size of wood's
+    grain, decides where the table was ``seen`` (h, w) before: a share that it speaks against is no shadow's,
+    and one that it speaks for needs no fine texture.
     """
     grey, dimmed = brightness(scene), brightness(view)
     where = where & (grey > 15) & (dimmed < (limit + 0.05) * grey) & (dimmed > 0.9 * _SHADE[0] * grey)
@@ -220,11 +225,59 @@ def _shade(
     dark = (share > _SHADE[0]) & (share < limit[where]) & (across < (3 * noise) ** 2 + 0.03**2 * length2)
     if dark.sum() < 60:
         return None
+    shares = share[dark]
     weights = np.clip(cv2.blur(grain, (7, 7))[where][dark], -1.0, 1.0)
-    counts, edges = np.histogram(share[dark], bins=70, range=(0.2, 0.9), weights=weights)
-    sharp = np.convolve(counts, np.ones(5), "same")
-    best = int(sharp.argmax())
-    if sharp[best] < 30.0:  # a few square centimetres of table
-        return None
-    peak = 0.5 * (edges[best] + edges[best + 1])
-    return float(np.median(share[dark][np.abs(share[dark] - peak) < 0.03]))
+    # Texture is compared where most pixels count: others as dark show a cloth of another tint.
+    counted = np.zeros(where.shape, dtype=np.float32)
+    counted[where] = dark
+    seen = (seen & (cv2.blur(counted, (5, 5)) > 0.5))[::2, ::2]
+    old, now = (cv2.blur(image, (5, 5))[::2, ::2] for image in (grey, dimmed))
+    # Both thresholds are a few square centimetres of table.
+    for weight, least, needed in ((weights, 30.0, -_ODDS), (np.ones_like(shares), 300.0, _ODDS)):
+        counts, edges = np.histogram(shares, bins=70, range=(0.2, 0.9), weights=weight)
+        sharp = np.convolve(counts, np.ones(5), "same")
+        for _ in range(3):
+            best = int(sharp.argmax())
+            if sharp[best] < least:
+                break
+            peak = 0.5 * (edges[best] + edges[best + 1])
+            if _goes_on(old, now, peak, seen, noise) > needed:
+                return float(np.median(shares[np.abs(shares - peak) < 0.03]))
+            sharp[max(best - 5, 0) : best + 6] = -np.inf
+    return None
+
+
+def _goes_on(old: np.ndarray, now: np.ndarray, share: float, seen: np.ndarray, noise: float) -> float:
+    """Logarithm of the odds that the table's coarse texture goes on where a share of its light is seen.
+
+    Within a shadow the logarithm of the view follows that of the table one to one; on a cloth it does not
+    follow it at all.
+
+    Args:
+        old: (h, w) float32, brightness of the scene, the mean of 5 x 5 px.
+        now: (h, w) float32, that of the view.
+        share: The share of the light.
+        seen: (h, w) bool, where the scene was seen, not guessed, and the view has its tint.
+        noise: Standard deviation of a channel [levels].
+
+    Returns:
+        Positive for a shadow, negative for a cloth, 0 where too little is seen or the table is too even.
+    """
+    # A wide range about the share: a narrow one would choose pixels that follow the table.
+    region = shrink((np.abs(now / np.maximum(old, 1.0) - share) < 0.25 * share) & seen & (old > 15), 2)
+    if region.sum() < 150:
+        return 0.0
+    inside, size = region.astype(np.float32), (15, 15)
+    weight = np.maximum(cv2.blur(inside, size), np.float32(1e-3))
+    logs = [np.log(np.maximum(image, 1.0)) * inside for image in (old, now)]
+    x, y = ((log - cv2.blur(log, size) / weight)[region] for log in logs)
+    # 0.6 of the noise is left after a mean over 5 x 5 of pixels that are smoothed already, and 1 / sqrt(6) of that in
+    # one image's mean of three channels: it belongs to no texture.
+    own = float(((0.6 / np.sqrt(6.0) * noise / old[region]) ** 2).mean())
+    spread = float((x * x).mean()) - own
+    if spread < own:
+        return 0.0
+    slope = float((x * y).mean()) / spread
+    left = max(float(((y - slope * x) ** 2).mean()), own)
+    # Neighbours are not independent: one in 25 counts. The likelihood of slope 1 against that of slope 0.
+    return (slope - 0.5) * spread / left * len(x) / 25.0

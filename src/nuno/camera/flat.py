@@ -15,6 +15,7 @@ _STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture
 _DIFFERENT = 4.0  # standard deviations of the table's own colour
 _CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a stain
 _SMALLEST = 20  # [blocks] of a region that may be a cloth
+_DOUBT = 1.0  # [nats] a bay in a flat cloth's outline is one only if the colours in it say so by more than this
 _RECTANGLE = 0.8  # share of the smallest rectangle around it that a flat cloth fills; a disc has 0.785
 
 
@@ -232,6 +233,8 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
     )
     image = rgb[window].astype(np.float32)
     labels, table = labels[window], table[window]
+    # What lies beyond the table's edge is no cloth on it, whatever its colour; the surface ends a block short of it.
+    on_table = grow(table, 4)
     around = table & ~grow(labels, 8)
     # Divide by the light on the table: then one colour is one colour from end to end.
     step = image[::2, ::2]
@@ -245,7 +248,7 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
         ratio = np.clip(ratio, -6, 6)
         guide = discriminant(soft, inside, around)
         score = guided_filter(ratio, guide, radius=4 if turn < 2 else 3, epsilon=0.05)
-        labels = _near(score > 0, labels)
+        labels = _without_bays(_near((score > 0) & on_table, labels), score)
         inside, around = shrink(labels, 3), table & ~grow(labels, 4)
         if inside.sum() < 20 or around.sum() < 20:
             break
@@ -254,6 +257,34 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
     mask = np.zeros((h, w), dtype=bool)
     mask[window] = labels
     return mask
+
+
+def _without_bays(mask: np.ndarray, score: np.ndarray) -> np.ndarray:
+    """A mask (h, w) bool with the bays of its outline filled about which its score (h, w) is in doubt.
+
+    A flat rectangle has no bays: where a pattern meets the outline in the table's own colour, that decides.
+    """
+    width = int(0.06 * np.sqrt(mask.sum())) | 1
+    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
+    solid = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, ellipse)  # without spurs, which would be spanned
+    contours, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not contours:
+        return mask
+    hull = np.zeros_like(solid)
+    cv2.fillConvexPoly(hull, cv2.convexHull(np.concatenate(contours)), 1)
+    if mask.sum() < _RECTANGLE * hull.sum():
+        return mask
+    # Bays of less than 5 px are the outline's own unevenness.
+    small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    bays = cv2.morphologyEx(np.where(mask, np.uint8(0), hull), cv2.MORPH_OPEN, small)
+    count, parts = cv2.connectedComponents(bays, connectivity=4)
+    mean = np.bincount(parts.ravel(), weights=score.ravel(), minlength=count) / np.bincount(parts.ravel())
+    fill = mean > -_DOUBT
+    fill[0] = False
+    if not fill.any():
+        return mask
+    filled = np.minimum(cv2.dilate(fill[parts].astype(np.uint8), small), hull)
+    return fill_holes(mask | filled.astype(bool))
 
 
 def _near(found: np.ndarray, labels: np.ndarray) -> np.ndarray:
