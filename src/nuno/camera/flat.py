@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import cv2
 import numpy as np
 
@@ -72,17 +74,14 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     # surface surrounds is looked for, as where the table's extents are not known.
     try:
         blob = _choose(found, distance, pixel, xy if hint is None else None)
-    except ClothNotFoundError:
+    except ClothNotFoundError as error:
         try:
             return _surrounded(small, xy, hint)
         except ClothNotFoundError:
-            pass
-        raise
+            raise error from None
     if _likeness(blob, xy) < _RECTANGLE:
-        try:
+        with suppress(ClothNotFoundError):
             return _surrounded(small, xy, hint)
-        except ClothNotFoundError:
-            pass
     return blob, surface
 
 

@@ -216,22 +216,6 @@ def bound_blocks(t: Any, topo: Topology, thread: int, threads: int):
 
 
 @wp.func
-def bound_groups(t: Any, topo: Topology, thread: int, threads: int):
-    """Bounding boxes of groups of consecutive blocks."""
-    m = topo.blocks
-    for g in range(thread, (m + GROUP - 1) / GROUP, threads):
-        k = 6 * (m + g)
-        for c in range(6):
-            v = t.bounds[6 * GROUP * g + c]
-            for b in range(GROUP * g + 1, wp.min(GROUP * g + GROUP, m)):
-                if c < 3:
-                    v = least(v, t.bounds[6 * b + c])
-                else:
-                    v = most(v, t.bounds[6 * b + c])
-            t.bounds[k + c] = v
-
-
-@wp.func
 def closest_on_edges(rx: Any, ry: Any, rz: Any, ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
     """Parameters in [0, 1] of the closest points of two edges with directions a and b, r from b's start to a's."""
     zero = fill(rx, 0.0)

@@ -123,8 +123,3 @@ class Soles:
         self._pushing, self._levels = pushing, self._balance.T @ inverse
         self._spread = (self._sums[:, :, pushing] @ some.T @ inverse).reshape(-1, 3)
         return True
-
-
-def share_among_feet(force: np.ndarray, torque: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share a ground reaction among soles with corners (feet, 4, 3) [m], once; see ``Soles``."""
-    return Soles(corners).share(force, torque)
