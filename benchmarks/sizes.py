@@ -19,6 +19,7 @@ import nuno
 
 FRAMES = 24
 PARTICLES = {"cpu": (8, 16, 32, 64), "cuda": (16, 32, 64, 128, 256)}
+SOFT = {"cpu": (4, 6, 10, 16), "cuda": (4, 6, 10, 16, 24)}
 WORLDS = {"cpu": (1, 4, 16, 64), "cuda": (1, 16, 128, 1024, 8192)}
 SHAPES = (1, 10, 100, 1000)
 
@@ -65,7 +66,7 @@ def measured(kind: str, device: str) -> list[dict[str, Any]]:
             row = {"size": (cells + 1) ** 2, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps}
             rows.append(row | {"bytes": solver.memory_bytes / row["size"]})
     elif kind == "soft particles":
-        for cells in (4, 6, 10, 16):
+        for cells in SOFT[short]:
             world = room(device)
             body = cube(world, cells)
             solver = body._dynamics.solver  # type: ignore[union-attr]

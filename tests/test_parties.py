@@ -1,12 +1,14 @@
 """Who goes together in a frame is asked in each world by itself: a world of a batch is what it is alone."""
 
 import numpy as np
+import pytest
 
 import nuno
 from nuno.parties import find_parties
 
 WORLDS = 4
 BODIES = ("towel", "cube", "box", "ball", "scarf")
+DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
 
 
 def places():
@@ -20,9 +22,9 @@ def places():
     }
 
 
-def room(k=None):
+def room(k=None, device="cpu"):
     """Return a batch, or world k of it alone: a towel held at its corners, and what falls on it or beside it."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.plane(name="floor"))
     world.add(nuno.sheet((0.2, 0.2), (6, 6), position=(0.0, 0.0, 0.4), name="towel"))
     world.add(nuno.soft_box((0.05, 0.05, 0.05), (2, 2, 2), name="cube"))
@@ -64,9 +66,10 @@ def told(world, k=0):
     return found
 
 
-def test_a_world_of_a_batch_is_itself_alone_bit_for_bit():
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_world_of_a_batch_is_itself_alone_bit_for_bit(device):
     """Promise: whoever is near whom in the other worlds, and however many substeps that takes."""
-    batch, alone = room(), [room(k) for k in range(WORLDS)]
+    batch, alone = room(None, device), [room(k, device) for k in range(WORLDS)]
     mixed = 0
     for _ in range(4):
         moving = [batch.find(name) for name in BODIES]
@@ -101,9 +104,10 @@ def test_parties_are_those_that_meet_through_others():
     np.testing.assert_array_equal(parties.at(few), [[0, 0, 0], [1, 1, 0], [2, 2, 2], [3, 3, 3]])
 
 
-def test_a_span_in_pieces_is_the_span():
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_span_in_pieces_is_the_span(device):
     """Promise: where runs begin and end changes no bit, also where worlds go through frames with other substeps."""
-    whole, parts = room(), room()
+    whole, parts = room(None, device), room(None, device)
     whole.run(0.2)
     for _ in range(2):
         parts.run(0.1)

@@ -144,14 +144,17 @@ def test_cuda_repeats_bit_for_bit_and_world_by_world(body):
 
 
 @pytest.mark.cuda
-def test_shared_memory_changes_no_bit():
-    """Promise: where the positions lie while they are worked on is of no account."""
+@pytest.mark.parametrize(("cells", "worlds"), [(4, 1), (12, 1), (12, 150)], ids=["all", "a part", "a part of many"])
+def test_shared_memory_changes_no_bit(cells, worlds):
+    """Promise: where the positions lie while they are worked on is of no account, whether all or some of it fits."""
+    body = SoftTopology.of(*box_tetrahedra((0.03 * cells,) * 3, (cells,) * 3))
     found = []
     for shared in (False, True):
-        made = solver("auto", device="cuda:0")
+        made = solver("auto", worlds, device="cuda:0", body=body)
         made.shared_memory = shared
         found.append(outcome(made))
     np.testing.assert_array_equal(found[0], found[1])
+    assert np.isfinite(found[0]).all()
 
 
 @pytest.mark.cuda

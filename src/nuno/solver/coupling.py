@@ -235,24 +235,30 @@ class Coupling:
     # -- what the last frame took
 
     def contacts(self) -> list[tuple[int, tuple[int, int], np.ndarray, np.ndarray, np.ndarray]]:
-        """What pushed in the last substep: world, the two bodies, point [m], normal and force [N] on the first."""
+        """What pushed in the last substep: world, the two bodies, point [m], normal and force [N] on the first.
+
+        By world, bodies and elements: on CUDA rows are listed as threads come to them.
+        """
         rows, particles, worlds = self._rows, self._particles, self.world_count
         counts = rows.active_count.numpy() if self._listed else np.zeros(worlds, int)
-        names = ("push", "drag", "normal", "weights", "corners", "bodies")
-        push, drag, normal, weights, corners, bodies = (getattr(rows, name).numpy() for name in names)
+        names = ("push", "drag", "normal", "weights", "corners", "bodies", "active")
+        push, drag, normal, weights, corners, bodies, active = (getattr(rows, name).numpy() for name in names)
+        keys = (bodies, corners, *(getattr(rows, name).numpy() for name in ("kind", "part", "point")))
         place = particles.p.numpy() + particles.u.numpy()
         found = []
         for world in range(worlds):
             base = world * rows.room
-            for r in rows.active.numpy()[base : base + counts[world]]:
-                if push[r] > 0.0:
-                    ours = (corners[r] >= 0) & (weights[r] > 0.0)
-                    share = weights[r][ours] / weights[r][ours].sum()
-                    point = share @ place[world * particles.count + corners[r][ours]]
-                    force = (push[r] * normal[r] + drag[r]).astype(float) * self._rate
-                    pair = (int(bodies[r][0]), int(bodies[r][1]))
-                    point = point + self._origins[world, pair[0]]
-                    found.append((world, pair, point, normal[r].astype(float), force))
+            pushing = active[base : base + counts[world]]
+            pushing = pushing[push[pushing] > 0.0]
+            order = np.lexsort(np.column_stack([key[pushing] for key in keys]).T[::-1])
+            for r in pushing[order]:
+                ours = (corners[r] >= 0) & (weights[r] > 0.0)
+                share = weights[r][ours] / weights[r][ours].sum()
+                point = share @ place[world * particles.count + corners[r][ours]]
+                force = (push[r] * normal[r] + drag[r]).astype(float) * self._rate
+                pair = (int(bodies[r][0]), int(bodies[r][1]))
+                point = point + self._origins[world, pair[0]]
+                found.append((world, pair, point, normal[r].astype(float), force))
         return found
 
     def tie_forces(self) -> np.ndarray:
