@@ -97,13 +97,21 @@ def plot(results: dict[str, list[dict[str, Any]]], path: str, device: str) -> No
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator, NullLocator
 
-    figure, axes = plt.subplots(1, len(results), figsize=(4 * len(results), 3.4), layout="constrained")
+    figure, axes = plt.subplots(1, len(results), figsize=(4 * len(results), 3.4), layout="constrained", sharey=True)
     for axis, (kind, rows) in zip(axes, results.items(), strict=True):
-        axis.loglog([r["size"] for r in rows], [r["ms"] for r in rows], "o-", color="tab:blue")
+        sizes = [r["size"] for r in rows]
+        axis.loglog(sizes, [r["ms"] for r in rows], "o-", color="tab:blue")
         axis.axhline(1e3 / 60, color="gray", linewidth=0.8)
-        axis.set(xlabel=kind, ylabel="ms a frame (grey: real time)", title=f"{kind}, {device}")
-        axis.grid(True, which="both", linewidth=0.3)
+        axis.set(xlabel=kind, title=f"{kind}, {device}")
+        axis.set_xticks(sizes, [str(size) for size in sizes])
+        axis.set_xticks([], minor=True)
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_locator(NullLocator())
+        axis.grid(True, linewidth=0.3)
+    axes[0].set_ylabel("ms a frame (grey: real time)")
     figure.savefig(path, dpi=110)
 
 

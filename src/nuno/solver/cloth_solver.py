@@ -15,7 +15,7 @@ from nuno.scene.cloth import ClothTopology
 from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.frame import run_lanes, run_worlds
-from nuno.solver.grid import FEWEST_BLOCKS, GridPlan, team_blocks
+from nuno.solver.grid import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.large import LargePlan
 from nuno.solver.particle_solver import ParticleSolver
@@ -104,10 +104,9 @@ class ClothSolver(ParticleSolver):
         self.self_contact = self_contact
         self.shared_memory = True
         if plan == "auto":
-            one = "vector" if not self._cuda and self.world_count == 1 else "fused"
-            plan = one
+            plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
             if self._cuda and self.particle_count > BLOCK_PARTICLES:
-                plan = "grid" if team_blocks(self.world_count, self.device) >= FEWEST_BLOCKS else "large"
+                plan = "grid"
         self.plan = plan
         self._large: LargePlan | GridPlan | None = None
         self._wide: Any = None
@@ -269,7 +268,7 @@ class ClothSolver(ParticleSolver):
 
     def _large_plan(self) -> LargePlan | GridPlan:
         grid = self.plan == "grid"
-        blocks = team_blocks(self.world_count if grid else 1, self.device)
+        teams, blocks = teams_of(self.world_count if grid else 1, cores_of(self.device))
         stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES)
         if self._shared is None:
             work = make_work(self.topology, self._soft, stages, self.device)
@@ -277,4 +276,4 @@ class ClothSolver(ParticleSolver):
         work, lists = self._shared
         parts = (self._state, self._topology, self._size, self._shapes)
         launches = LargePlan(*parts, self.device, self.world_count, work, stages.first, lists)
-        return GridPlan(launches, *parts, self.device, self.world_count, work, lists) if grid else launches
+        return GridPlan(launches, *parts, self.device, teams, work, lists) if grid else launches

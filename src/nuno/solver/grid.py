@@ -1,9 +1,10 @@
 """The CUDA plan for scenes that take the whole device: all its blocks go through a frame together, in one launch.
 
-The phases are those of `nuno.solver.large`, but blocks wait for each other inside of the launch (`nuno.solver.team`),
-which takes half as long as beginning another, and lists that still hold cost nothing. Every block keeps the figures
-that all threads read in shared memory, its own copy. Where the device has no room for all blocks at once, the launches
-of `nuno.solver.large` take over.
+Each world has a team of blocks, which takes more worlds in turn where there are many. The phases are those of
+`nuno.solver.large`, but blocks wait for each other inside of the launch (`nuno.solver.team`), which takes half as
+long as beginning another, and lists that still hold cost nothing. Every block keeps the figures that all threads read
+in shared memory, its own copy. Where the device has no room for all blocks at once, the launches of
+`nuno.solver.large` take over.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ from nuno.solver.state import ALL_PARTS, SPEED, Settings, Shapes, Sizes, StateFl
 from nuno.solver.team import ARRIVED, COUNT, VERDICT, Team, begin_to_meet, call_roll, counts_of, meet, team_of
 from nuno.solver.warps import in_warps
 
-FEWEST_BLOCKS = 8
-"""Blocks that a world must have for itself; where worlds are too many for that, each phase of all is a launch."""
+SHARED = 7.0
+"""A substep by b blocks takes as long as 1 + 7 / b: waits and what a single thread does, and what is shared out (6,561
+vertices on an H200, 1 to 132 blocks; 23 for 16,641)."""
 
 log = logging.getLogger(__name__)
 
@@ -106,34 +108,37 @@ def advance_by_team(
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.run_grid")
 def run_grid(
     s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, work: Work, lists: Lists,
-    speeds: wp.array(dtype=float), gate: wp.array(dtype=int), call: int, substeps: int, blocks: int, threads: int,
+    speeds: wp.array(dtype=float), gate: wp.array(dtype=int), call: int, substeps: int, teams: int, blocks: int,
+    threads: int,
 ):  # fmt: skip
     """A frame, or the beginning of one, of every world by a team of blocks; nothing where not all are there."""
-    world, team = team_of(wp.tid(), gate, call, s.worlds, blocks, threads)
-    if call_roll(gate, call, s.worlds, s.worlds * blocks):
+    first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
+    if call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
-        t = view(s, world, topo.particles, size)
-        notes = t.notes
         steps = steps_of(work, team.block)
-        if in_warps(threads):
-            scalars = t.scalars
-            t.scalars = figures(0)
-            t.notes = figures(8)
-            if team.thread == 0:
-                for k in range(7):
-                    t.scalars[k] = scalars[k]
+        if in_warps(threads) and work.steps <= MOST_STEPS:
+            steps = program(0)
+            listed = steps_of(work, team.block)
+            for k in range(team.thread, 4 * work.steps, threads):
+                steps[k] = listed[k]
+        for world in range(first, s.worlds, teams):
+            t = view(s, world, topo.particles, size)
+            notes = t.notes
+            if in_warps(threads):
+                scalars = t.scalars
+                t.scalars = figures(0)
+                t.notes = figures(8)
+                if team.thread == 0:
+                    for k in range(7):
+                        t.scalars[k] = scalars[k]
+                    for k in range(6):
+                        t.notes[k] = notes[k]
+            barrier(threads)
+            advance_by_team(t, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
+            if team.turn == 0:
                 for k in range(6):
-                    t.notes[k] = notes[k]
-            if work.steps <= MOST_STEPS:
-                steps = program(0)
-                listed = steps_of(work, team.block)
-                for k in range(team.thread, 4 * work.steps, threads):
-                    steps[k] = listed[k]
-        barrier(threads)
-        advance_by_team(t, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
-        if team.turn == 0:
-            for k in range(6):
-                notes[k] = t.notes[k]
+                    notes[k] = t.notes[k]
+            barrier(threads)
 
 
 class GridPlan:
@@ -147,20 +152,20 @@ class GridPlan:
         size: Numbers a world in each array.
         shapes: Static shapes.
         device: "cuda:0" ..., or "cpu", where one thread does everything.
-        worlds: How many.
-        work: The elements' `Work`, whose shares say how many blocks a world has.
+        teams: How many worlds are gone through at once, each by a team of blocks.
+        work: The elements' `Work`, whose shares say how many blocks a team has.
         lists: Room for listing pairs, from `nuno.contact.team_listing.make_lists`.
     """
 
     def __init__(
-        self, launches: LargePlan, state: Any, topology: Any, size: Any, shapes: Any, device: str, worlds: int,
+        self, launches: LargePlan, state: Any, topology: Any, size: Any, shapes: Any, device: str, teams: int,
         work: Any, lists: Any,
     ) -> None:  # fmt: skip
-        self._launches, self._device, self._worlds = launches, device, worlds
+        self._launches, self._device, self._teams = launches, device, teams
         self._inputs = [state, topology, size, shapes, work, lists]
         self._blocks = work.step.shape[0] // (4 * work.steps)
         self._threads = THREADS if device.startswith("cuda") else 1
-        self._speeds = wp.zeros(2 * worlds, dtype=float, device=device)
+        self._speeds = wp.zeros(2 * state.worlds, dtype=float, device=device)
         self._crowded = False
 
     def run(self, run: Any, substeps: int) -> None:
@@ -169,14 +174,14 @@ class GridPlan:
             self._launches.run(run, substeps)
             return
         frames = range(0, substeps, run.frame)
-        gate = wp.zeros(len(frames) * counts_of(self._worlds), dtype=int, device=self._device)
+        gate = wp.zeros(len(frames) * counts_of(self._teams), dtype=int, device=self._device)
         state, topology, size, shapes, work, lists = self._inputs
         for call, first in enumerate(frames):
             inputs = [state, topology, size, run, shapes, work, lists, self._speeds, gate, call]
-            inputs += [min(run.frame, substeps - first), self._blocks, self._threads]
-            dim = self._worlds * self._blocks * self._threads
+            inputs += [min(run.frame, substeps - first), self._teams, self._blocks, self._threads]
+            dim = self._teams * self._blocks * self._threads
             wp.launch(run_grid, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
-        verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._worlds, COUNT)[:, VERDICT, 0]
+        verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._teams, COUNT)[:, VERDICT, 0]
         if (verdicts != 1).any():
             self._crowded = True
             log.warning("a CUDA device is too busy for a launch of %d blocks: smaller ones go on", self._blocks)
@@ -184,6 +189,19 @@ class GridPlan:
             self._launches.run(run, substeps - run.first)
 
 
-def team_blocks(worlds: int, device: str) -> int:
-    """Blocks that each world has for itself: all multiprocessors of a device are shared out; 1 on the CPU."""
-    return wp.get_device(device).sm_count // worlds if device.startswith("cuda") else 1
+def teams_of(worlds: int, cores: int) -> tuple[int, int]:
+    """Return how many worlds are gone through at once, and the blocks of each: so many multiprocessors, shared out.
+
+    Where worlds are more than can be at once, teams take several in turn; it may be quicker to do so earlier.
+    """
+
+    def cost(teams: int) -> float:
+        return -(-worlds // teams) * (1.0 + SHARED / (cores // teams))
+
+    teams = min(range(1, min(worlds, cores) + 1), key=cost)
+    return teams, cores // teams
+
+
+def cores_of(device: str) -> int:
+    """Return a device's multiprocessors; 1 on the CPU."""
+    return int(wp.get_device(device).sm_count) if device.startswith("cuda") else 1
