@@ -1,10 +1,10 @@
 """The listing of self-contact pairs by the many threads of a CUDA block.
 
-The pairs of blocks that may have near elements are queued. A warp takes a few of them at a time, and looks at one after
-the other with its 32 threads together: what they read lies side by side, and nothing is read twice. It notes the
-pairs of elements whose spheres meet, its suspects, and where these are enough for all its threads it lists those that
-are near. No warp waits for another. The queue and the suspects stand in the room of the picked pairs, which are picked
-anew once the list is made.
+The pairs of blocks that may have near elements are queued. A warp takes a few of them at a time, and looks at four
+together, with eight threads each, for a block of a sheet has eight triangles and eight edges. It notes the pairs of
+elements whose spheres meet, its suspects, and where these are enough for all its threads it lists those that are near.
+No warp waits for another. The queue and the suspects stand in the room of the picked pairs, which are picked anew once
+the list is made.
 """
 
 import warp as wp
@@ -13,195 +13,150 @@ from nuno.contact.flat_blocks import in_flat
 from nuno.contact.nearness import append, near_edges, near_triangle
 from nuno.solver.lanes import barrier, window
 from nuno.solver.state import StateFloat, Topology
-from nuno.solver.warps import WARP, before_me, claim, lowest, size_of_set, sync_warp, told
+from nuno.solver.warps import WARP, claim, sync_warp, told
 
-BATCH = wp.constant(4)
-"""Pairs of blocks that a warp takes from the queue at a time."""
+BATCH, TOGETHER = wp.constant(8), wp.constant(4)
+"""Pairs of blocks that a warp takes from the queue at a time, and those that it looks at side by side."""
 ENOUGH = wp.constant(64)
 """Suspects from which on a warp examines them."""
-COLUMNS = wp.constant(16)
-"""Elements of one block that a warp looks at side by side, its two halves at different ones of the other block."""
-
-
-@wp.func
-def note(room: wp.array(dtype=int), k: int, bits: int, first: int, other: int):
-    """Write the pairs of ``first`` + j, for the numbers j of the set ``bits``, with ``other`` from place k on."""
-    place = int(k)
-    left = int(bits)
-    while left != 0:
-        if 2 * place + 1 < room.shape[0]:
-            room[2 * place] = first + lowest(left)
-            room[2 * place + 1] = other
-        place += 1
-        left = left & (left - 1)
-    return place
 
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-const int lane = threadIdx.x % 32;
-const int v = first + lane % 16;
-const bool own = v < last;
-const int k = own ? v : last - 1;
-const float4 s = reinterpret_cast<const float4*>(middle.data)[k];
-const int f0 = face.data[k][0], f1 = face.data[k][1], f2 = face.data[k][2];
-const float reach = s.w + far;
-int bits = 0;
-for (int row = lane / 16; row < rows; row += 2) {
-    const int i = vertex.data[begin + row];
-    const float dx = x.data[i] - s.x, dy = y.data[i] - s.y, dz = z.data[i] - s.z;
-    const bool near = own && dx * dx + dy * dy + dz * dz < reach * reach;
-    if (near && i != f0 && i != f1 && i != f2) bits |= 1 << row;
+const unsigned all = 0xffffffffu;
+const int lane = threadIdx.x % 32, v = lane % 8, k = first + lane / 8;
+const bool on = k < last;
+const int pair = queue.data[on ? k : first], a = pair >> 16, b = pair & 0xffff;
+const int va = vertex_start.data[a], na = vertex_start.data[a + 1] - va;
+const int vb = vertex_start.data[b], nb = vertex_start.data[b + 1] - vb;
+const int fa = face_start.data[a], fb = face_start.data[b];
+const int ea = edge_start.data[a], eb = edge_start.data[b];
+const int faces = on && a != b ? face_start.data[a + 1] - fa : 0, others = on ? face_start.data[b + 1] - fb : 0;
+const int rows = on ? edge_start.data[a + 1] - ea : 0, edges = on ? edge_start.data[b + 1] - eb : 0;
+const float4* spheres = reinterpret_cast<const float4*>(middle.data);
+// which of some vertices, four at most, the sphere of a triangle reaches
+auto vertices = [&](int f, int begin, int count) {
+    const float4 s = spheres[f];
+    const int f0 = face.data[f][0], f1 = face.data[f][1], f2 = face.data[f][2];
+    const float reach = s.w + far;
+    int bits = 0;
+    for (int row = 0; row < count; ++row) {
+        const int i = vertex.data[begin + row];
+        const float dx = x.data[i] - s.x, dy = y.data[i] - s.y, dz = z.data[i] - s.z;
+        const bool near = dx * dx + dy * dy + dz * dz < reach * reach;
+        if (near && i != f0 && i != f1 && i != f2) bits |= 1 << row;
+    }
+    return bits;
+};
+int2* notes = reinterpret_cast<int2*>(room.data);
+// triangles in the first half of the room, edges in the second
+const int half = room.shape[0] / 4;
+int counts = before;
+const int longest = max(max(faces, others), edges);
+for (int step = v; __any_sync(all, step - v < longest); step += 8) {
+    int ab = step < others ? vertices(fb + step, va, na) : 0;
+    int ba = step < faces ? vertices(fa + step, vb, nb) : 0;
+    for (int begin = 0; begin == 0 || __any_sync(all, begin < rows); begin += 32) {
+        int bits = 0;
+        if (step < edges) {
+            const float4 s = spheres[offset + eb + step];
+            const int g0 = edge.data[eb + step][0], g1 = edge.data[eb + step][1];
+            // of a block with itself each pair once
+            const int stop = min(begin + 32, a == b ? step : rows);
+            for (int row = begin; row < stop; ++row) {
+                const float4 r = spheres[offset + ea + row];
+                const int e0 = edge.data[ea + row][0], e1 = edge.data[ea + row][1];
+                const float dx = r.x - s.x, dy = r.y - s.y, dz = r.z - s.z, reach = r.w + s.w + far;
+                const bool near = dx * dx + dy * dy + dz * dz < reach * reach;
+                if (near && e0 != g0 && e0 != g1 && e1 != g0 && e1 != g1) bits |= 1 << (row - begin);
+            }
+        }
+        const int own = __popc(ab) + __popc(ba) + (__popc(bits) << 16);
+        if (__any_sync(all, own)) {
+            int sum = own;
+            for (int d = 1; d < 32; d *= 2) {
+                const int below = __shfl_up_sync(all, sum, d);
+                if (lane >= d) sum += below;
+            }
+            const int place = counts + sum - own;
+            int i = place & 0xffff, j = place >> 16;
+            for (; ab; ab &= ab - 1, ++i) if (i < half) notes[i] = make_int2(va + __ffs(ab) - 1, fb + step);
+            for (; ba; ba &= ba - 1, ++i) if (i < half) notes[i] = make_int2(vb + __ffs(ba) - 1, fa + step);
+            for (; bits; bits &= bits - 1, ++j)
+                if (j < half) notes[half + j] = make_int2(ea + begin + __ffs(bits) - 1, eb + step);
+            counts += __shfl_sync(all, sum, 31);
+        }
+    }
 }
-return bits;
+return counts;
 #else
 return 0;
 #endif
 """)
-def vertices_near(
+def suspect(
+    queue: wp.array(dtype=int),
+    first: int,
+    last: int,
     x: wp.array(dtype=float),
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
+    vertex_start: wp.array(dtype=int),
     vertex: wp.array(dtype=int),
-    begin: int,
-    rows: int,
-    middle: wp.array(dtype=float),
+    face_start: wp.array(dtype=int),
     face: wp.array(dtype=wp.vec3i),
-    first: int,
-    last: int,
-    far: float,
-) -> int:
-    """Which of the vertices from ``begin`` on, 32 at most, the sphere of the thread's triangle reaches.
-
-    The thread's is one of sixteen triangles from ``first`` on, and the vertices are every other one.
-    """
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-const int lane = threadIdx.x % 32;
-const int v = first + lane % 16;
-const bool own = v < last;
-const int k = own ? v : last - 1;
-const float4* spheres = reinterpret_cast<const float4*>(middle.data) + offset;
-const float4 s = spheres[k];
-const int g0 = edge.data[k][0], g1 = edge.data[k][1];
-// few of the one block's edges reach the other's box
-bool reaches = begin + lane < stop;
-if (reaches) {
-    const float4 r = spheres[begin + lane];
-    const float* box = bounds.data + 6 * b;
-    const float gx = fminf(r.x - box[0], box[3] - r.x);
-    const float gy = fminf(r.y - box[1], box[4] - r.y);
-    const float gz = fminf(r.z - box[2], box[5] - r.z);
-    reaches = fminf(gx, fminf(gy, gz)) + r.w + far > 0.f;
-}
-unsigned left = __ballot_sync(0xffffffffu, reaches) & (lane < 16 ? 0x55555555u : 0xaaaaaaaau);
-int bits = 0;
-while (left != 0) {
-    const int row = __ffs(left) - 1;
-    left &= left - 1;
-    const float4 r = spheres[begin + row];
-    const float dx = r.x - s.x, dy = r.y - s.y, dz = r.z - s.z, reach = r.w + s.w + far;
-    if (own && dx * dx + dy * dy + dz * dz < reach * reach) {
-        const int e0 = edge.data[begin + row][0], e1 = edge.data[begin + row][1];
-        if (e0 != g0 && e0 != g1 && e1 != g0 && e1 != g1) bits |= 1 << row;
-    }
-}
-__syncwarp();
-return bits;
-#else
-return 0;
-#endif
-""")
-def edges_near(
+    edge_start: wp.array(dtype=int),
+    edge: wp.array(dtype=wp.vec2i),
     middle: wp.array(dtype=float),
     offset: int,
-    bounds: wp.array(dtype=float),
-    b: int,
-    edge: wp.array(dtype=wp.vec2i),
-    begin: int,
-    stop: int,
-    first: int,
-    last: int,
     far: float,
+    room: wp.array(dtype=int),
+    before: int,
 ) -> int:
-    """Which of the edges from ``begin`` on, 32 at most, have spheres that meet that of the thread's edge.
+    """Note the elements of four pairs of blocks whose spheres meet: eight threads a pair, each an element of one.
 
-    The thread's is one of sixteen edges of block b from ``first`` on, and the others are every other one.
+    A suspect is two numbers. The places in the blocks of a vertex and a triangle are noted in the first half of the
+    room, those of two edges in the second.
+
+    Args:
+        queue: Pairs of blocks.
+        first: The first of these four.
+        last: One past the last in the queue.
+        x: Coordinates; so are ``y`` and ``z`` [m].
+        y: See ``x``.
+        z: See ``x``.
+        vertex_start: Where the vertices of each block start; so for faces and edges.
+        vertex: The blocks' vertices.
+        face_start: See ``vertex_start``.
+        face: Their triangles.
+        edge_start: See ``vertex_start``.
+        edge: Their edges.
+        middle: Spheres of the triangles, and from number ``offset`` on of the edges.
+        offset: See ``middle``.
+        far: Distance up to which elements are near [m].
+        room: Where they are noted; what does not fit is counted but not kept.
+        before: What was noted before.
+
+    Returns:
+        How many vertices and triangles are noted, plus 65,536 times how many pairs of edges.
     """
     ...
 
 
 @wp.func
-def suspect(
-    t: StateFloat, topo: Topology, a: int, b: int, far: float, room: wp.array(dtype=int), before: int, thread: int
-):
-    """Note the elements of two blocks whose spheres meet, behind ``before`` others; how many are noted then.
-
-    A suspect is two numbers: the place of a vertex in the blocks and that of a triangle, or the number of particles
-    plus the place of an edge and that of another.
-    """
-    count = int(before)
-    v = thread % COLUMNS
-    offset = topo.block_face.shape[0]
-    va = topo.block_vertex_start[a]
-    vb = topo.block_vertex_start[b]
-    na = topo.block_vertex_start[a + 1] - va
-    nb = topo.block_vertex_start[b + 1] - vb
-    ea = topo.block_edge_start[a]
-    ea2 = topo.block_edge_start[a + 1]
-    eb = topo.block_edge_start[b]
-    eb2 = topo.block_edge_start[b + 1]
-    fa = topo.block_face_start[a]
-    fa2 = topo.block_face_start[a + 1]
-    fb = topo.block_face_start[b]
-    fb2 = topo.block_face_start[b + 1]
-    for step in range(0, wp.max(eb2 - eb, wp.max(fa2 - fa, fb2 - fb)), COLUMNS):
-        ab = int(0)
-        ba = int(0)
-        if fb + step < fb2:
-            ab = vertices_near(t.x, t.y, t.z, topo.block_vertex, va, na, t.middle, topo.block_face, fb + step, fb2, far)
-        if a != b and fa + step < fa2:
-            ba = vertices_near(t.x, t.y, t.z, topo.block_vertex, vb, nb, t.middle, topo.block_face, fa + step, fa2, far)
-        for begin in range(ea, wp.max(ea2, ea + 1), WARP):
-            bits = int(0)
-            if eb + step < eb2:
-                bits = edges_near(t.middle, offset, t.bounds, b, topo.block_edge, begin, ea2, eb + step, eb2, far)
-                if a == b:
-                    # each pair once: those whose number is below that of the other
-                    below = wp.max(eb + step + v - begin, 0)
-                    if below < 32:
-                        bits = bits & ((1 << below) - 1)
-            own = size_of_set(ab) + size_of_set(ba) + size_of_set(bits)
-            k = count + before_me(own)
-            count = told(k + own, WARP - 1)
-            k = note(room, k, ab, va, fb + step + v)
-            k = note(room, k, ba, vb, fa + step + v)
-            note(room, k, bits, topo.particles + begin, eb + step + v)
-            ab = int(0)
-            ba = int(0)
-    return count
-
-
-@wp.func
-def examine(t: StateFloat, topo: Topology, far2: float, room: wp.array(dtype=int), count: int, thread: int):
+def examine(t: StateFloat, topo: Topology, far2: float, room: wp.array(dtype=int), counts: int, thread: int):
     """List those of a warp's suspects that are near; what did not fit its room is passed over."""
     sync_warp()
-    for k in range(thread % WARP, wp.min(count, room.shape[0] / 2), WARP):
-        u = room[2 * k]
-        v = room[2 * k + 1]
-        if u < topo.particles:
-            f = topo.block_face[v]
-            i = topo.block_vertex[u]
-            hit = near_triangle(t, i, f[0], f[1], f[2], far2)
-            append(hit, t.pair_count, 0, t.vertex_triangle, i, f[0], f[1], f[2])
-        else:
-            e = topo.block_edge[u - topo.particles]
-            g = topo.block_edge[v]
-            near = near_edges(t, e[0], e[1], g[0], g[1], far2)
-            append(near, t.pair_count, 1, t.edge_edge, e[0], e[1], g[0], g[1])
+    half = room.shape[0] / 4
+    for k in range(thread % WARP, wp.min(counts & 0xFFFF, half), WARP):
+        f = topo.block_face[room[2 * k + 1]]
+        i = topo.block_vertex[room[2 * k]]
+        hit = near_triangle(t, i, f[0], f[1], f[2], far2)
+        append(hit, t.pair_count, 0, t.vertex_triangle, i, f[0], f[1], f[2])
+    for k in range(thread % WARP, wp.min(counts >> 16, half), WARP):
+        e = topo.block_edge[room[2 * (half + k)]]
+        g = topo.block_edge[room[2 * (half + k) + 1]]
+        near = near_edges(t, e[0], e[1], g[0], g[1], far2)
+        append(near, t.pair_count, 1, t.edge_edge, e[0], e[1], g[0], g[1])
     sync_warp()
 
 
@@ -238,21 +193,29 @@ def queue_blocks(t: StateFloat, topo: Topology, far: float, thread: int, threads
 @wp.func
 def search_batch(t: StateFloat, topo: Topology, far: float, first: int, last: int, thread: int, threads: int):
     """List the near elements of the queued pairs first to last: a warp's work."""
-    size = t.touch_edge.shape[0] / (threads / WARP)
-    room = window(t.touch_edge, thread / WARP * size, size)
-    count = int(0)
+    # two halves of pairs of numbers
+    half = t.touch_edge.shape[0] / (threads / WARP) / 4
+    room = window(t.touch_edge, thread / WARP * 4 * half, 4 * half)
+    counts = int(0)
+    together = int(TOGETHER)
     k = int(first)
     while k < last:
-        pair = t.touch_triangle[k]
-        noted = suspect(t, topo, pair >> 16, pair & 0xFFFF, far, room, count, thread)
-        # what has no room behind others is noted once more when they are out of the way
-        fits = count == 0 or noted <= size / 2
-        if fits:
-            count = noted
-            k += 1
-        if not fits or count >= ENOUGH or k == last:
-            examine(t, topo, far * far, room, count, thread)
-            count = 0
+        noted = suspect(
+            t.touch_triangle, k, wp.min(k + together, last), t.x, t.y, t.z, topo.block_vertex_start, topo.block_vertex,
+            topo.block_face_start, topo.block_face, topo.block_edge_start, topo.block_edge, t.middle,
+            topo.block_face.shape[0], far, room, counts,
+        )  # fmt: skip
+        # what has no room behind others is noted once more when they are out of the way, at last by itself
+        fits = (noted & 0xFFFF) <= half and (noted >> 16) <= half
+        if fits or (counts == 0 and together == 1):
+            counts = noted
+            k += together
+            together = TOGETHER
+        elif counts == 0:
+            together = 1
+        if not fits or (counts & 0xFFFF) + (counts >> 16) >= ENOUGH or k >= last:
+            examine(t, topo, far * far, room, counts, thread)
+            counts = 0
 
 
 @wp.func

@@ -273,8 +273,14 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
 def take_moves(t: Any, n: int, thread: int, threads: int):
     """Apply the summed moves of many threads: the weighed mean over each particle's contacts."""
     if threads > 1:
+        # far away on CUDA: the next is fetched while one is looked at
+        ahead = int(0)
+        if thread < n:
+            ahead = t.moved[3 * n + thread]
         for i in range(thread, n, threads):
-            count = t.moved[3 * n + i]
+            count = ahead
+            if i + threads < n:
+                ahead = t.moved[3 * n + i + threads]
             if count > 0:
                 s = UNIT / float(count)
                 apply_move(t.x, i, float(t.moved[i]) * s)

@@ -19,6 +19,7 @@ from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loa
 from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
+from nuno.solver.sheet_strips import bend_in_strips, fits_strips
 from nuno.solver.state import (
     DAMPING,
     LAYERS,
@@ -35,8 +36,11 @@ from nuno.solver.state import (
     view,
 )
 from nuno.solver.vector import at, corner, scaled, spread
-from nuno.solver.warps import WARP, in_warps
-from nuno.solver.yarns import PAIR_EDGES, WARP_EDGES, stretch_yarn_together
+from nuno.solver.warps import in_warps
+from nuno.solver.yarns import YARN_EDGES, stretch_yarns_together
+
+STRETCH_KINDS = wp.constant(2)
+"""Numbers in ``stretch_soft`` where they are the same for all edges of a direction."""
 
 
 @wp.func
@@ -115,41 +119,16 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
 
 @wp.func
 def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The yarns of one direction: on CUDA each by a warp, else by a thread."""
+    """The yarns of one direction, which are equally long: on CUDA each by a few threads, else by one."""
     rate = 1.0 / (run.dt * run.dt)
-    if in_warps(threads):
-        warps = threads / WARP
-        k = int(first + thread / WARP)
-        while k < last:
-            start = table.yarn[k]
-            stop = table.yarn[k + 1]
-            other = int(0)
-            end = int(0)
-            if k + warps < last:
-                other = table.yarn[k + warps]
-                end = table.yarn[k + warps + 1]
-            if wp.max(stop - start, end - other) > PAIR_EDGES:
-                end = other
-            if stop - start <= WARP_EDGES:
-                stretch_yarn_together(
-                    t.x,
-                    t.y,
-                    t.z,
-                    t.w,
-                    t.stretch_soft,
-                    table.edge,
-                    table.edge_rest,
-                    table.edge_scale,
-                    table.edge_soft,
-                    start,
-                    stop,
-                    other,
-                    end,
-                    rate,
-                )
-            elif thread % WARP == 0:
-                stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
-            k += wp.where(end > other, 2 * warps, warps)
+    count = int(0)
+    if in_warps(threads) and first < last:
+        count = table.yarn[first + 1] - table.yarn[first]
+    if count > 0 and count <= YARN_EDGES:
+        stretch_yarns_together(
+            t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, table.edge_rest, table.edge_scale, table.edge_soft,
+            table.yarn[first], count, last - first, t.stretch_soft.shape[0] > STRETCH_KINDS, rate, threads,
+        )  # fmt: skip
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
@@ -180,7 +159,9 @@ def bend_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: int)
 
 @wp.func
 def bend_sheet(t: StateFloat, topo: Topology, run: Settings, thread: int, threads: int):
-    if shares_work(threads):
+    if in_warps(threads) and fits_strips(topo):
+        bend_in_strips(t, topo, run, threads)
+    elif shares_work(threads):
         bend_twists_ahead(t, topo, run, thread, threads)
         bend_lines_ahead(t, topo, run, thread, threads)
         shear_cells_ahead(t, topo, run, thread, threads)

@@ -119,38 +119,6 @@ def anyone(yes: bool) -> bool:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-return __popc(bits);
-#else
-return __builtin_popcount(bits);
-#endif
-""")
-def size_of_set(bits: int) -> int:
-    """How many numbers are in a set."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-const unsigned all = 0xffffffffu;
-if (!__any_sync(all, mine)) return 0;
-const int lane = threadIdx.x % 32;
-int sum = mine;
-for (int k = 1; k < 32; k *= 2) {
-    int below = __shfl_up_sync(all, sum, k);
-    if (lane >= k) sum += below;
-}
-return sum - mine;
-#else
-return 0;
-#endif
-""")
-def before_me(mine: int) -> int:
-    """The sum of what those of the 32 threads before this one have."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
 __syncwarp();
 #endif
 """)

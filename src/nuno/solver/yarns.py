@@ -1,141 +1,145 @@
-"""A yarn's stretch by the 32 threads of a warp on CUDA.
+"""A yarn's stretch by a few neighbouring threads on CUDA, each with four or eight edges in its registers.
 
 What `nuno.solver.membrane.stretch_yarn` does from one end to the other takes a step an edge, each waiting for the one
-before. Cyclic reduction of all rows at once (Hockney and Jesshope, "Parallel Computers", 1981) takes log2(edges): in
-each step a row is freed of its neighbours and linked to those twice as far.
+before. Here each thread eliminates its own rows but the last, as that does, with the last row of the thread before as
+one more unknown (the partition method of Wang, "A parallel method for tridiagonal equations", 1981). What is left, a
+row a thread, is solved by cyclic reduction (Hockney and Jesshope, "Parallel Computers", 1981): in each step a row is
+freed of its neighbours and linked to those twice as far.
 """
 
 import warp as wp
 
-PAIR_EDGES = wp.constant(32)
-"""Edges of the longest yarns of which a warp takes two side by side: each waits less for the other than for itself."""
-WARP_EDGES = wp.constant(256)
-"""Edges of the longest yarn that a warp takes together: eight rows a thread."""
+YARN_EDGES = wp.constant(256)
+"""Edges of the longest yarn that threads of one warp solve: eight each."""
 
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
 const unsigned all = 0xffffffffu;
-const int lane = threadIdx.x % 32;
-const int count = last - first, more = stop - start;
-struct One { enum { rows = 1, apart = 0 }; };
-struct Pair { enum { rows = 2, apart = 1 }; };
-struct Two { enum { rows = 2, apart = 0 }; };
-struct Eight { enum { rows = 8, apart = 0 }; };
+const int lane = threadIdx.x % 32, warp = threadIdx.x / 32, warps = threads / 32;
+struct Four { enum { rows = 4 }; };
+struct Eight { enum { rows = 8 }; };
 auto solve = [&](auto kind) {
-    // row k of the system is in thread k % 32; of two yarns apart each thread has a row of either
     constexpr int ROWS = decltype(kind)::rows;
-    constexpr bool APART = decltype(kind)::apart;
-    constexpr int REACH = APART ? 32 : 32 * ROWS;
-    auto place = [&](int j) { return APART ? lane : 32 * j + lane; };
-    auto length_of = [&](int j) { return APART && j > 0 ? more : count; };
-    int end[ROWS];
-    float ex[ROWS], ey[ROWS], ez[ROWS], inverse[ROWS], low[ROWS], high[ROWS], pull[ROWS];
-    // what row k - shift, or k + shift, has
-    auto before = [&](const float* v, int shift, float* r) {
-        if (shift < 32) {
-            float s[ROWS];
-            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane - shift) & 31);
-            for (int j = ROWS - 1; j >= 0; --j)
-                r[j] = lane >= shift ? s[j] : (j > 0 && !APART ? s[j > 0 ? j - 1 : 0] : 0.f);
-        } else {
-            #pragma unroll
-            for (int j = 0; j < ROWS; ++j) {
-                r[j] = 0.f;
-                #pragma unroll
-                for (int i = 0; i < ROWS; ++i) if (32 * (j - i) == shift) r[j] = v[i];
+    int span = 1;
+    while (span * ROWS < count) span *= 2;
+    const int each = 32 / span, q = lane % span;
+    for (int begin = warp * each; begin < yarns; begin += warps * each) {
+        const int own = begin + lane / span;
+        const int start = first + (own < yarns ? own : begin) * count;
+        const int here = own < yarns ? count : 0;
+        const int head = edge.data[start][0], step = edge.data[start][1] - head;
+        const float length = rest.data[start];
+        float alpha = soft.data[which.data[start]] * (scale.data[start] * rate);
+        // the thread's rows, and the vertices at both ends of each
+        float vx[ROWS + 1], vy[ROWS + 1], vz[ROWS + 1], vw[ROWS + 1];
+        #pragma unroll
+        for (int r = 0; r <= ROWS; ++r) {
+            const int k = q * ROWS + r;
+            const int i = head + (k < count ? k : count) * step;
+            vx[r] = x.data[i]; vy[r] = y.data[i]; vz[r] = z.data[i]; vw[r] = w.data[i];
+        }
+        float ex[ROWS], ey[ROWS], ez[ROWS], weight[ROWS], pull[ROWS];
+        #pragma unroll
+        for (int r = 0; r < ROWS; ++r) {
+            const bool on = q * ROWS + r < here;
+            if (varied && on) {
+                const int k = start + q * ROWS + r;
+                alpha = soft.data[which.data[k]] * (scale.data[k] * rate);
             }
+            const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
+            const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
+            const float inverse = rsqrtf(square);
+            ex[r] = dx * inverse; ey[r] = dy * inverse; ez[r] = dz * inverse;
+            pull[r] = on ? length - square * inverse : 0.f;
+            weight[r] = on ? vw[r] + vw[r + 1] + alpha + 1.0e-12f : 1.f;
         }
-    };
-    auto after = [&](const float* v, int shift, float* r) {
-        if (shift < 32) {
-            float s[ROWS];
-            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane + shift) & 31);
-            for (int j = 0; j < ROWS; ++j)
-                r[j] = lane + shift < 32 ? s[j] : (j < ROWS - 1 && !APART ? s[j < ROWS - 1 ? j + 1 : j] : 0.f);
-        } else {
-            #pragma unroll
-            for (int j = 0; j < ROWS; ++j) {
-                r[j] = 0.f;
-                #pragma unroll
-                for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == shift) r[j] = v[i];
+        // what links each row to the one before, and the last one to the next thread's first
+        float beside[ROWS + 1];
+        const float bx = __shfl_up_sync(all, ex[ROWS - 1], 1, span);
+        const float by = __shfl_up_sync(all, ey[ROWS - 1], 1, span);
+        const float bz = __shfl_up_sync(all, ez[ROWS - 1], 1, span);
+        beside[0] = q > 0 && q * ROWS < here ? vw[0] * (bx * ex[0] + by * ey[0] + bz * ez[0]) : 0.f;
+        #pragma unroll
+        for (int r = 1; r < ROWS; ++r) {
+            const float c = vw[r] * (ex[r - 1] * ex[r] + ey[r - 1] * ey[r] + ez[r - 1] * ez[r]);
+            beside[r] = q * ROWS + r < here ? c : 0.f;
+        }
+        beside[ROWS] = __shfl_down_sync(all, beside[0], 1, span);
+        if (q == span - 1) beside[ROWS] = 0.f;
+        // row r is now pull + gain (row r + 1) + far (the last row of the thread before)
+        float gain[ROWS], far[ROWS];
+        {
+            const float s = 1.f / weight[0];
+            pull[0] *= s; gain[0] = beside[1] * s; far[0] = beside[0] * s;
+        }
+        #pragma unroll
+        for (int r = 1; r < ROWS - 1; ++r) {
+            const float s = 1.f / (weight[r] - beside[r] * gain[r - 1]);
+            pull[r] = (pull[r] + beside[r] * pull[r - 1]) * s;
+            gain[r] = beside[r + 1] * s;
+            far[r] = beside[r] * far[r - 1] * s;
+        }
+        // the first row by the thread's last and the last before, which the thread before asks for
+        float p = pull[ROWS - 2], g = gain[ROWS - 2], f = far[ROWS - 2];
+        #pragma unroll
+        for (int r = ROWS - 3; r >= 0; --r) {
+            p = pull[r] + gain[r] * p;
+            f = far[r] + gain[r] * f;
+            g = gain[r] * g;
+        }
+        p = __shfl_down_sync(all, p, 1, span);
+        g = __shfl_down_sync(all, g, 1, span);
+        f = __shfl_down_sync(all, f, 1, span);
+        const float near = beside[ROWS - 1], next = beside[ROWS];
+        const float s = 1.f / (weight[ROWS - 1] - near * gain[ROWS - 2] - next * f);
+        float low = near * far[ROWS - 2] * s, high = next * g * s;
+        float last = (pull[ROWS - 1] + near * pull[ROWS - 2] + next * p) * s;
+        for (int shift = 1; shift < span; shift *= 2) {
+            const bool down = q >= shift, up = q + shift < span;
+            const float lb = __shfl_up_sync(all, low, shift, span), hb = __shfl_up_sync(all, high, shift, span);
+            const float pb = __shfl_up_sync(all, last, shift, span), la = __shfl_down_sync(all, low, shift, span);
+            const float ha = __shfl_down_sync(all, high, shift, span), pa = __shfl_down_sync(all, last, shift, span);
+            // at the ends ``low`` and ``high`` are zero, and what comes from there is finite
+            const float s = 1.f / (1.f - (down ? low * hb : 0.f) - (up ? high * la : 0.f));
+            last = (last + low * pb + high * pa) * s;
+            low = down ? low * lb * s : 0.f;
+            high = up ? high * ha * s : 0.f;
+        }
+        float before = __shfl_up_sync(all, last, 1, span);
+        if (q == 0) before = 0.f;
+        pull[ROWS - 1] = last;
+        #pragma unroll
+        for (int r = ROWS - 2; r >= 0; --r) pull[r] = pull[r] + gain[r] * pull[r + 1] + far[r] * before;
+        #pragma unroll
+        for (int r = 0; r < ROWS; ++r) { ex[r] *= pull[r]; ey[r] *= pull[r]; ez[r] *= pull[r]; }
+        float nx = __shfl_down_sync(all, ex[0], 1, span);
+        float ny = __shfl_down_sync(all, ey[0], 1, span);
+        float nz = __shfl_down_sync(all, ez[0], 1, span);
+        if (q == span - 1) { nx = 0.f; ny = 0.f; nz = 0.f; }
+        // all have read their vertices before the first shuffle, so that nothing is overwritten too soon
+        if (q == 0 && here > 0) {
+            x.data[head] = vx[0] + vw[0] * ex[0];
+            y.data[head] = vy[0] + vw[0] * ey[0];
+            z.data[head] = vz[0] + vw[0] * ez[0];
+        }
+        #pragma unroll
+        for (int r = 0; r < ROWS; ++r) {
+            const int k = q * ROWS + r;
+            if (k < here) {
+                const int i = head + (k + 1) * step;
+                x.data[i] = vx[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ex[r < ROWS - 1 ? r + 1 : r] : nx) - ex[r]);
+                y.data[i] = vy[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ey[r < ROWS - 1 ? r + 1 : r] : ny) - ey[r]);
+                z.data[i] = vz[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ez[r < ROWS - 1 ? r + 1 : r] : nz) - ez[r]);
             }
-        }
-    };
-    float wa[ROWS], wb[ROWS], px[ROWS], py[ROWS], pz[ROWS];
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) {
-        const bool own = place(j) < length_of(j);
-        const int e = own ? (APART && j > 0 ? start : first) + place(j) : first;
-        const int a = edge.data[e][0], b = edge.data[e][1];
-        px[j] = x.data[b]; py[j] = y.data[b]; pz[j] = z.data[b];
-        wa[j] = w.data[a]; wb[j] = w.data[b];
-        end[j] = own ? b : -1;
-        const float dx = x.data[a] - px[j], dy = y.data[a] - py[j], dz = z.data[a] - pz[j];
-        const float length = sqrtf(dx * dx + dy * dy + dz * dz + 1.0e-20f);
-        inverse[j] = 1.f / length;
-        ex[j] = dx * inverse[j]; ey[j] = dy * inverse[j]; ez[j] = dz * inverse[j];
-        pull[j] = own ? rest.data[e] - length : 0.f;
-        inverse[j] = wa[j] + wb[j] + soft.data[which.data[e]] * (scale.data[e] * rate) + 1.0e-12f;
-    }
-    {
-        float bx[ROWS], by[ROWS], bz[ROWS], beside[ROWS];
-        before(ex, 1, bx); before(ey, 1, by); before(ez, 1, bz);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const int k = place(j);
-            beside[j] = k > 0 && k < length_of(j) ? -wa[j] * (bx[j] * ex[j] + by[j] * ey[j] + bz[j] * ez[j]) : 0.f;
-        }
-        after(beside, 1, high);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const float s = 1.f / inverse[j];
-            low[j] = beside[j] * s; high[j] *= s; pull[j] *= s;
-        }
-    }
-    // unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
-    #pragma unroll
-    for (int shift = 1; shift < REACH; shift *= 2) {
-        float lb[ROWS], hb[ROWS], pb[ROWS], la[ROWS], ha[ROWS], pa[ROWS];
-        before(low, shift, lb); before(high, shift, hb); before(pull, shift, pb);
-        after(low, shift, la); after(high, shift, ha); after(pull, shift, pa);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const float s = 1.f / (1.f - low[j] * hb[j] - high[j] * la[j]);
-            pull[j] = (pull[j] - low[j] * pb[j] - high[j] * pa[j]) * s;
-            low[j] = -low[j] * lb[j] * s;
-            high[j] = -high[j] * ha[j] * s;
-        }
-    }
-    float nx[ROWS], ny[ROWS], nz[ROWS];
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) { ex[j] *= pull[j]; ey[j] *= pull[j]; ez[j] *= pull[j]; }
-    after(ex, 1, nx); after(ey, 1, ny); after(ez, 1, nz);
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) {
-        // all have read their ends in the first shuffles, so that nothing is overwritten too soon
-        const int k = place(j);
-        if (end[j] >= 0) {
-            const bool on = k + 1 < length_of(j);
-            x.data[end[j]] = px[j] + wb[j] * ((on ? nx[j] : 0.f) - ex[j]);
-            y.data[end[j]] = py[j] + wb[j] * ((on ? ny[j] : 0.f) - ey[j]);
-            z.data[end[j]] = pz[j] + wb[j] * ((on ? nz[j] : 0.f) - ez[j]);
-        }
-        if (k == 0 && length_of(j) > 0) {
-            const int head = edge.data[APART && j > 0 ? start : first][0];
-            x.data[head] += wa[j] * ex[j];
-            y.data[head] += wa[j] * ey[j];
-            z.data[head] += wa[j] * ez[j];
         }
     }
 };
-if (more > 0) solve(Pair());
-else if (count <= 32) solve(One());
-else if (count <= 64) solve(Two());
+if (count <= 128) solve(Four());
 else solve(Eight());
 #endif
 """)
-def stretch_yarn_together(
+def stretch_yarns_together(
     x: wp.array(dtype=float),
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
@@ -146,12 +150,15 @@ def stretch_yarn_together(
     scale: wp.array(dtype=float),
     which: wp.array(dtype=int),
     first: int,
-    last: int,
-    start: int,
-    stop: int,
+    count: int,
+    yarns: int,
+    varied: bool,
     rate: float,
+    threads: int,
 ):
-    """Solve the edges first to last, a yarn's, at once and move its vertices; those of two short yarns side by side.
+    """Solve the edges of each yarn of one direction at once and move its vertices.
+
+    The yarns are equally long, their vertices equally far apart in memory, and their edges have one rest length.
 
     Args:
         x: Coordinates; so are ``y`` and ``z`` [m].
@@ -159,14 +166,15 @@ def stretch_yarn_together(
         z: See ``x``.
         w: Inverse masses [1/kg].
         soft: The world's compliances.
-        edge: Vertices of the edges.
+        edge: Vertices of the edges, those of one yarn after those of another.
         rest: Their lengths [m].
         scale: What the compliance of each is multiplied with.
         which: The place of each in ``soft``.
-        first: The yarn's first edge.
-        last: One past its last.
-        start: The same of another yarn of at most 32 edges, which shares no vertex with the first, as short a one.
-        stop: See ``start``, and the same where there is no other.
+        first: The first edge of the first yarn.
+        count: Edges of a yarn, `YARN_EDGES` at most.
+        yarns: How many yarns.
+        varied: Whether the edges of a yarn differ in compliance.
         rate: 1 / dt^2 [1/s2].
+        threads: Threads of the block, whole warps.
     """
     ...

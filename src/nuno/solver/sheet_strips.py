@@ -1,0 +1,298 @@
+"""A sheet's bends and shears by warps on CUDA: each thread has a few vertices in its registers.
+
+Elements of one colour share no vertex. Taken colour by colour, every vertex is read and written again for each, with
+what tables say of each element, and all threads of the block wait in between. Here a warp takes lines of the grid, or
+strips between two lines, through all colours that stay in them. A thread has two or three vertices along the line, and
+hands on what lies between it and its neighbours. The order of the elements is that of the colours, and where a material
+is the same everywhere nothing is read of tables but a number or two.
+"""
+
+import warp as wp
+
+from nuno.solver.lanes import barrier
+from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
+
+STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(96)
+"""Vertices of the longest strip and of the longest line that the 32 threads of a warp take together."""
+BEND_KINDS = wp.constant(9)
+"""Numbers in ``bend_soft`` where they are the same for all elements of a kind."""
+
+_BEGIN = """
+#if defined(__CUDA_ARCH__)
+const unsigned all = 0xffffffffu;
+const int lane = threadIdx.x % 32, warp = threadIdx.x / 32, warps = threads / 32;
+struct Vertex { float x, y, z, w; int i; };
+auto read = [&](int i) { return Vertex{x.data[i], y.data[i], z.data[i], w.data[i], i}; };
+auto write = [&](const Vertex& v) { x.data[v.i] = v.x; y.data[v.i] = v.y; z.data[v.i] = v.z; };
+// the vertex v of the next thread, or of the one before
+auto from_next = [&](const Vertex& v, int i, float w) {
+    return Vertex{__shfl_down_sync(all, v.x, 1), __shfl_down_sync(all, v.y, 1), __shfl_down_sync(all, v.z, 1), w, i};
+};
+auto from_last = [&](const Vertex& v, int i, float w) {
+    return Vertex{__shfl_up_sync(all, v.x, 1), __shfl_up_sync(all, v.y, 1), __shfl_up_sync(all, v.z, 1), w, i};
+};
+// the quotient of two counts, of which none is large
+auto share = [&](int a, int b) { return (int)((a + 0.5f) / b); };
+auto move = [&](Vertex& v, float dx, float dy, float dz, float s) { v.x += dx * s; v.y += dy * s; v.z += dz * s; };
+"""
+_STRIPS = (
+    _BEGIN
+    + """
+// nuno.solver.PROJECTION
+CONSTRAINT
+const int across = columns - 1, span = (columns + 1) / 2, each = share(32, span), strips = (rows - odd) / 2;
+const int turn = share(lane, span), q = lane - turn * span;
+// where cells of either colour start among all, and how many of them a strip has
+const int begin[2] = {colour.data[2 * odd], colour.data[2 * odd + 1]}, length[2] = {(across + 1) / 2, across / 2};
+for (int first = warp * each; first < strips; first += warps * each) {
+    const int s = first + turn;
+    const bool on = turn < each && s < strips;
+    const int here = (2 * (on ? s : first) + odd) * columns + 2 * q;
+    const bool two = on && 2 * q + 1 < columns, linked = on && 2 * q + 2 < columns;
+    Vertex a = read(here), b = read(two ? here + 1 : here);
+    Vertex c = read(here + columns), d = read(two ? here + columns + 1 : here + columns);
+    const float wa = w.data[linked ? here + 2 : here], wc = w.data[linked ? here + columns + 2 : here];
+    if (two) project(a, b, c, d, varied ? soften(begin[0] + s * length[0] + q) : same);
+    Vertex e = from_next(a, here + 2, wa), f = from_next(c, here + columns + 2, wc);
+    if (linked) project(b, e, d, f, varied ? soften(begin[1] + s * length[1] + q) : same);
+    e = from_last(e, a.i, a.w);
+    f = from_last(f, c.i, c.w);
+    if (on) {
+        // the thread before has moved them on
+        write(q > 0 ? e : a);
+        write(q > 0 ? f : c);
+        if (two) { write(b); write(d); }
+    }
+}
+#endif
+"""
+)
+_TWIST = """
+auto soften = [&](int k) { return soft.data[which.data[k]] * (scale.data[k] * rate); };
+auto project = [&](Vertex& a, Vertex& b, Vertex& c, Vertex& d, float alpha) {
+    float cx = a.x - b.x - c.x + d.x, cy = a.y - b.y - c.y + d.y, cz = a.z - b.z - c.z + d.z;
+    float weight = a.w + b.w + c.w + d.w;
+    if (damped) {
+        auto bent = [&](const float* p) { return p[a.i] - p[b.i] - p[c.i] + p[d.i]; };
+        cx += gamma * (cx - bent(px.data)); cy += gamma * (cy - bent(py.data)); cz += gamma * (cz - bent(pz.data));
+        weight += gamma * weight;
+    }
+    const float s = -1.f / (fmaxf(weight * 0.5f + alpha, weight * 0.8f) + 1.0e-12f);
+    move(a, cx, cy, cz, s * a.w);
+    move(b, cx, cy, cz, -s * b.w);
+    move(c, cx, cy, cz, -s * c.w);
+    move(d, cx, cy, cz, s * d.w);
+};
+"""
+_SHEAR = """
+const float quarter = scale.data[0];
+auto soften = [&](int k) { return soft.data[which.data[k]] * (quarter * 4.f * rate); };
+auto project = [&](Vertex& a, Vertex& b, Vertex& c, Vertex& d, float alpha) {
+    const float d1x = d.x - a.x, d1y = d.y - a.y, d1z = d.z - a.z;
+    const float d2x = b.x - c.x, d2y = b.y - c.y, d2z = b.z - c.z;
+    const float q1 = d1x * d1x + d1y * d1y + d1z * d1z, q2 = d2x * d2x + d2y * d2y + d2z * d2z;
+    const float gradient = (a.w + d.w) * q1 + (b.w + c.w) * q2;
+    const float weight = gradient * (quarter * 4.f * quarter) + alpha + 1.0e-12f;
+    const float s = (q1 - q2) * quarter / weight * (quarter * 2.f);
+    move(a, d1x, d1y, d1z, s * a.w);
+    move(d, d1x, d1y, d1z, -s * d.w);
+    move(b, d2x, d2y, d2z, s * b.w);
+    move(c, d2x, d2y, d2z, -s * c.w);
+};
+"""
+
+
+@wp.func_native(_STRIPS.replace("CONSTRAINT", _TWIST).replace("PROJECTION", "bending.bend_twist"))
+def twist_strips(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    w: wp.array(dtype=float),
+    px: wp.array(dtype=float),
+    py: wp.array(dtype=float),
+    pz: wp.array(dtype=float),
+    soft: wp.array(dtype=float),
+    scale: wp.array(dtype=float),
+    which: wp.array(dtype=int),
+    colour: wp.array(dtype=int),
+    columns: int,
+    rows: int,
+    odd: int,
+    same: float,
+    varied: bool,
+    damped: bool,
+    gamma: float,
+    rate: float,
+    threads: int,
+):
+    """The twists of the cells in every other strip between two rows of a sheet: of two colours.
+
+    Args:
+        x: Coordinates; so are ``y`` and ``z`` [m].
+        y: See ``x``.
+        z: See ``x``.
+        w: Inverse masses [1/kg].
+        px: Coordinates when the substep began; so are ``py`` and ``pz`` [m].
+        py: See ``px``.
+        pz: See ``px``.
+        soft: The world's compliances.
+        scale: What the compliance of each element is multiplied with.
+        which: The place of each in ``soft``.
+        colour: Where the colours start.
+        columns: Vertices in a row, `STRIP_COLUMNS` at most.
+        rows: Rows of vertices.
+        odd: Whether the first strip is that after row 1, instead of row 0.
+        same: The compliance of all over dt^2, where they do not differ.
+        varied: Whether they do.
+        damped: Whether there is damping.
+        gamma: Damping over dt.
+        rate: 1 / dt^2 [1/s2].
+        threads: Threads of the block, whole warps.
+    """
+    ...
+
+
+@wp.func_native(_STRIPS.replace("CONSTRAINT", _SHEAR).replace("PROJECTION", "membrane.shear_cell"))
+def shear_strips(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    w: wp.array(dtype=float),
+    soft: wp.array(dtype=float),
+    scale: wp.array(dtype=float),
+    which: wp.array(dtype=int),
+    colour: wp.array(dtype=int),
+    columns: int,
+    rows: int,
+    odd: int,
+    same: float,
+    varied: bool,
+    rate: float,
+    threads: int,
+):
+    """The shears of the same cells; for the arguments see `twist_strips`."""
+    ...
+
+
+@wp.func_native(
+    _BEGIN
+    + """
+// nuno.solver.bending.bend_line
+auto soften = [&](int k) { return soft.data[which.data[k]] * (scale.data[k] * rate); };
+auto project = [&](Vertex& a, Vertex& b, Vertex& c, float alpha) {
+    float cx = a.x - b.x * 2.f + c.x, cy = a.y - b.y * 2.f + c.y, cz = a.z - b.z * 2.f + c.z;
+    float weight = a.w + b.w * 4.f + c.w;
+    if (damped) {
+        auto bent = [&](const float* p) { return p[a.i] - p[b.i] * 2.f + p[c.i]; };
+        cx += gamma * (cx - bent(px.data)); cy += gamma * (cy - bent(py.data)); cz += gamma * (cz - bent(pz.data));
+        weight += gamma * weight;
+    }
+    const float s = -1.f / (fmaxf(weight * 0.5f + alpha, weight * 0.8f) + 1.0e-12f);
+    move(a, cx, cy, cz, s * a.w);
+    move(b, cx, cy, cz, s * b.w * -2.f);
+    move(c, cx, cy, cz, s * c.w);
+};
+const int length = upright ? rows : columns, lines = upright ? columns : rows;
+const int along = upright ? columns : 1, beside = upright ? 1 : columns;
+const int span = (length + 2) / 3, each = share(32, span), side = share(lane, span), q = lane - side * span;
+// bend around vertex 3 turn + c of a line, of colour c, among all
+auto number = [&](int c, int turn, int line) {
+    const int before = c == 0 ? turn - 1 : turn, count = (length + 1 - (c == 0 ? 3 : c)) / 3;
+    return colour.data[3 * upright + c] + (upright ? before * lines + line : line * count + before);
+};
+for (int first = warp * each; first < lines; first += warps * each) {
+    const int line = first + side;
+    const bool on = side < each && line < lines;
+    const int here = (on ? line : first) * beside + 3 * q * along;
+    const bool two = on && 3 * q + 1 < length, three = on && 3 * q + 2 < length;
+    const bool linked = on && 3 * q + 3 < length;
+    // lines at the rim are half as wide
+    const float same = scale.data[number(1, 0, on ? line : first)] * rate * give;
+    Vertex a = read(here), b = read(two ? here + along : here), c = read(three ? here + 2 * along : here);
+    const float wl = w.data[q > 0 ? here - along : here], wn = w.data[linked ? here + 3 * along : here];
+    Vertex e = from_last(c, here - along, wl);
+    if (two && q > 0) project(e, a, b, varied ? soften(number(0, q, line)) : same);
+    e = from_next(e, c.i, c.w);
+    // the next thread has moved it where it has a bend there
+    if (on && 3 * q + 4 < length) c = e;
+    if (three) project(a, b, c, varied ? soften(number(1, q, line)) : same);
+    e = from_next(a, here + 3 * along, wn);
+    if (linked) project(b, c, e, varied ? soften(number(2, q, line)) : same);
+    e = from_last(e, a.i, a.w);
+    if (on) {
+        write(q > 0 ? e : a);
+        if (two) write(b);
+        if (three) write(c);
+    }
+}
+#endif
+"""
+)
+def bend_strips(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    w: wp.array(dtype=float),
+    px: wp.array(dtype=float),
+    py: wp.array(dtype=float),
+    pz: wp.array(dtype=float),
+    soft: wp.array(dtype=float),
+    scale: wp.array(dtype=float),
+    which: wp.array(dtype=int),
+    colour: wp.array(dtype=int),
+    columns: int,
+    rows: int,
+    upright: int,
+    give: float,
+    varied: bool,
+    damped: bool,
+    gamma: float,
+    rate: float,
+    threads: int,
+):
+    """The bends along all rows, or where ``upright`` along all columns, of `LINE_VERTICES` vertices at most.
+
+    ``give`` is the compliance of all, less their scale, where they do not differ. For the others see `twist_strips`.
+    """
+    ...
+
+
+@wp.func
+def fits_strips(table: Topology):
+    """Whether a cloth is a sheet whose strips a warp has threads for."""
+    columns = table.columns
+    return columns > 0 and columns <= STRIP_COLUMNS and table.particles <= LINE_VERTICES * columns
+
+
+@wp.func
+def bend_in_strips(t: StateFloat, table: Topology, run: Settings, threads: int):
+    """All twists, bends and shears of a sheet that `fits_strips`, in the order of `nuno.solver.frame.bend_sheet`."""
+    columns = table.columns
+    rows = table.particles / columns
+    rate = 1.0 / (run.dt * run.dt)
+    damped = run.damped != 0
+    gamma = t.scalars[DAMPING] * (1.0 / run.dt)
+    varied = t.bend_soft.shape[0] > BEND_KINDS
+    # early, for it comes from far away
+    twist = t.bend_soft[table.twist_soft[0]] * (table.twist_scale[0] * rate)
+    shear = t.shear_soft[table.cell_soft[0]] * (table.cell_scale[0] * 4.0 * rate)
+    halves = int(2)  # a variable, or Warp would unroll the loops
+    for odd in range(halves):
+        twist_strips(
+            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.bend_soft, table.twist_scale, table.twist_soft,
+            table.twist_colour, columns, rows, odd, twist, varied, damped, gamma, rate, threads,
+        )  # fmt: skip
+        barrier(threads)
+    for upright in range(halves):
+        give = t.bend_soft[table.line_soft[table.line_colour[3 * upright]]]
+        bend_strips(
+            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.bend_soft, table.line_scale, table.line_soft,
+            table.line_colour, columns, rows, upright, give, varied, damped, gamma, rate, threads,
+        )  # fmt: skip
+        barrier(threads)
+    for odd in range(halves):
+        shear_strips(
+            t.x, t.y, t.z, t.w, t.shear_soft, table.cell_scale, table.cell_soft,
+            table.cell_colour, columns, rows, odd, shear, t.shear_soft.shape[0] > 1, rate, threads,
+        )  # fmt: skip
+        barrier(threads)
