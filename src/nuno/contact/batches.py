@@ -15,9 +15,11 @@ from nuno.solver.lanes import barrier, window
 from nuno.solver.state import StateFloat, Topology
 from nuno.solver.warps import WARP, claim, sync_warp, told
 
-BATCH, TOGETHER = wp.constant(8), wp.constant(4)
-"""Pairs of blocks that a warp takes from the queue at a time, and those that it looks at side by side."""
-ENOUGH = wp.constant(64)
+BATCH, LONG_BATCH = wp.constant(8), wp.constant(24)
+"""Pairs of blocks that a warp takes from the queue at a time, where blocks help and where none does."""
+TOGETHER = wp.constant(4)
+"""Pairs of blocks that it looks at side by side."""
+ENOUGH = wp.constant(128)
 """Suspects from which on a warp examines them."""
 
 
@@ -175,11 +177,11 @@ def queue_blocks(t: StateFloat, topo: Topology, far: float, thread: int, threads
         on = int(0)
         if k < pairs:
             pair = t.near_blocks[1 + k]
-            a = 6 * (pair >> 16)
-            b = 6 * (pair & 0xFFFF)
-            gx = wp.min(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
-            gy = wp.min(t.bounds[a + 4] - t.bounds[b + 1], t.bounds[b + 4] - t.bounds[a + 1])
-            gz = wp.min(t.bounds[a + 5] - t.bounds[b + 2], t.bounds[b + 5] - t.bounds[a + 2])
+            a = window(t.bounds, 6 * (pair >> 16), 6)
+            b = window(t.bounds, 6 * (pair & 0xFFFF), 6)
+            gx = wp.min(a[3] - b[0], b[3] - a[0])
+            gy = wp.min(a[4] - b[1], b[4] - a[1])
+            gz = wp.min(a[5] - b[2], b[5] - a[2])
             if wp.min(gx, wp.min(gy, gz)) + far > 0.0:
                 if not in_flat(t, topo, pair >> 16, pair & 0xFFFF):
                     on = 1
@@ -230,8 +232,8 @@ def find_in_batches(t: StateFloat, topo: Topology, far: float, thread: int, thre
     while first < queued:
         place = int(0)
         if thread % WARP == 0:
-            place = wp.atomic_add(t.touch_count, 0, BATCH)
+            place = wp.atomic_add(t.touch_count, 0, LONG_BATCH)
         first = told(place, 0)
         if first < queued:
-            search_batch(t, topo, far, first, wp.min(first + BATCH, queued), thread, threads)
+            search_batch(t, topo, far, first, wp.min(first + LONG_BATCH, queued), thread, threads)
     barrier(threads)

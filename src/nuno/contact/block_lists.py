@@ -8,7 +8,7 @@ and stays true until any two points of the cloth may have come closer by the dif
 import warp as wp
 
 from nuno.contact.nearness import GROUP, raise_to
-from nuno.solver.lanes import barrier
+from nuno.solver.lanes import barrier, window
 from nuno.solver.state import THICKNESS, StateFloat, Topology
 from nuno.solver.warps import WARP, claim, lowest
 
@@ -87,17 +87,17 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, thread: int, threads
     most = float(0.0)
     for k in range(thread, t.near_blocks[0], threads):
         pair = t.near_blocks[1 + k]
-        a = 6 * (pair >> 16)
-        b = 6 * (pair & 0xFFFF)
-        gx = wp.max(t.bounds[a] - t.bounds[b + 3], t.bounds[b] - t.bounds[a + 3])
-        gy = wp.max(t.bounds[a + 1] - t.bounds[b + 4], t.bounds[b + 1] - t.bounds[a + 4])
-        gz = wp.max(t.bounds[a + 2] - t.bounds[b + 5], t.bounds[b + 2] - t.bounds[a + 5])
+        a = window(t.bounds, 6 * (pair >> 16), 6)
+        b = window(t.bounds, 6 * (pair & 0xFFFF), 6)
+        gx = wp.max(a[0] - b[3], b[0] - a[3])
+        gy = wp.max(a[1] - b[4], b[1] - a[4])
+        gz = wp.max(a[2] - b[5], b[2] - a[5])
         spare = wp.max(wp.max(gx, wp.max(gy, gz)) - far, 0.0)
-        a += place
-        b += place
-        dx = wp.max(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
-        dy = wp.max(t.bounds[a + 4] - t.bounds[b + 1], t.bounds[b + 4] - t.bounds[a + 1])
-        dz = wp.max(t.bounds[a + 5] - t.bounds[b + 2], t.bounds[b + 5] - t.bounds[a + 2])
+        a = window(a, place, 6)
+        b = window(b, place, 6)
+        dx = wp.max(a[3] - b[0], b[3] - a[0])
+        dy = wp.max(a[4] - b[1], b[4] - a[1])
+        dz = wp.max(a[5] - b[2], b[5] - a[2])
         most = wp.max(most, wp.sqrt(dx * dx + dy * dy + dz * dz) - spare)
     return most
 
@@ -106,22 +106,23 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, thread: int, threads
 def meet(t: StateFloat, far: float, m: int, thread: int, threads: int):
     """List the pairs of blocks whose boxes are nearer than ``far``, each pair once."""
     for a in range(thread / WARP, m, threads / WARP):
-        lx = t.bounds[6 * a] - far
-        ly = t.bounds[6 * a + 1] - far
-        lz = t.bounds[6 * a + 2] - far
-        hx = t.bounds[6 * a + 3] + far
-        hy = t.bounds[6 * a + 4] + far
-        hz = t.bounds[6 * a + 5] + far
+        own = window(t.bounds, 6 * a, 6)
+        lx = own[0] - far
+        ly = own[1] - far
+        lz = own[2] - far
+        hx = own[3] + far
+        hy = own[4] + far
+        hz = own[5] + far
         for begin in range(a, m, 32 * WARP):
             bits = int(0)
             count = int(0)
             for j in range(wp.min(32, (m - begin + WARP - 1) / WARP)):
                 b = begin + WARP * j + thread % WARP
                 if b < m:
-                    k = 6 * b
-                    gx = wp.min(t.bounds[k + 3] - lx, hx - t.bounds[k])
-                    gy = wp.min(t.bounds[k + 4] - ly, hy - t.bounds[k + 1])
-                    gz = wp.min(t.bounds[k + 5] - lz, hz - t.bounds[k + 2])
+                    other = window(t.bounds, 6 * b, 6)
+                    gx = wp.min(other[3] - lx, hx - other[0])
+                    gy = wp.min(other[4] - ly, hy - other[1])
+                    gz = wp.min(other[5] - lz, hz - other[2])
                     if wp.min(gx, wp.min(gy, gz)) > 0.0:
                         bits = bits | (1 << j)
                         count += 1

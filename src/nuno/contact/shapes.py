@@ -266,6 +266,13 @@ def measure_box(t: Any, n: int, thread: int, threads: int):
 
 
 @wp.func
+def along_box(t: Any, shapes: Shapes, row: int, axis: int, centre: Any):
+    """The least of the box's corners along a plane's normal, by one coordinate."""
+    n = per_world(centre, shapes.table, t.group, shapes.stride, t.worlds, row + 5 + 3 * axis)
+    return least(times(n, t.box[axis] - centre), times(n, t.box[3 + axis] - centre))
+
+
+@wp.func
 def select_shapes(t: Any, shapes: Shapes, ahead: float, thread: int, threads: int):
     """List the shapes that a particle could touch within ``ahead`` seconds.
 
@@ -293,7 +300,12 @@ def select_shapes(t: Any, shapes: Shapes, ahead: float, thread: int, threads: in
         ox = most(t.box[0] - cx, cx - t.box[3])
         oy = most(t.box[1] - cy, cy - t.box[4])
         oz = most(t.box[2] - cz, cz - t.box[5])
-        if anywhere(reach - most(ox, most(oy, oz))):
+        far = most(ox, most(oy, oz))
+        if shapes.kind[s] == PLANE and slot < 0:
+            # as far as the corner of the box that is the nearest
+            far = along_box(t, shapes, row, 0, cx) + along_box(t, shapes, row, 1, cy) + along_box(t, shapes, row, 2, cz)
+            reach = grow + per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 17)
+        if anywhere(reach - far):
             k = wp.atomic_add(t.near, 0, 1)
             t.near[1 + k] = s
 

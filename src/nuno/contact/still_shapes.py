@@ -10,32 +10,33 @@ import warp as wp
 
 from nuno.contact.distances import BOX, PLANE, SOLID_MESH, distance_solid, way_in
 from nuno.contact.shapes import COLUMNS, LEAVE_SPEED, SWIFT, press, touch_shape
+from nuno.solver.lanes import window
 from nuno.solver.state import FRICTION, ORIGIN, THICKNESS, Shapes
 
 
 @wp.func
 def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, threads: int):
     """All particles against one such shape."""
-    row = t.group * shapes.stride + s * COLUMNS
-    cx = shapes.table[row] - t.scalars[ORIGIN]
-    cy = shapes.table[row + 1] - t.scalars[ORIGIN + 1]
-    cz = shapes.table[row + 2] - t.scalars[ORIGIN + 2]
-    r00 = shapes.table[row + 3]
-    r01 = shapes.table[row + 4]
-    r02 = shapes.table[row + 5]
-    r10 = shapes.table[row + 6]
-    r11 = shapes.table[row + 7]
-    r12 = shapes.table[row + 8]
-    r20 = shapes.table[row + 9]
-    r21 = shapes.table[row + 10]
-    r22 = shapes.table[row + 11]
-    sa = shapes.table[row + 12]
-    sb = shapes.table[row + 13]
-    sc = shapes.table[row + 14]
-    mu = shapes.table[row + 16]
+    row = window(shapes.table, t.group * shapes.stride + s * COLUMNS, COLUMNS)
+    cx = row[0] - t.scalars[ORIGIN]
+    cy = row[1] - t.scalars[ORIGIN + 1]
+    cz = row[2] - t.scalars[ORIGIN + 2]
+    r00 = row[3]
+    r01 = row[4]
+    r02 = row[5]
+    r10 = row[6]
+    r11 = row[7]
+    r12 = row[8]
+    r20 = row[9]
+    r21 = row[10]
+    r22 = row[11]
+    sa = row[12]
+    sb = row[13]
+    sc = row[14]
+    mu = row[16]
     if mu + 0.5 <= 0.0:
-        mu = wp.sqrt(t.scalars[FRICTION] * shapes.table[row + 15])
-    radius = t.scalars[THICKNESS] * 0.5 + shapes.table[row + 17]
+        mu = wp.sqrt(t.scalars[FRICTION] * row[15])
+    radius = t.scalars[THICKNESS] * 0.5 + row[17]
     kind = shapes.kind[s]
     near = radius + SWIFT * dt
     for i in range(thread, n, threads):

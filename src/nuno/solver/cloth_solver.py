@@ -19,7 +19,14 @@ from nuno.solver.grid import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.large import LargePlan
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.shared import FEW_THREADS, MANY_THREADS, run_blocks, run_blocks_partly, run_blocks_shared
+from nuno.solver.shared import (
+    FEW_THREADS,
+    MANY_THREADS,
+    run_blocks,
+    run_blocks_many,
+    run_blocks_partly,
+    run_blocks_shared,
+)
 from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES
 from nuno.solver.stages import divide, make_work
 from nuno.solver.state import HELP, LISTINGS, NOTES, ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
@@ -237,14 +244,17 @@ class ClothSolver(ParticleSolver):
             return
         common = [self._state, self._topology, self._size, run, self._shapes]
         if self._cuda:
+            few = self.world_count <= wp.get_device(self.device).sm_count
             kernel = run_blocks
-            if self.shared_memory and self.particle_count <= SHARED_PARTICLES:
-                kernel = run_blocks_shared if self.particle_count <= WHOLE_PARTICLES else run_blocks_partly
+            if self.shared_memory and self.particle_count <= WHOLE_PARTICLES:
+                kernel = run_blocks_shared if few else run_blocks_many
+            elif self.shared_memory and self.particle_count <= SHARED_PARTICLES:
+                kernel = run_blocks_partly
             blocks = self.world_count
             if self._state.helpers and substeps > 1:
                 blocks += self._state.helpers
                 self._state.help.zero_()
-            threads = FEW_THREADS if self.world_count <= wp.get_device(self.device).sm_count else MANY_THREADS
+            threads = FEW_THREADS if few else MANY_THREADS
             wp.launch(
                 kernel, dim=blocks * threads, inputs=[*common, substeps, threads],
                 device=self.device, block_dim=threads,

@@ -11,15 +11,17 @@ import warp as wp
 from nuno.contact.helping import help_out, send_home
 from nuno.solver.frame import advance
 from nuno.solver.lanes import barrier
-from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES, column, counts, figures
+from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES, column, counts, figures, whole
 from nuno.solver.state import Settings, Shapes, Sizes, StateFloat, Topology, view
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
 for one, and nothing runs while that waits."""
+MANY_AT_ONCE = 3
+"""The same of cloth in many worlds: as many as its shared memory has room for."""
 FEW_THREADS, MANY_THREADS = 512, 256
-"""Threads of a block where every world has a multiprocessor to itself, and where worlds queue up for them: two blocks
-then share one, so that another world runs while one waits. The kernel is the same for both, and so are the bits."""
+"""Threads of a block where every world has a multiprocessor to itself, and where worlds queue up for them: some blocks
+then share one, so that other worlds run while one waits. Both do the same, and so the bits are the same."""
 
 
 @wp.func
@@ -58,7 +60,7 @@ def advance_block(
 
 # A module each, so that only the kind that is run is compiled. Quotients and roots as the processor has them, which
 # may be off by two in the last place: a tenth of the time, and the same bits for the same input all the same.
-for _name in ("run_blocks", "run_blocks_partly", "run_blocks_shared"):
+for _name in ("run_blocks", "run_blocks_partly", "run_blocks_shared", "run_blocks_many"):
     wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True
 
 
@@ -124,7 +126,7 @@ def advance_blocks_shared(
     s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, block: int, thread: int,
     threads: int,
 ):  # fmt: skip
-    """The same with all that changes in a substep in shared memory: x, y, z, w, p and v."""
+    """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
     n = topo.particles
     t = view(s, block, n, size)
     outside = view(s, block, n, size)
@@ -135,9 +137,7 @@ def advance_blocks_shared(
     t.px = column(4 * WHOLE_PARTICLES)
     t.py = column(5 * WHOLE_PARTICLES)
     t.pz = column(6 * WHOLE_PARTICLES)
-    t.vx = column(7 * WHOLE_PARTICLES)
-    t.vy = column(8 * WHOLE_PARTICLES)
-    t.vz = column(9 * WHOLE_PARTICLES)
+    t.moved = whole(column(7 * WHOLE_PARTICLES))
     for i in range(thread, n, threads):
         t.x[i] = outside.x[i]
         t.y[i] = outside.y[i]
@@ -146,9 +146,8 @@ def advance_blocks_shared(
         t.px[i] = outside.px[i]
         t.py[i] = outside.py[i]
         t.pz[i] = outside.pz[i]
-        t.vx[i] = outside.vx[i]
-        t.vy[i] = outside.vy[i]
-        t.vz[i] = outside.vz[i]
+    for i in range(thread, 4 * n, threads):
+        t.moved[i] = 0
     advance_block(t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
@@ -157,18 +156,24 @@ def advance_blocks_shared(
         outside.px[i] = t.px[i]
         outside.py[i] = t.py[i]
         outside.pz[i] = t.pz[i]
-        outside.vx[i] = t.vx[i]
-        outside.vy[i] = t.vy[i]
-        outside.vz[i] = t.vz[i]
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks_shared")
 def run_blocks_shared(
     s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
 ):
-    """The same with all that changes in a substep in shared memory: x, y, z, w, p and v."""
+    """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
     tid = wp.tid()
     if tid / threads < s.worlds:
         advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
     else:
         help_out(s, topo, size, run, tid / threads - s.worlds, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(MANY_THREADS, MANY_AT_ONCE), module="nuno.solver.run_blocks_many")
+def run_blocks_many(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+):
+    """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor."""
+    tid = wp.tid()
+    advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)

@@ -9,8 +9,8 @@ SHARED_PARTICLES = wp.constant(SHARED_FLOATS // 4)
 """Particles whose coordinates and inverse masses fit."""
 MOST_STEPS = wp.constant(128)
 """Steps that there is room for in `program`."""
-ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(SHARED_FLOATS // 10)
-"""Particles whose velocities fit too, and those whose positions at the substep's start do besides."""
+ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(SHARED_FLOATS // 11)
+"""Particles of which three more numbers fit, and those for whose contacts there is room besides."""
 
 
 @wp.func_native("""
@@ -27,6 +27,18 @@ def column(first: int) -> wp.array(dtype=float):  # type: ignore[valid-type]
     Known to the compiler as such, and by a place that it knows, an element is read by one short instruction. The array
     says that it has no elements, for then no index can be one that counts from the end.
     """
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return wp::array_t<wp::int32>(reinterpret_cast<int*>(numbers.data), 0);
+#else
+return {};
+#endif
+""")
+def whole(numbers: wp.array(dtype=float)) -> wp.array(dtype=int):  # type: ignore[valid-type]
+    """A `column` of whole numbers."""
     ...
 
 

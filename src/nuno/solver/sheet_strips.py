@@ -2,9 +2,9 @@
 
 Elements of one colour share no vertex. Taken colour by colour, every vertex is read and written again for each, with
 what tables say of each element, and all threads of the block wait in between. Here a warp takes lines of the grid, or
-strips between two lines, through all colours that stay in them. A thread has two or three vertices along the line, and
-hands on what lies between it and its neighbours. The order of the elements is that of the colours, and where a material
-is the same everywhere nothing is read of tables but a number or two.
+strips between two lines, through all colours that stay in them. A thread has six vertices of a line, or two of either
+line of a strip, and hands on what lies between it and its neighbours. The order of the elements is that of the colours,
+and where a material is the same everywhere nothing is read of tables but a number or two.
 """
 
 import warp as wp
@@ -12,7 +12,7 @@ import warp as wp
 from nuno.solver.lanes import barrier
 from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
 
-STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(96)
+STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(192)
 """Vertices of the longest strip and of the longest line that the 32 threads of a warp take together."""
 BEND_KINDS = wp.constant(9)
 """Numbers in ``bend_soft`` where they are the same for all elements of a kind."""
@@ -52,9 +52,14 @@ for (int first = warp * each; first < strips; first += warps * each) {
     Vertex a = read(here), b = read(two ? here + 1 : here);
     Vertex c = read(here + columns), d = read(two ? here + columns + 1 : here + columns);
     const float wa = w.data[linked ? here + 2 : here], wc = w.data[linked ? here + columns + 2 : here];
-    if (two) project(a, b, c, d, varied ? soften(begin[0] + s * length[0] + q) : same);
+    float first_alpha = same, second_alpha = same;
+    if (__builtin_expect(varied, false)) {
+        if (two) first_alpha = soften(begin[0] + s * length[0] + q);
+        if (linked) second_alpha = soften(begin[1] + s * length[1] + q);
+    }
+    if (two) project(a, b, c, d, first_alpha);
     Vertex e = from_next(a, here + 2, wa), f = from_next(c, here + columns + 2, wc);
-    if (linked) project(b, e, d, f, varied ? soften(begin[1] + s * length[1] + q) : same);
+    if (linked) project(b, e, d, f, second_alpha);
     e = from_last(e, a.i, a.w);
     f = from_last(f, c.i, c.w);
     if (on) {
@@ -194,36 +199,47 @@ auto project = [&](Vertex& a, Vertex& b, Vertex& c, float alpha) {
 };
 const int length = upright ? rows : columns, lines = upright ? columns : rows;
 const int along = upright ? columns : 1, beside = upright ? 1 : columns;
-const int span = (length + 2) / 3, each = share(32, span), side = share(lane, span), q = lane - side * span;
-// bend around vertex 3 turn + c of a line, of colour c, among all
+const int span = (length + 5) / 6, each = share(32, span), side = share(lane, span), q = lane - side * span;
+// a line's bend of a colour, the one so many after its first, among all
 auto number = [&](int c, int turn, int line) {
-    const int before = c == 0 ? turn - 1 : turn, count = (length + 1 - (c == 0 ? 3 : c)) / 3;
-    return colour.data[3 * upright + c] + (upright ? before * lines + line : line * count + before);
+    const int count = (length + 1 - (c == 0 ? 3 : c)) / 3;
+    return colour.data[3 * upright + c] + (upright ? turn * lines + line : line * count + turn);
 };
 for (int first = warp * each; first < lines; first += warps * each) {
     const int line = first + side;
     const bool on = side < each && line < lines;
-    const int here = (on ? line : first) * beside + 3 * q * along;
-    const bool two = on && 3 * q + 1 < length, three = on && 3 * q + 2 < length;
-    const bool linked = on && 3 * q + 3 < length;
+    const int here = (on ? line : first) * beside + 6 * q * along, left = on ? length - 6 * q : 0;
     // lines at the rim are half as wide
     const float same = scale.data[number(1, 0, on ? line : first)] * rate * give;
-    Vertex a = read(here), b = read(two ? here + along : here), c = read(three ? here + 2 * along : here);
-    const float wl = w.data[q > 0 ? here - along : here], wn = w.data[linked ? here + 3 * along : here];
-    Vertex e = from_last(c, here - along, wl);
-    if (two && q > 0) project(e, a, b, varied ? soften(number(0, q, line)) : same);
-    e = from_next(e, c.i, c.w);
-    // the next thread has moved it where it has a bend there
-    if (on && 3 * q + 4 < length) c = e;
-    if (three) project(a, b, c, varied ? soften(number(1, q, line)) : same);
-    e = from_next(a, here + 3 * along, wn);
-    if (linked) project(b, c, e, varied ? soften(number(2, q, line)) : same);
-    e = from_last(e, a.i, a.w);
-    if (on) {
-        write(q > 0 ? e : a);
-        if (two) write(b);
-        if (three) write(c);
+    Vertex v[6];
+    float alpha[6];
+    #pragma unroll
+    for (int r = 0; r < 6; ++r) {
+        v[r] = read(here + (r < left ? r * along : 0));
+        alpha[r] = same;
     }
+    if (__builtin_expect(varied, false)) {
+        #pragma unroll
+        for (int r = 0; r < 6; ++r)
+            if (r + 1 < left && q + r > 0) alpha[r] = soften(number(r % 3, 2 * q + r / 3 - (r % 3 == 0), line));
+    }
+    const float wl = w.data[q > 0 ? here - along : here], wn = w.data[left > 6 ? here + 6 * along : here];
+    Vertex e = from_last(v[5], here - along, wl);
+    if (q > 0 && left > 1) project(e, v[0], v[1], alpha[0]);
+    if (left > 4) project(v[2], v[3], v[4], alpha[3]);
+    e = from_next(e, v[5].i, v[5].w);
+    // the next thread has moved it where it has a bend there
+    if (left > 7) v[5] = e;
+    if (left > 2) project(v[0], v[1], v[2], alpha[1]);
+    if (left > 5) project(v[3], v[4], v[5], alpha[4]);
+    if (left > 3) project(v[1], v[2], v[3], alpha[2]);
+    e = from_next(v[0], here + 6 * along, wn);
+    if (left > 6) project(v[4], v[5], e, alpha[5]);
+    e = from_last(e, v[0].i, v[0].w);
+    if (q > 0) v[0] = e;
+    #pragma unroll
+    for (int r = 0; r < 6; ++r)
+        if (r < left) write(v[r]);
 }
 #endif
 """

@@ -1,4 +1,4 @@
-"""A yarn's stretch by a few neighbouring threads on CUDA, each with four or eight edges in its registers.
+"""A yarn's stretch by a few neighbouring threads on CUDA, each with eight edges in its registers.
 
 What `nuno.solver.membrane.stretch_yarn` does from one end to the other takes a step an edge, each waiting for the one
 before. Here each thread eliminates its own rows but the last, as that does, with the last row of the thread before as
@@ -17,126 +17,122 @@ YARN_EDGES = wp.constant(256)
 #if defined(__CUDA_ARCH__)
 const unsigned all = 0xffffffffu;
 const int lane = threadIdx.x % 32, warp = threadIdx.x / 32, warps = threads / 32;
-struct Four { enum { rows = 4 }; };
-struct Eight { enum { rows = 8 }; };
-auto solve = [&](auto kind) {
-    constexpr int ROWS = decltype(kind)::rows;
-    int span = 1;
-    while (span * ROWS < count) span *= 2;
-    const int each = 32 / span, q = lane % span;
-    for (int begin = warp * each; begin < yarns; begin += warps * each) {
-        const int own = begin + lane / span;
-        const int start = first + (own < yarns ? own : begin) * count;
-        const int here = own < yarns ? count : 0;
-        const int head = edge.data[start][0], step = edge.data[start][1] - head;
-        const float length = rest.data[start];
-        float alpha = soft.data[which.data[start]] * (scale.data[start] * rate);
-        // the thread's rows, and the vertices at both ends of each
-        float vx[ROWS + 1], vy[ROWS + 1], vz[ROWS + 1], vw[ROWS + 1];
-        #pragma unroll
-        for (int r = 0; r <= ROWS; ++r) {
-            const int k = q * ROWS + r;
-            const int i = head + (k < count ? k : count) * step;
-            vx[r] = x.data[i]; vy[r] = y.data[i]; vz[r] = z.data[i]; vw[r] = w.data[i];
+constexpr int ROWS = 8;
+// read anew, once they are needed again: there are not registers enough to keep them
+auto again = [](const float& a) { return *const_cast<const volatile float*>(&a); };
+int power = 0;
+while ((ROWS << power) < count) ++power;
+const int span = 1 << power, each = 32 >> power, side = lane >> power, q = lane - (side << power);
+for (int begin = warp * each; begin < yarns; begin += warps * each) {
+    const int own = begin + side;
+    const int start = first + (own < yarns ? own : begin) * count;
+    const int here = own < yarns ? count : 0;
+    const int head = edge.data[start][0], step = edge.data[start][1] - head;
+    const float length = rest.data[start];
+    float alpha = soft.data[which.data[start]] * (scale.data[start] * rate);
+    // the thread's rows, and the vertices at both ends of each
+    float vx[ROWS + 1], vy[ROWS + 1], vz[ROWS + 1], vw[ROWS + 1];
+    #pragma unroll
+    for (int r = 0; r <= ROWS; ++r) {
+        const int k = q * ROWS + r;
+        const int i = head + (k < count ? k : count) * step;
+        vx[r] = x.data[i]; vy[r] = y.data[i]; vz[r] = z.data[i]; vw[r] = w.data[i];
+    }
+    float ex[ROWS], ey[ROWS], ez[ROWS], weight[ROWS], pull[ROWS];
+    #pragma unroll
+    for (int r = 0; r < ROWS; ++r) {
+        const bool on = q * ROWS + r < here;
+        if (__builtin_expect(varied, false) && on) {
+            const int k = start + q * ROWS + r;
+            alpha = soft.data[which.data[k]] * (scale.data[k] * rate);
         }
-        float ex[ROWS], ey[ROWS], ez[ROWS], weight[ROWS], pull[ROWS];
-        #pragma unroll
-        for (int r = 0; r < ROWS; ++r) {
-            const bool on = q * ROWS + r < here;
-            if (varied && on) {
-                const int k = start + q * ROWS + r;
-                alpha = soft.data[which.data[k]] * (scale.data[k] * rate);
-            }
-            const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
-            const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
-            const float inverse = rsqrtf(square);
-            ex[r] = dx * inverse; ey[r] = dy * inverse; ez[r] = dz * inverse;
-            pull[r] = on ? length - square * inverse : 0.f;
-            weight[r] = on ? vw[r] + vw[r + 1] + alpha + 1.0e-12f : 1.f;
-        }
-        // what links each row to the one before, and the last one to the next thread's first
-        float beside[ROWS + 1];
-        const float bx = __shfl_up_sync(all, ex[ROWS - 1], 1, span);
-        const float by = __shfl_up_sync(all, ey[ROWS - 1], 1, span);
-        const float bz = __shfl_up_sync(all, ez[ROWS - 1], 1, span);
-        beside[0] = q > 0 && q * ROWS < here ? vw[0] * (bx * ex[0] + by * ey[0] + bz * ez[0]) : 0.f;
-        #pragma unroll
-        for (int r = 1; r < ROWS; ++r) {
-            const float c = vw[r] * (ex[r - 1] * ex[r] + ey[r - 1] * ey[r] + ez[r - 1] * ez[r]);
-            beside[r] = q * ROWS + r < here ? c : 0.f;
-        }
-        beside[ROWS] = __shfl_down_sync(all, beside[0], 1, span);
-        if (q == span - 1) beside[ROWS] = 0.f;
-        // row r is now pull + gain (row r + 1) + far (the last row of the thread before)
-        float gain[ROWS], far[ROWS];
-        {
-            const float s = 1.f / weight[0];
-            pull[0] *= s; gain[0] = beside[1] * s; far[0] = beside[0] * s;
-        }
-        #pragma unroll
-        for (int r = 1; r < ROWS - 1; ++r) {
-            const float s = 1.f / (weight[r] - beside[r] * gain[r - 1]);
-            pull[r] = (pull[r] + beside[r] * pull[r - 1]) * s;
-            gain[r] = beside[r + 1] * s;
-            far[r] = beside[r] * far[r - 1] * s;
-        }
-        // the first row by the thread's last and the last before, which the thread before asks for
-        float p = pull[ROWS - 2], g = gain[ROWS - 2], f = far[ROWS - 2];
-        #pragma unroll
-        for (int r = ROWS - 3; r >= 0; --r) {
-            p = pull[r] + gain[r] * p;
-            f = far[r] + gain[r] * f;
-            g = gain[r] * g;
-        }
-        p = __shfl_down_sync(all, p, 1, span);
-        g = __shfl_down_sync(all, g, 1, span);
-        f = __shfl_down_sync(all, f, 1, span);
-        const float near = beside[ROWS - 1], next = beside[ROWS];
-        const float s = 1.f / (weight[ROWS - 1] - near * gain[ROWS - 2] - next * f);
-        float low = near * far[ROWS - 2] * s, high = next * g * s;
-        float last = (pull[ROWS - 1] + near * pull[ROWS - 2] + next * p) * s;
-        for (int shift = 1; shift < span; shift *= 2) {
-            const bool down = q >= shift, up = q + shift < span;
-            const float lb = __shfl_up_sync(all, low, shift, span), hb = __shfl_up_sync(all, high, shift, span);
-            const float pb = __shfl_up_sync(all, last, shift, span), la = __shfl_down_sync(all, low, shift, span);
-            const float ha = __shfl_down_sync(all, high, shift, span), pa = __shfl_down_sync(all, last, shift, span);
-            // at the ends ``low`` and ``high`` are zero, and what comes from there is finite
-            const float s = 1.f / (1.f - (down ? low * hb : 0.f) - (up ? high * la : 0.f));
-            last = (last + low * pb + high * pa) * s;
-            low = down ? low * lb * s : 0.f;
-            high = up ? high * ha * s : 0.f;
-        }
-        float before = __shfl_up_sync(all, last, 1, span);
-        if (q == 0) before = 0.f;
-        pull[ROWS - 1] = last;
-        #pragma unroll
-        for (int r = ROWS - 2; r >= 0; --r) pull[r] = pull[r] + gain[r] * pull[r + 1] + far[r] * before;
-        #pragma unroll
-        for (int r = 0; r < ROWS; ++r) { ex[r] *= pull[r]; ey[r] *= pull[r]; ez[r] *= pull[r]; }
-        float nx = __shfl_down_sync(all, ex[0], 1, span);
-        float ny = __shfl_down_sync(all, ey[0], 1, span);
-        float nz = __shfl_down_sync(all, ez[0], 1, span);
-        if (q == span - 1) { nx = 0.f; ny = 0.f; nz = 0.f; }
-        // all have read their vertices before the first shuffle, so that nothing is overwritten too soon
-        if (q == 0 && here > 0) {
-            x.data[head] = vx[0] + vw[0] * ex[0];
-            y.data[head] = vy[0] + vw[0] * ey[0];
-            z.data[head] = vz[0] + vw[0] * ez[0];
-        }
-        #pragma unroll
-        for (int r = 0; r < ROWS; ++r) {
-            const int k = q * ROWS + r;
-            if (k < here) {
-                const int i = head + (k + 1) * step;
-                x.data[i] = vx[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ex[r < ROWS - 1 ? r + 1 : r] : nx) - ex[r]);
-                y.data[i] = vy[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ey[r < ROWS - 1 ? r + 1 : r] : ny) - ey[r]);
-                z.data[i] = vz[r + 1] + vw[r + 1] * ((r < ROWS - 1 ? ez[r < ROWS - 1 ? r + 1 : r] : nz) - ez[r]);
-            }
+        const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
+        const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
+        const float inverse = rsqrtf(square);
+        ex[r] = dx * inverse; ey[r] = dy * inverse; ez[r] = dz * inverse;
+        pull[r] = on ? length - square * inverse : 0.f;
+        weight[r] = on ? vw[r] + vw[r + 1] + alpha + 1.0e-12f : 1.f;
+    }
+    // what links each row to the one before, and the last one to the next thread's first
+    float beside[ROWS + 1];
+    const float bx = __shfl_up_sync(all, ex[ROWS - 1], 1, span);
+    const float by = __shfl_up_sync(all, ey[ROWS - 1], 1, span);
+    const float bz = __shfl_up_sync(all, ez[ROWS - 1], 1, span);
+    beside[0] = q > 0 && q * ROWS < here ? vw[0] * (bx * ex[0] + by * ey[0] + bz * ez[0]) : 0.f;
+    #pragma unroll
+    for (int r = 1; r < ROWS; ++r) {
+        const float c = vw[r] * (ex[r - 1] * ex[r] + ey[r - 1] * ey[r] + ez[r - 1] * ez[r]);
+        beside[r] = q * ROWS + r < here ? c : 0.f;
+    }
+    beside[ROWS] = __shfl_down_sync(all, beside[0], 1, span);
+    if (q == span - 1) beside[ROWS] = 0.f;
+    // row r is now pull + gain (row r + 1) + far (the last row of the thread before)
+    float gain[ROWS], far[ROWS];
+    {
+        const float s = 1.f / weight[0];
+        pull[0] *= s; gain[0] = beside[1] * s; far[0] = beside[0] * s;
+    }
+    #pragma unroll
+    for (int r = 1; r < ROWS - 1; ++r) {
+        const float s = 1.f / (weight[r] - beside[r] * gain[r - 1]);
+        pull[r] = (pull[r] + beside[r] * pull[r - 1]) * s;
+        gain[r] = beside[r + 1] * s;
+        far[r] = beside[r] * far[r - 1] * s;
+    }
+    // the first row by the thread's last and the last before, which the thread before asks for
+    float p = pull[ROWS - 2], g = gain[ROWS - 2], f = far[ROWS - 2];
+    #pragma unroll
+    for (int r = ROWS - 3; r >= 0; --r) {
+        p = pull[r] + gain[r] * p;
+        f = far[r] + gain[r] * f;
+        g = gain[r] * g;
+    }
+    p = __shfl_down_sync(all, p, 1, span);
+    g = __shfl_down_sync(all, g, 1, span);
+    f = __shfl_down_sync(all, f, 1, span);
+    const float near = beside[ROWS - 1], next = beside[ROWS];
+    const float s = 1.f / (weight[ROWS - 1] - near * gain[ROWS - 2] - next * f);
+    float low = near * far[ROWS - 2] * s, high = next * g * s;
+    float last = (pull[ROWS - 1] + near * pull[ROWS - 2] + next * p) * s;
+    for (int shift = 1; shift < span; shift *= 2) {
+        const bool down = q >= shift, up = q + shift < span;
+        const float lb = __shfl_up_sync(all, low, shift, span), hb = __shfl_up_sync(all, high, shift, span);
+        const float pb = __shfl_up_sync(all, last, shift, span), la = __shfl_down_sync(all, low, shift, span);
+        const float ha = __shfl_down_sync(all, high, shift, span), pa = __shfl_down_sync(all, last, shift, span);
+        // at the ends ``low`` and ``high`` are zero, and what comes from there is finite
+        const float s = 1.f / (1.f - (down ? low * hb : 0.f) - (up ? high * la : 0.f));
+        last = (last + low * pb + high * pa) * s;
+        low = down ? low * lb * s : 0.f;
+        high = up ? high * ha * s : 0.f;
+    }
+    float before = __shfl_up_sync(all, last, 1, span);
+    if (q == 0) before = 0.f;
+    pull[ROWS - 1] = last;
+    #pragma unroll
+    for (int r = ROWS - 2; r >= 0; --r) pull[r] = pull[r] + gain[r] * pull[r + 1] + far[r] * before;
+    #pragma unroll
+    for (int r = 0; r < ROWS; ++r) { ex[r] *= pull[r]; ey[r] *= pull[r]; ez[r] *= pull[r]; }
+    float nx = __shfl_down_sync(all, ex[0], 1, span);
+    float ny = __shfl_down_sync(all, ey[0], 1, span);
+    float nz = __shfl_down_sync(all, ez[0], 1, span);
+    if (q == span - 1) { nx = 0.f; ny = 0.f; nz = 0.f; }
+    // all have read their vertices before the first shuffle, so that nothing is overwritten too soon
+    __syncwarp();
+    if (q == 0 && here > 0) {
+        x.data[head] += vw[0] * ex[0];
+        y.data[head] += vw[0] * ey[0];
+        z.data[head] += vw[0] * ez[0];
+    }
+    #pragma unroll
+    for (int r = 0; r < ROWS; ++r) {
+        if (q * ROWS + r < here) {
+            const int i = head + (q * ROWS + r + 1) * step;
+            x.data[i] = again(x.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ex[(r + 1) % ROWS] : nx) - ex[r]);
+            y.data[i] = again(y.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ey[(r + 1) % ROWS] : ny) - ey[r]);
+            z.data[i] = again(z.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ez[(r + 1) % ROWS] : nz) - ez[r]);
         }
     }
-};
-if (count <= 128) solve(Four());
-else solve(Eight());
+}
 #endif
 """)
 def stretch_yarns_together(
