@@ -236,6 +236,35 @@ def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
     np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
+def patchwork(cells, device, shares=(0.0, 1.0)):
+    """Positions of a wrinkled sheet after three frames, of which every cell has a material of its own."""
+    cloth = ClothTopology.sheet(cells, (0.03 * cells[0], 0.03 * cells[1]))
+    random = np.random.default_rng(2)
+    wrinkles = random.normal(scale=0.003, size=cloth.rest.shape)
+    cell = random.uniform(*shares, (1, cloth.element_count))
+    material = nuno.Cloth(
+        bending_rigidity=1e-5 * 100**cell, stretch_stiffness=100 + 900 * cell, shear_stiffness=10 + 90 * cell,
+        damping=0.001,
+    )  # fmt: skip
+    made = ClothSolver(
+        cloth, material, (cloth.rest + wrinkles)[None], np.zeros((1, *cloth.rest.shape)), device=device, substeps=12,
+        self_contact=False, plan="fused",
+    )  # fmt: skip
+    return outcome(made, 0.05)[0]
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("cells", [(13, 9), (70, 6), (6, 70), (5, 270), (3, 3)])
+def test_cuda_tells_cells_apart_in_sheets_of_any_shape(cells):
+    """Beside the CPU: what strips, lines and yarns a warp has threads for, and what it has not.
+
+    10 um: rounding; one material everywhere makes 4 to 7 mm.
+    """
+    expected = patchwork(cells, "cpu")
+    assert np.abs(patchwork(cells, "cpu", (0.5, 0.5)) - expected).max() > 1e-3
+    np.testing.assert_allclose(patchwork(cells, "cuda:0"), expected, atol=1e-5)
+
+
 @pytest.mark.cuda
 @pytest.mark.parametrize("plan", ["fused", "large", "grid"])
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
