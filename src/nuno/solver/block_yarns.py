@@ -87,7 +87,7 @@ def stretch_edges(
 ):
     """Solve the edges first to last, those of whole yarns of at most ``longest`` edges, and move their vertices.
 
-    For the other arguments see `nuno.solver.yarns.stretch_yarn_together`. All threads of the block come here.
+    For the other arguments see `nuno.solver.yarns.stretch_yarns_together`. All threads of the block come here.
     """
     ...
 
