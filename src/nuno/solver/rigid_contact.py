@@ -10,9 +10,22 @@ import warp as wp
 
 from nuno.contact.convex import Parts
 from nuno.contact.manifold import POINTS
-from nuno.contact.rigid_manifolds import FAR, Contacts, is_slipping, moves
-from nuno.solver.rigid_body import RigidState, inverse_mass_at, turn_between, turned
+from nuno.contact.rigid_manifolds import FAR, Contacts, is_slipping
+from nuno.solver.rigid_body import RigidState
+from nuno.solver.rigid_meeting import (
+    Going,
+    Meeting,
+    against,
+    ease,
+    keep_places,
+    keep_speeds,
+    meeting_of,
+    places_of,
+    speeds_of,
+)
 
+PLACES, SPEEDS = 0, 1
+"""What the points are solved for."""
 MEND = wp.constant(0.2)
 """Share of an overlap, and of a slip that should not be, that a substep takes back."""
 REST = wp.constant(2.0e-5)
@@ -35,12 +48,7 @@ def limited(force: wp.vec3, mu: float):
 @wp.func
 def start_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
     """Apply the last substep's forces to the velocities."""
-    p = (e - world * c.parts * c.row) / c.row
-    i = world * s.capacity + parts.slot[p]
-    j = world * s.capacity + parts.slot[c.partner[e]]
-    n = c.normal_now[e]
-    t = c.tangent_now[e]
-    u = wp.cross(n, t)
+    m = meeting_of(s, parts, c, world, e)
     total = wp.vec3(0.0)
     turn_a = wp.vec3(0.0)
     turn_b = wp.vec3(0.0)
@@ -48,102 +56,107 @@ def start_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt
         o = e * POINTS + k
         f = limited(c.force[o], c.friction[e])
         c.force[o] = f
-        push = dt * (f[0] * n + f[1] * t + f[2] * u)
+        push = dt * (f[0] * m.n + f[1] * m.t + f[2] * m.u)
         total = total + push
         turn_a = turn_a + wp.cross(c.arm_a[o], push)
         turn_b = turn_b + wp.cross(c.arm_b[o], push)
-    if s.weight[i] > 0.0:
-        s.velocity[i] = s.velocity[i] + s.weight[i] * total
-        s.spin[i] = s.spin[i] + s.give[i] * turn_a
-    if s.weight[j] > 0.0:
-        s.velocity[j] = s.velocity[j] - s.weight[j] * total
-        s.spin[j] = s.spin[j] - s.give[j] * turn_b
+    if m.wa > 0.0:
+        s.velocity[m.i] = s.velocity[m.i] + m.wa * total
+        s.spin[m.i] = s.spin[m.i] + m.ia * turn_a
+    if m.wb > 0.0:
+        s.velocity[m.j] = s.velocity[m.j] - m.wb * total
+        s.spin[m.j] = s.spin[m.j] - m.ib * turn_b
 
 
 @wp.func
-def part_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
-    """Positions: nothing comes nearer than touching, and nothing slips that friction holds."""
-    p = (e - world * c.parts * c.row) / c.row
-    i = world * s.capacity + parts.slot[p]
-    j = world * s.capacity + parts.slot[c.partner[e]]
-    wa = s.weight[i]
-    wb = s.weight[j]
-    ia = s.give[i]
-    ib = s.give[j]
-    n = c.normal_now[e]
-    t = c.tangent_now[e]
-    u = wp.cross(n, t)
-    # what the bodies have moved in this substep
-    xa = s.position[i] - s.position_before[i]
-    xb = s.position[j] - s.position_before[j]
-    ta = turn_between(s.rotation_before[i], s.rotation[i])
-    tb = turn_between(s.rotation_before[j], s.rotation[j])
-    changed = int(0)
-    rate = 1.0 / (dt * dt)
+def beyond(c: Contacts, o: int, along: float, of: int):
+    """How much farther a point goes along the normal than it has to; negative where it is to be pushed.
+
+    Of places what touches may come no nearer, and what does not may not overlap [m]; of speeds it is to part at its
+    aim [m/s].
+    """
+    result = along - c.aim[o]
+    if of == PLACES:
+        gap = c.start[o][0]
+        result = gap + along - wp.min(gap, 0.0)
+    return result
+
+
+@wp.func
+def solve_points(c: Contacts, m: Meeting, start: Going, e: int, step: float, of: int, back: int):
+    """Bring the forces of an entry's points to what they have to be; how the bodies go then.
+
+    ``step`` is what a force makes of a mass: of places dt² [s2], of speeds dt [s]. ``back`` takes the points in
+    reverse.
+    """
+    g = start
+    rate = 1.0 / step
     # all points alike first: what lands flat is not set spinning by the order of its corners
     counted = int(0)
     count = float(0.0)
     least = float(1.0e30)
     mean = float(0.0)
-    arm = wp.vec3(0.0)
-    brm = wp.vec3(0.0)
+    arm_a = wp.vec3(0.0)
+    arm_b = wp.vec3(0.0)
     each = float(0.0)
     for k in range(c.count[e]):
         o = e * POINTS + k
         ra = c.arm_a[o]
         rb = c.arm_b[o]
-        gap = c.start[o][0]
-        over = gap + wp.dot(n, xa + wp.cross(ta, ra) - xb - wp.cross(tb, rb)) - wp.min(gap, 0.0)
         f = c.force[o]
-        if gap < FAR and (over < 0.0 or f[0] > 0.0):
+        over = beyond(c, o, wp.dot(m.n, against(g, ra, rb)), of)
+        if c.start[o][0] < FAR and (over < 0.0 or f[0] > 0.0):
             count = count + 1.0
             least = wp.min(least, f[0])
             mean = mean + over
-            arm = arm + ra
-            brm = brm + rb
+            arm_a = arm_a + ra
+            arm_b = arm_b + rb
             counted = counted | (1 << k)
     if count > 1.0:
-        arm = arm / count
-        brm = brm / count
-        each = -mean / count * rate / (count * (inverse_mass_at(s, i, arm, n) + inverse_mass_at(s, j, brm, n)))
+        arm_a = arm_a / count
+        arm_b = arm_b / count
+        each = -mean / count * rate / (count * ease(m, arm_a, arm_b, m.n))
         each = wp.max(each, -least)
-        push = (dt * dt * count * each) * n
-        xa = xa + wa * push
-        ta = ta + ia * wp.cross(arm, push)
-        xb = xb - wb * push
-        tb = tb - ib * wp.cross(brm, push)
-        changed = 1
-    for k in range(c.count[e]):
+        # written out at each push: of a struct that a function gives back Warp makes copies, 5 % of a run's time
+        push = (step * count * each) * m.n
+        g.xa = g.xa + m.wa * push
+        g.ta = g.ta + m.ia * wp.cross(arm_a, push)
+        g.xb = g.xb - m.wb * push
+        g.tb = g.tb - m.ib * wp.cross(arm_b, push)
+        g.changed = 1
+    for h in range(c.count[e]):
+        k = wp.where(back == 1, c.count[e] - 1 - h, h)
         o = e * POINTS + k
         ra = c.arm_a[o]
         rb = c.arm_b[o]
-        start = c.start[o]
         mass = c.mass[o]
         f = c.force[o]
         if (counted & (1 << k)) != 0:
             f = wp.vec3(f[0] + each, f[1], f[2])
             c.force[o] = f
-        went = xa + wp.cross(ta, ra) - xb - wp.cross(tb, rb)
-        over = start[0] + wp.dot(n, went) - wp.min(start[0], 0.0)
-        g = wp.vec3(wp.max(0.0, f[0] - over * mass[0] * rate), f[1], f[2])
-        if start[0] < FAR and (g[0] > 0.0 or f[0] > 0.0):
-            g = wp.vec3(g[0], g[1] - wp.dot(t, went) * mass[1] * rate, g[2] - wp.dot(u, went) * mass[2] * rate)
-            g = limited(g, c.friction[e])
-            c.force[o] = g
-            d = g - f
-            push = dt * dt * (d[0] * n + d[1] * t + d[2] * u)
-            xa = xa + wa * push
-            ta = ta + ia * wp.cross(ra, push)
-            xb = xb - wb * push
-            tb = tb - ib * wp.cross(rb, push)
-            changed = 1
-    if changed == 1:
-        if wa > 0.0:
-            s.position[i] = s.position_before[i] + xa
-            s.rotation[i] = turned(s.rotation_before[i], ta)
-        if wb > 0.0:
-            s.position[j] = s.position_before[j] + xb
-            s.rotation[j] = turned(s.rotation_before[j], tb)
+        went = against(g, ra, rb)
+        over = beyond(c, o, wp.dot(m.n, went), of)
+        press = wp.max(0.0, f[0] - over * mass[0] * rate)
+        if c.start[o][0] < FAR and (press > 0.0 or f[0] > 0.0):
+            slip_t = f[1] - wp.dot(m.t, went) * mass[1] * rate
+            slip_u = f[2] - wp.dot(m.u, went) * mass[2] * rate
+            force = limited(wp.vec3(press, slip_t, slip_u), c.friction[e])
+            c.force[o] = force
+            d = force - f
+            push = step * (d[0] * m.n + d[1] * m.t + d[2] * m.u)
+            g.xa = g.xa + m.wa * push
+            g.ta = g.ta + m.ia * wp.cross(ra, push)
+            g.xb = g.xb - m.wb * push
+            g.tb = g.tb - m.ib * wp.cross(rb, push)
+            g.changed = 1
+    return g
+
+
+@wp.func
+def part_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
+    """Positions: nothing comes nearer than touching, and nothing slips that friction holds."""
+    m = meeting_of(s, parts, c, world, e)
+    keep_places(s, m, solve_points(c, m, places_of(s, m), e, dt * dt, PLACES, 0))
 
 
 @wp.func
@@ -152,19 +165,13 @@ def aim_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: 
 
     What touches is to part at the speed of its bounce; what does not yet is left alone.
     """
-    p = (e - world * c.parts * c.row) / c.row
-    i = world * s.capacity + parts.slot[p]
-    j = world * s.capacity + parts.slot[c.partner[e]]
-    n = c.normal_now[e]
-    xa = s.position[i] - s.position_before[i]
-    xb = s.position[j] - s.position_before[j]
-    ta = turn_between(s.rotation_before[i], s.rotation[i])
-    tb = turn_between(s.rotation_before[j], s.rotation[j])
+    m = meeting_of(s, parts, c, world, e)
+    g = places_of(s, m)
     for k in range(c.count[e]):
         o = e * POINTS + k
         start = c.start[o]
         if start[0] < FAR:
-            gap = start[0] + wp.dot(n, xa + wp.cross(ta, c.arm_a[o]) - xb - wp.cross(tb, c.arm_b[o]))
+            gap = start[0] + wp.dot(m.n, against(g, c.arm_a[o], c.arm_b[o]))
             wanted = -FAR
             if c.force[o][0] > 0.0 or gap < REST:
                 wanted = 0.0
@@ -180,85 +187,8 @@ def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
     ``back`` takes the points in reverse. They stand in a round, and pass after pass the one way would drive what rests
     to wobble the same way round: a stack of boxes on its corners, or a heavy box on a light one.
     """
-    p = (e - world * c.parts * c.row) / c.row
-    a = parts.slot[p]
-    b = parts.slot[c.partner[e]]
-    i = world * s.capacity + a
-    j = world * s.capacity + b
-    wa = s.weight[i]
-    wb = s.weight[j]
-    ia = s.give[i]
-    ib = s.give[j]
-    n = c.normal_now[e]
-    t = c.tangent_now[e]
-    u = wp.cross(n, t)
-    va = moves(s, i, a) * s.velocity[i]
-    vb = moves(s, j, b) * s.velocity[j]
-    oa = moves(s, i, a) * s.spin[i]
-    ob = moves(s, j, b) * s.spin[j]
-    changed = int(0)
-    rate = 1.0 / dt
-    counted = int(0)
-    count = float(0.0)
-    least = float(1.0e30)
-    mean = float(0.0)
-    arm = wp.vec3(0.0)
-    brm = wp.vec3(0.0)
-    each = float(0.0)
-    for k in range(c.count[e]):
-        o = e * POINTS + k
-        ra = c.arm_a[o]
-        rb = c.arm_b[o]
-        f = c.force[o]
-        short = wp.dot(n, va + wp.cross(oa, ra) - vb - wp.cross(ob, rb)) - c.aim[o]
-        if c.start[o][0] < FAR and (short < 0.0 or f[0] > 0.0):
-            count = count + 1.0
-            least = wp.min(least, f[0])
-            mean = mean + short
-            arm = arm + ra
-            brm = brm + rb
-            counted = counted | (1 << k)
-    if count > 1.0:
-        arm = arm / count
-        brm = brm / count
-        each = -mean / count * rate / (count * (inverse_mass_at(s, i, arm, n) + inverse_mass_at(s, j, brm, n)))
-        each = wp.max(each, -least)
-        push = (dt * count * each) * n
-        va = va + wa * push
-        oa = oa + ia * wp.cross(arm, push)
-        vb = vb - wb * push
-        ob = ob - ib * wp.cross(brm, push)
-        changed = 1
-    for h in range(c.count[e]):
-        k = wp.where(back == 1, c.count[e] - 1 - h, h)
-        o = e * POINTS + k
-        ra = c.arm_a[o]
-        rb = c.arm_b[o]
-        mass = c.mass[o]
-        f = c.force[o]
-        if (counted & (1 << k)) != 0:
-            f = wp.vec3(f[0] + each, f[1], f[2])
-            c.force[o] = f
-        speed = va + wp.cross(oa, ra) - vb - wp.cross(ob, rb)
-        g = wp.vec3(wp.max(0.0, f[0] - (wp.dot(n, speed) - c.aim[o]) * mass[0] * rate), f[1], f[2])
-        if c.start[o][0] < FAR and (g[0] > 0.0 or f[0] > 0.0):
-            g = wp.vec3(g[0], g[1] - wp.dot(t, speed) * mass[1] * rate, g[2] - wp.dot(u, speed) * mass[2] * rate)
-            g = limited(g, c.friction[e])
-            c.force[o] = g
-            d = g - f
-            push = dt * (d[0] * n + d[1] * t + d[2] * u)
-            va = va + wa * push
-            oa = oa + ia * wp.cross(ra, push)
-            vb = vb - wb * push
-            ob = ob - ib * wp.cross(rb, push)
-            changed = 1
-    if changed == 1:
-        if wa > 0.0:
-            s.velocity[i] = va
-            s.spin[i] = oa
-        if wb > 0.0:
-            s.velocity[j] = vb
-            s.spin[j] = ob
+    m = meeting_of(s, parts, c, world, e)
+    keep_speeds(s, m, solve_points(c, m, speeds_of(s, m, world), e, dt, SPEEDS, back))
 
 
 @wp.func
@@ -267,21 +197,8 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
 
     The force of an impact is forgotten: the next substep begins with forces that last.
     """
-    p = (e - world * c.parts * c.row) / c.row
-    i = world * s.capacity + parts.slot[p]
-    j = world * s.capacity + parts.slot[c.partner[e]]
-    wa = s.weight[i]
-    wb = s.weight[j]
-    ia = s.give[i]
-    ib = s.give[j]
-    n = c.normal_now[e]
-    t = c.tangent_now[e]
-    u = wp.cross(n, t)
-    xa = s.position[i] - s.position_before[i]
-    xb = s.position[j] - s.position_before[j]
-    ta = turn_between(s.rotation_before[i], s.rotation[i])
-    tb = turn_between(s.rotation_before[j], s.rotation[j])
-    changed = int(0)
+    m = meeting_of(s, parts, c, world, e)
+    g = places_of(s, m)
     for h in range(c.count[e]):
         k = c.count[e] - 1 - h
         o = e * POINTS + k
@@ -290,26 +207,20 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
         start = c.start[o]
         mass = c.mass[o]
         f = c.force[o]
-        went = xa + wp.cross(ta, ra) - xb - wp.cross(tb, rb)
-        gap = start[0] + wp.dot(n, went)
+        went = against(g, ra, rb)
+        gap = start[0] + wp.dot(m.n, went)
         back = wp.vec3(0.0)
         if gap < -REST:
-            back = wp.min(-MEND * (gap + REST), PART_SPEED * dt) * mass[0] * n
+            back = wp.min(-MEND * (gap + REST), PART_SPEED * dt) * mass[0] * m.n
         if f[0] > 0.0 and not is_slipping(f, c.friction[e]):
-            back = back - MEND * (start[1] + wp.dot(t, went)) * mass[1] * t
-            back = back - MEND * (start[2] + wp.dot(u, went)) * mass[2] * u
+            back = back - MEND * (start[1] + wp.dot(m.t, went)) * mass[1] * m.t
+            back = back - MEND * (start[2] + wp.dot(m.u, went)) * mass[2] * m.u
         if start[3] < -still:
             c.force[o] = wp.vec3(0.0)
         if wp.length_sq(back) > 0.0:
-            xa = xa + wa * back
-            ta = ta + ia * wp.cross(ra, back)
-            xb = xb - wb * back
-            tb = tb - ib * wp.cross(rb, back)
-            changed = 1
-    if changed == 1:
-        if wa > 0.0:
-            s.position[i] = s.position_before[i] + xa
-            s.rotation[i] = turned(s.rotation_before[i], ta)
-        if wb > 0.0:
-            s.position[j] = s.position_before[j] + xb
-            s.rotation[j] = turned(s.rotation_before[j], tb)
+            g.xa = g.xa + m.wa * back
+            g.ta = g.ta + m.ia * wp.cross(ra, back)
+            g.xb = g.xb - m.wb * back
+            g.tb = g.tb - m.ib * wp.cross(rb, back)
+            g.changed = 1
+    keep_places(s, m, g)
