@@ -183,6 +183,41 @@ def nearest_on_triangle(a: wp.vec3, b: wp.vec3, c: wp.vec3):
 
 
 @wp.func
+def nearest_on_tetrahedron(a: wp.vec3, b: wp.vec3, c: wp.vec3, d: wp.vec3):
+    """Weights of the corners in the tetrahedron's point nearest to the origin; all 0 where the origin is inside."""
+    result = wp.vec4(0.0)
+    best = float(1.0e30)
+    for k in range(4):
+        # the face opposite of corner k
+        first = wp.where(k == 0, b, a)
+        second = wp.where(k < 2, c, b)
+        third = wp.where(k < 3, d, c)
+        corner = a
+        if k == 1:
+            corner = b
+        elif k == 2:
+            corner = c
+        elif k == 3:
+            corner = d
+        normal = wp.cross(second - first, third - first)
+        # only a face that has the origin on its other side may have the nearest point
+        if wp.dot(normal, corner - first) * wp.dot(normal, -first) <= 0.0:
+            u = nearest_on_triangle(first, second, third)
+            near = wp.length_sq(u[0] * first + u[1] * second + u[2] * third)
+            if near < best:
+                best = near
+                if k == 0:
+                    result = wp.vec4(0.0, u[0], u[1], u[2])
+                elif k == 1:
+                    result = wp.vec4(u[0], 0.0, u[1], u[2])
+                elif k == 2:
+                    result = wp.vec4(u[0], u[1], 0.0, u[2])
+                else:
+                    result = wp.vec4(u[0], u[1], u[2], 0.0)
+    return result
+
+
+@wp.func
 def core_direction(parts: Parts, a: Convex, x: wp.vec3, q: wp.quat, b: Convex):
     """From b's core to a's: the unit direction between their nearest points, and 1, or 0 where the cores meet."""
     v = x
@@ -217,40 +252,8 @@ def core_direction(parts: Parts, a: Convex, x: wp.vec3, q: wp.quat, b: Convex):
         elif count == 3:
             weights = nearest_on_triangle(s0, s1, s2)
         elif count == 4:
-            # the nearest of the faces that have the origin on their other side; none: it is inside
-            best = float(1.0e30)
-            for face in range(4):
-                fa = s1
-                fb = s2
-                fc = s3
-                fd = s0
-                if face == 1:
-                    fa = s0
-                    fd = s1
-                elif face == 2:
-                    fa = s0
-                    fb = s1
-                    fd = s2
-                elif face == 3:
-                    fa = s0
-                    fb = s1
-                    fc = s2
-                    fd = s3
-                normal = wp.cross(fb - fa, fc - fa)
-                if wp.dot(normal, fd - fa) * wp.dot(normal, -fa) <= 0.0:
-                    u = nearest_on_triangle(fa, fb, fc)
-                    near = wp.length_sq(u[0] * fa + u[1] * fb + u[2] * fc)
-                    if near < best:
-                        best = near
-                        if face == 0:
-                            weights = wp.vec4(0.0, u[0], u[1], u[2])
-                        elif face == 1:
-                            weights = wp.vec4(u[0], 0.0, u[1], u[2])
-                        elif face == 2:
-                            weights = wp.vec4(u[0], u[1], 0.0, u[2])
-                        else:
-                            weights = wp.vec4(u[0], u[1], u[2], 0.0)
-            if best > 1.0e29:
+            weights = nearest_on_tetrahedron(s0, s1, s2, s3)
+            if wp.length_sq(weights) == 0.0:
                 apart = 0.0
                 break
         nearest = weights[0] * s0

@@ -199,6 +199,28 @@ def nearest_of_segments(a: wp.vec3, u: wp.vec3, b: wp.vec3, v: wp.vec3, n: wp.ve
 
 
 @wp.func
+def side_by_side(
+    place: wp.array(dtype=wp.vec3), gap: wp.array(dtype=float), other: wp.array(dtype=wp.vec3), n: wp.vec3
+):
+    """Cut a segment to where it overlaps another that is parallel to it; how many points that are."""
+    start = place[0]
+    u = place[1] - start
+    v = other[1] - other[0]
+    size = wp.dot(u, u)
+    s0 = wp.dot(other[0] - start, u) / size
+    s1 = wp.dot(other[1] - start, u) / size
+    low = wp.clamp(wp.min(s0, s1), 0.0, 1.0)
+    high = wp.clamp(wp.max(s0, s1), 0.0, 1.0)
+    for k in range(2):
+        t = wp.where(k == 0, low, high)
+        p = start + t * u
+        along = wp.clamp((t - s0) / (s1 - s0), 0.0, 1.0)
+        place[k] = p
+        gap[k] = wp.dot(n, p - (other[0] + along * v))
+    return 2
+
+
+@wp.func
 def lay_over(
     parts: Parts,
     a: Convex,
@@ -237,20 +259,7 @@ def lay_over(
             gap[0] = gap_n
             count = 1
         else:
-            # side by side: where they overlap along u
-            size = wp.dot(u, u)
-            s0 = wp.dot(pb[0] - place[0], u) / size
-            s1 = wp.dot(pb[1] - place[0], u) / size
-            low = wp.clamp(wp.min(s0, s1), 0.0, 1.0)
-            high = wp.clamp(wp.max(s0, s1), 0.0, 1.0)
-            first = place[0]
-            for k in range(2):
-                t = wp.where(k == 0, low, high)
-                p = first + t * u
-                along = wp.clamp((t - s0) / (s1 - s0), 0.0, 1.0)
-                place[k] = p
-                gap[k] = wp.dot(n, p - (pb[0] + along * v))
-            count = 2
+            count = side_by_side(place, gap, pb, n)
     else:
         slack = 1.0e-6
         lean = float(1.0)

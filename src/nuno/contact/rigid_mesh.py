@@ -84,10 +84,10 @@ def hold(
     point: wp.vec3,
     gap: float,
     same: float,
-    place: wp.array(dtype=wp.vec3),
+    room: wp.array(dtype=wp.vec3),
     depth: wp.array(dtype=float),
 ):
-    """Add a point to the manifold with its normal; the number of manifolds."""
+    """Add a point to the manifold with its normal; the number of manifolds. ``room`` and ``depth`` are to work in."""
     best = float(-2.0)
     m = int(-1)
     for k in range(found):
@@ -113,11 +113,11 @@ def hold(
     if twice == 0:
         if count == HELD:
             for k in range(count):
-                place[k] = held[first + k]
+                room[k] = held[first + k]
                 depth[k] = gaps[first + k]
-            count = fewer(place, depth, count, normals[m])
+            count = fewer(room, depth, count, normals[m])
             for k in range(count):
-                held[first + k] = place[k]
+                held[first + k] = room[k]
                 gaps[first + k] = depth[k]
         held[first + count] = point
         gaps[first + count] = gap
@@ -168,6 +168,8 @@ def collide_mesh(
     counts = wp.zeros(shape=(6,), dtype=int)
     held = wp.zeros(shape=(48,), dtype=wp.vec3)
     gaps = wp.zeros(shape=(48,), dtype=float)
+    room = wp.zeros(shape=(8,), dtype=wp.vec3)
+    depth = wp.zeros(shape=(8,), dtype=float)
     b = c.partner[e]
     solid = wp.where(parts.kind[b] == SURFACE, 1, 0)
     mesh = parts.mesh[world * parts.mesh_stride + b]
@@ -198,28 +200,8 @@ def collide_mesh(
                 least = gap_along(parts, part, x, q, t, n)
                 if least <= margin:
                     count = lay_over(parts, part, x, q, t, n, least, margin, place, gap)
-                    # `hold` needs the room that the points stand in
-                    p0 = place[0]
-                    p1 = place[1]
-                    p2 = place[2]
-                    p3 = place[3]
-                    g0 = gap[0]
-                    g1 = gap[1]
-                    g2 = gap[2]
-                    g3 = gap[3]
                     for k in range(count):
-                        point = p0
-                        depth = g0
-                        if k == 1:
-                            point = p1
-                            depth = g1
-                        elif k == 2:
-                            point = p2
-                            depth = g2
-                        elif k == 3:
-                            point = p3
-                            depth = g3
-                        found = hold(normals, counts, held, gaps, found, n, point, depth, same, place, gap)
+                        found = hold(normals, counts, held, gaps, found, n, place[k], gap[k], same, room, depth)
     first = (e / c.row) * c.row
     c.clear[e] = wp.where(found > 0, 0.0, margin)
     for k in range(c.row):
