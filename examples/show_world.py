@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.viewer import Viewer
 
 TOP = 0.4  # [m] height of the table top
 LIFT = 0.2  # [m]
@@ -30,7 +29,7 @@ start = napkin.vertices[0]
 way = nuno.Path([0.3, 1.0], [start, start + np.array((0.05, 0.05, LIFT))], interpolation="minimum_jerk")
 world.grip(napkin, corner, to=way)
 
-with Viewer(world) as viewer:
+with nuno.Viewer(world) as viewer:
     viewer.draw(cube, "tetrahedra", explode=1.2)
     viewer.look_from((0.9, -1.0, 0.95), (0, 0, 0.45))
     viewer.show()  # opens a browser where there is a screen

@@ -66,6 +66,14 @@ def test_links_lead_somewhere():
             assert (page.parent / link).exists(), f"{page.name}: {link}"
 
 
+def test_every_example_is_told_of():
+    """The table of docs/getting-started.md has a row for each program in examples/, and no other."""
+    page = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^\| `(\w+\.py)`", page, re.M)) == sorted(
+        p.name for p in (ROOT / "examples").glob("*.py")
+    )
+
+
 def test_the_first_program_runs(tmp_path):
     """That of docs/getting-started.md, as it is, in a process of its own."""
     (tmp_path / "first.py").write_text(BLOCKS["getting-started-0"])
