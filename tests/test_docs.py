@@ -1,6 +1,7 @@
 """What README and docs show is Python, uses names that there are, and the first program that they show runs."""
 
 import ast
+import builtins
 import re
 import subprocess
 import sys
@@ -47,6 +48,21 @@ def test_names_are_there(name):
         elif node.value.id in CALLED:
             members = set().union(*(members_of(owner) for owner in CALLED[node.value.id]))
             assert node.attr in members, f"{node.value.id}.{node.attr}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_what_is_called_is_known(page):
+    """No block calls a function or class that the page has neither imported nor defined before."""
+    known = set(dir(builtins))
+    for name in (name for name in BLOCKS if name.rpartition("-")[0] == page.stem):
+        nodes = list(ast.walk(ast.parse(BLOCKS[name])))
+        for node in nodes:
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                known |= {alias.asname or alias.name for alias in node.names}
+            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                known.add(node.name)
+        called = {node.func.id for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        assert called <= known, f"{name}: {called - known}"
 
 
 def members_of(owner):
