@@ -28,7 +28,7 @@ def bin_of(boxes: int) -> tuple[float, float]:
 
 def make(boxes: int, worlds: int, device: str, substeps: int | None):
     """The solver, and the slots of the boxes."""
-    from nuno.mesh.mass_properties import mass_properties
+    from nuno.mass_properties import mass_properties
     from nuno.scene.rigid_shape import rigid_shape
     from nuno.shape import Box
     from nuno.solver.rigid_solver import RigidSolver

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nuno.mesh.mass_properties import mass_properties
+from nuno.mass_properties import mass_properties
 from nuno.quaternion import from_axis_angle
 from nuno.scene.rigid_shape import rigid_shape
 from nuno.shape import Plane

@@ -12,9 +12,9 @@ from nuno import quaternion as quat
 from nuno.coordinates import apply, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
-from nuno.surface import SurfacePoints
+from nuno.surface import chosen_points
 from nuno.tie import HoldSpec, TieSpec, make_hold, make_tie
-from nuno.validation import finite_array, index_array
+from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -160,7 +160,7 @@ def make_grip(
         raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
     if target is not None and target._dynamics is not None:
         return Grip(body, make_tie(body, where, target, compliance, world), target)
-    vertices, corners, weights = points_of(body, where, worlds)
+    vertices, corners, weights = chosen_points(where, body.vertices.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
     rows = np.arange(worlds)[:, None]
     if vertices is not None:
@@ -188,22 +188,6 @@ def make_grip(
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
     spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance)
     return Grip(body, spec, target, local)
-
-
-def points_of(body: Body, where: Any, worlds: int) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Return vertices (worlds, k), or corners and barycentric coordinates (worlds, k, 3) each, of points of a body."""
-    vertex_count, faces = body.vertices.shape[-2], body.faces
-    if not isinstance(where, SurfacePoints):
-        indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)
-        return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
-    chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
-    corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
-    shape = (worlds, *corners.shape[-2:])
-    return (
-        None,
-        np.array(np.broadcast_to(corners, shape)),
-        np.array(np.broadcast_to(where.barycentric, shape)),
-    )
 
 
 def _along(path: Path, offsets: np.ndarray, world: Simulation) -> tuple[np.ndarray, np.ndarray, str]:

@@ -23,8 +23,7 @@ class Path:
         times: (k,) float [s] of the world's clock, increasing.
         positions: (k, 3) or (worlds, k, 3) float [m].
         quaternions: (k, 4) or (worlds, k, 4) float, (w, x, y, z), or None where nothing turns.
-        interpolation: "linear", or "minimum_jerk": rest at every key and 10 s^3 - 15 s^4 + 6 s^5 between
-            (Flash and Hogan 1985).
+        interpolation: "linear", or "minimum_jerk": rest at every key and ``minimum_jerk`` between.
 
     Raises:
         InvalidInputError: times that do not increase, not finite, or shapes that do not fit.
@@ -88,5 +87,13 @@ class Path:
         span = np.where(last > first, self.times[last] - self.times[first], 1.0)
         s = np.minimum(np.maximum((t - self.times[first]) / span, 0.0), 1.0)
         if self.interpolation == "minimum_jerk":
-            s = s**3 * (10.0 + s * (6.0 * s - 15.0))
+            s = minimum_jerk(s)
         return first, last, s
+
+
+def minimum_jerk(share: np.ndarray) -> np.ndarray:
+    """Return how far a motion of least jerk, from rest to rest, is at a share of its time, both in [0, 1].
+
+    10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985).
+    """
+    return share**3 * (10.0 + share * (6.0 * share - 15.0))

@@ -10,8 +10,8 @@ import warp as wp
 from nuno import quaternion as quat
 from nuno.coordinates import Pose, apply, compose, invert
 from nuno.dynamics import Dynamics, State, check_material
+from nuno.mass_properties import mass_properties
 from nuno.materials import Rigid
-from nuno.mesh.mass_properties import mass_properties
 from nuno.scene.rigid_shape import RigidPart, rigid_shape
 from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED
 from nuno.solver.rigid_solver import RigidSolver

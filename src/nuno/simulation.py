@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from nuno.driver import Driver
     from nuno.materials import Material
     from nuno.rigid_dynamics import RigidScene
+    from nuno.watcher import Watcher
 
 CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
 
@@ -64,7 +65,7 @@ class Simulation:
         self._background: Background | None = None
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
-        self._watchers: list[Any] = []  # viewers and films: told (``seen``) of each piece of a run, under the lock
+        self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
 
     def __repr__(self) -> str:
         batch = f", {self.world_count} worlds" if self.world_count > 1 else ""

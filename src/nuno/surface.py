@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array
+from nuno.validation import finite_array, index_array
 
 NEGATIVE = -1e-6  # weights may be this far outside [0, 1] by rounding
 
@@ -93,6 +94,33 @@ def sheet_points(cells: tuple[int, int], u: np.ndarray, v: np.ndarray) -> Surfac
     second = np.stack([1.0 - t, s, t - s], axis=-1)
     faces = 2 * (j * nx + i) + np.where(lower, 0, 1)
     return SurfacePoints(faces, np.where(lower[..., None], first, second))
+
+
+def chosen_points(
+    where: Any, vertex_count: int, faces: np.ndarray, worlds: int
+) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Return the points of a mesh that a grip is asked for: vertices, or corners of faces and their weights.
+
+    Args:
+        where: Indices of vertices, (k,) or (worlds, k), -1 for no point; or ``SurfacePoints``.
+        vertex_count: Of the mesh.
+        faces: (m, 3) int, its faces.
+        worlds: Worlds in the batch.
+
+    Returns:
+        Vertices (worlds, k) int, None, None; or None, corners (worlds, k, 3) int, -1 for no point, and weights
+        (worlds, k, 3).
+
+    Raises:
+        InvalidInputError: an index out of range, or of another shape.
+    """
+    if not isinstance(where, SurfacePoints):
+        indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
+    chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
+    corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
+    shape = (worlds, *corners.shape[-2:])
+    return None, np.array(np.broadcast_to(corners, shape)), np.array(np.broadcast_to(where.barycentric, shape))
 
 
 def _closest_weights(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

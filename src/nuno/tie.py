@@ -11,7 +11,7 @@ from nuno import quaternion as quat
 from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
-from nuno.surface import closest_points
+from nuno.surface import chosen_points, closest_points
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
@@ -81,10 +81,8 @@ def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simu
     Raises:
         InvalidInputError: points that the body does not have.
     """
-    from nuno.grip import points_of
-
     worlds = world.world_count
-    vertices, corners, weights = points_of(body, where, worlds)
+    vertices, corners, weights = chosen_points(where, body.vertices.shape[-2], body.faces, worlds)
     if vertices is not None:
         corners = np.stack([vertices, np.full_like(vertices, -1), np.full_like(vertices, -1)], axis=-1)
         weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)

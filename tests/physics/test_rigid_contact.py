@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from nuno.compound import Compound
-from nuno.mesh.mass_properties import mass_properties
+from nuno.mass_properties import mass_properties
 from nuno.scene.rigid_shape import rigid_shape
 from nuno.shape import Box, Capsule, Cylinder, Sheet, Sphere, TriangleMesh
 from nuno.solver.rigid_solver import RigidSolver

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import nuno
+from nuno.path import minimum_jerk
 from nuno.tasks.arms import hands_level
 
 
@@ -17,7 +18,7 @@ class Glide:
         """Return the configuration (nq,) at a time [s], from rest to rest by a minimum jerk path."""
         s = np.clip(time / self.seconds, 0.0, 1.0)
         q = self.stance.copy()
-        q[:3] += s**3 * (10.0 + s * (6.0 * s - 15.0)) * self.shift
+        q[:3] += minimum_jerk(s) * self.shift
         return q
 
 

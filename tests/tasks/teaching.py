@@ -3,6 +3,7 @@
 import numpy as np
 
 import nuno
+from nuno.path import minimum_jerk
 from nuno.tasks.taught_fold import TaughtFold
 
 SIZE = (0.40, 0.30)  # [m] of the cloth that was folded
@@ -17,7 +18,7 @@ def hand_paths(sides=(-0.15, 0.15)):
     """Hands that carry the corners of the side at -x over to the other side in 1.5 s, and let go at 1.65 s."""
     times = np.arange(0.0, 2.0, 1 / 30)
     s = np.clip(times / 1.5, 0.0, 1.0)
-    angle = np.pi * s**3 * (10.0 + s * (6.0 * s - 15.0))  # minimum jerk
+    angle = np.pi * minimum_jerk(s)
     x, z = -0.2 * np.cos(angle), REST + 0.2 * np.sin(angle) + 0.006 * s
     return [nuno.HandPath(times, np.stack([x, np.full_like(x, y), z], axis=1), times < RELEASE) for y in sides]
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.path import minimum_jerk
 from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
@@ -342,7 +343,7 @@ class JointInterface(KnownJoints):
         count = max(1, int(wanted + 1e-9))
         s = np.arange(1, count + 1) / count
         if interpolation == "minjerk":
-            s = s**3 * (10.0 + s * (6.0 * s - 15.0))
+            s = minimum_jerk(s)
         points = start + s[:, None] * self.sub_angle_vector(end, start)
         times = [duration / count] * count
         return self.angle_vector_sequence(list(points), times, controller_type, start_time, time_scale=1.0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.path import minimum_jerk
 from nuno.robot.footsteps import Footstep, middle_of
 from nuno.robot.preview_control import TICK
 from nuno.robot.stride import Stride
@@ -139,9 +140,8 @@ def timeline(schedule: Schedule) -> Timeline:
 
 
 def smooth(share: np.ndarray) -> np.ndarray:
-    """Return how far a motion of least jerk is at a share of its time (both from 0 to 1)."""
-    s = np.clip(share, 0.0, 1.0)
-    return s**3 * (10.0 + s * (6.0 * s - 15.0))
+    """Return ``minimum_jerk`` of a share, at rest before 0 and after 1."""
+    return minimum_jerk(np.clip(share, 0.0, 1.0))
 
 
 def _between(a: np.ndarray, b: np.ndarray, ticks: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from nuno.bodies import plane
 from nuno.body import Body
 from nuno.errors import InvalidInputError
 from nuno.materials import Cloth, Material
-from nuno.path import Path
+from nuno.path import Path, minimum_jerk
 from nuno.shape import Box, Shape
 from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
 from nuno.world import World
@@ -293,7 +293,7 @@ def _grip_edges(
     keys = plan.times[::2]
     close = max(1, int(0.8 * plan.settle * FRAME_RATE))
     share = np.clip(np.arange(len(keys)) / close, 0.0, 1.0)
-    share = share**3 * (10.0 + share * (6.0 * share - 15.0))
+    share = minimum_jerk(share)
     for side, sign in enumerate((1.0, -1.0)):
         edge = np.flatnonzero(vertices[:, 1] * sign > half[1] - 1e-6)
         held = []

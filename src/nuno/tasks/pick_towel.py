@@ -24,7 +24,7 @@ from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
 from nuno.materials import Cloth
-from nuno.path import Path
+from nuno.path import Path, minimum_jerk
 from nuno.robot.head_cameras import STEREO, HeadCameras
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.interface import RobotInterface
@@ -312,4 +312,4 @@ def pinching(hand: str, point: np.ndarray) -> Coordinates:
 def _straight(start: np.ndarray, end: np.ndarray) -> list[np.ndarray]:
     """Points at even times on a straight way of minimum jerk, without its start."""
     s = np.arange(1, PIECES + 1) / PIECES
-    return list(start + (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))[:, None] * (end - start))
+    return list(start + minimum_jerk(s)[:, None] * (end - start))

@@ -6,7 +6,7 @@ import trimesh
 
 from nuno.compound import Compound
 from nuno.errors import MeshError
-from nuno.mesh.mass_properties import mass_properties
+from nuno.mass_properties import mass_properties
 from nuno.shape import Box, Capsule, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 
 
