@@ -131,6 +131,7 @@ def soft_mesh(
 
     Raises:
         MeshError: nothing to read, or a surface that is open, inside out or intersects itself.
+        InvalidInputError: another tetrahedraliser, or a length that is not positive.
         MissingPackageError: pytetwild is asked for and not installed.
     """
     vertices, faces = load_mesh(source)

@@ -141,6 +141,7 @@ class Coordinates:
 
         Raises:
             BodyStateError: the child has a parent already, or is this frame or one of its ancestors.
+            InvalidInputError: the child is no ``Coordinates``.
         """
         if not isinstance(child, Coordinates):
             raise InvalidInputError(f"assoc needs Coordinates, got {type(child).__name__}")

@@ -91,6 +91,9 @@ def of_shell(points: np.ndarray, faces: np.ndarray, thickness: float) -> MassPro
 
     Exact for triangles without thickness (second moments of a triangle from its corners and their mean), to which a
     plate's own thickness adds that of a rod across it, so that a flat one is no degenerate body.
+
+    Raises:
+        MeshError: no thickness, or triangles without area.
     """
     if thickness <= 0.0:
         raise MeshError(f"an open mesh needs a thickness to have a mass, got {thickness}")

@@ -71,6 +71,7 @@ class Recording:
     Raises:
         UnknownNameError: no body has such a name.
         BodyStateError: a body is not in the world.
+        InvalidInputError: there are no bodies.
     """
 
     def __init__(self, world: World, bodies: Iterable[Body | str] | None = None) -> None:

@@ -54,6 +54,7 @@ class World(Running):
 
         Raises:
             BodyStateError: the body is in a world already.
+            InvalidInputError: no body, or one that has values for another number of worlds.
         """
         with self._call():
             if not isinstance(body, Body):
@@ -262,7 +263,11 @@ class World(Running):
             own._dynamics.add_push(make_push(own, force, torque, duration, self))
 
     def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
-        """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back."""
+        """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back.
+
+        Raises:
+            InvalidInputError: the same body twice, or a coefficient that is negative or not finite.
+        """
         with self._call():
             pair = self._pair(a, b)
             if mu is None:
@@ -307,6 +312,9 @@ class World(Running):
 
         They are copies on the world's device, in the layout that other libraries expect (``__dlpack__``,
         ``__cuda_array_interface__``). Positions are copied there; velocities pass through the host.
+
+        Raises:
+            BodyStateError: the body is static.
         """
         import warp as wp
 
@@ -342,6 +350,7 @@ class World(Running):
 
         Raises:
             FileFormatError: the file cannot be read, or its format is unknown or newer.
+            InvalidInputError: neither a snapshot nor a path.
         """
         snapshot = saved
         if isinstance(snapshot, str | os.PathLike):
@@ -378,6 +387,7 @@ class World(Running):
 
         Raises:
             InvalidInputError: not imagined from this world, or ``k`` out of range.
+            BodyStateError: this world is a batch itself.
         """
         if not isinstance(futures, World) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")

@@ -179,12 +179,13 @@ def test_robot_world_is_like_the_real_one(loop):
 
 
 def test_finding_comes_first():
-    """A robot that has not looked has no towel to pick."""
+    """A robot that has not looked has no towel to pick, and no answer."""
     room_driver = Recorded.__new__(Recorded)
     room_driver.robot = Humanoid("talos")
     talos = TowelPicker(room_driver, dict, table=TABLE, device="cpu")
-    with pytest.raises(EstimationError, match="find_towel"):
-        talos.point(0, 0)
+    for ask in (lambda: talos.point(0, 0), lambda: talos.pick(np.zeros(3)), talos.answer):
+        with pytest.raises(EstimationError, match="find_towel"):
+            ask()
 
 
 def test_pinched_point_is_between_the_fingers():

@@ -102,7 +102,7 @@ class Humanoid(Coordinates):
         return self._angles.copy()
 
     def checked_angles(self, angles: ArrayLike | Mapping[str, float]) -> np.ndarray:
-        """Return angles as ``angle_vector`` takes them, (n,) float, complete and within limits."""
+        """Return angles as ``angle_vector`` takes them, (n,) float, complete and within limits; raises as it does."""
         if isinstance(angles, Mapping):
             wanted = self._angles.copy()
             for joint, angle in angles.items():
@@ -243,7 +243,11 @@ class Humanoid(Coordinates):
         return convex_outline(np.concatenate(corners))
 
     def configuration(self) -> np.ndarray:
-        """Return Pinocchio's configuration (nq,): base position, quaternion (x, y, z, w), joints."""
+        """Return Pinocchio's configuration (nq,): base position, quaternion (x, y, z, w), joints.
+
+        Raises:
+            InvalidInputError: the robot follows a frame that has a pose for each world of a batch.
+        """
         position, quaternion = self._pose()
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InvalidInputError("a robot has one pose, not one for each world")

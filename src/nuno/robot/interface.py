@@ -236,6 +236,7 @@ class RobotInterface(JointInterface):
 
         Raises:
             RobotModelError: the robot has no force sensors in its legs, or stands on neither.
+            InvalidInputError: another frame.
         """
         if wrt not in ("local", "world"):
             raise InvalidInputError(f"wrt must be 'local' or 'world', got {wrt!r}")

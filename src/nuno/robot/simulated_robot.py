@@ -260,21 +260,33 @@ class SimulatedRobot(RobotInterface):
             self.gait.cancel()
 
     def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
-        """Open or close a hand; see ``RobotInterface``. The effort is not simulated: what is between them is held."""
+        """Open or close a hand; see ``RobotInterface``. The effort is not simulated: what is between them is held.
+
+        Raises:
+            UnknownNameError: the robot has no such hand.
+        """
         with self.world.lock:
             if hand not in self.grippers:
                 raise UnknownNameError("hand", hand, list(self.grippers))
             return self.grippers[hand].send(position)
 
     def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return force and torque that what lies beyond a sensor exerts on what is before it."""
+        """Return force (3,) [N] and torque (3,) [N m] of what lies beyond a sensor; see ``RobotInterface``.
+
+        Raises:
+            RobotModelError: the robot has no such sensor.
+        """
         found = self.read().wrenches.get(frame)
         if found is None:
             raise RobotModelError(f"{self.actual.name!r} has no force sensor in {frame!r}")
         return found[:3].copy(), found[3:].copy()
 
     def read_imu(self) -> ImuReading:
-        """Return what the inertial measurement unit tells."""
+        """Return what the inertial measurement unit tells.
+
+        Raises:
+            RobotModelError: the robot has none.
+        """
         if "imu" not in self.actual.description.frames:
             raise RobotModelError(f"{self.actual.name!r} has no inertial measurement unit")
         told = self.read()

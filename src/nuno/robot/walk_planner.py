@@ -58,6 +58,9 @@ class WalkPlanner:
         feet: (2, 4) float, where they are: x, y, z [m], yaw [rad].
         floor: Height of the floor [m].
         height: Of the centre of mass above the floor, walking [m].
+
+    Raises:
+        WalkError: the robot does not stand with both soles on the floor, or cannot stand as it is to walk.
     """
 
     def __init__(

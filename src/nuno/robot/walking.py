@@ -96,6 +96,9 @@ def plan_walk_footsteps(
     """Plan a walk over given footsteps, in the world; see ``plan_walk``.
 
     The feet may end in any stance; only the times and the lift of the stride count.
+
+    Raises:
+        InvalidInputError: something else than footsteps; and as ``plan_walk``.
     """
     steps = tuple(footsteps)
     if any(not isinstance(step, Footstep) for step in steps):

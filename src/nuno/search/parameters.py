@@ -74,7 +74,11 @@ def make_parameters(given: Any, samples: int | None = None, seed: int = 0) -> Pa
 
 
 def from_rows(rows: Sequence[Any]) -> Parameters:
-    """Return the parameters of trials that are given one by one, as mappings with the same names."""
+    """Return the parameters of trials that are given one by one, as mappings with the same names.
+
+    Raises:
+        InvalidInputError: no trials, no mappings, or other names than the first has.
+    """
     if not rows:
         raise InvalidInputError("there are no parameters, so there is no trial to run")
     for k, row in enumerate(rows):

@@ -39,6 +39,7 @@ class ResultsFile:
         finished: The trials that it held when it was opened.
 
     Raises:
+        InvalidInputError: no folder for the file, or a folder in its place.
         ResultsInUseError: another sweep writes to the file.
         ResultsMismatchError: it holds another sweep's results.
         FileFormatError: it is no results file, of a newer format, or damaged.
@@ -176,7 +177,11 @@ def read_trials(data: bytes, path: FilePath) -> list[Trial]:
 
 
 def read_entries(data: bytes, path: FilePath) -> list[tuple[Trial, dict[str, Any]]]:
-    """Return the trials of a results file's whole lines, each with its parameters; raises as `read_trials`."""
+    """Return the trials of a results file's whole lines, each with its parameters.
+
+    Raises:
+        FileFormatError: a line that is damaged, or a trial that is there twice.
+    """
     entries: list[tuple[Trial, dict[str, Any]]] = []
     known: set[int] = set()
     for number, line in enumerate(data.split(b"\n")[1:-1], start=2):

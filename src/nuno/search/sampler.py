@@ -37,7 +37,12 @@ class Uniform:
 
 
 def check_bounds(bounds: Mapping[str, tuple[float, float]], log: Sequence[str]) -> None:
-    """Raise unless there are bounds, each low < high, and positive where they are in ``log``."""
+    """Check that there are bounds, each low < high, and positive where they are in ``log``.
+
+    Raises:
+        InvalidInputError: they are not so.
+        UnknownNameError: a name in ``log`` that has no bounds.
+    """
     if not isinstance(bounds, Mapping) or not bounds:
         raise InvalidInputError(f"bounds must be (low, high) by name, got {bounds!r}")
     if isinstance(log, str):

@@ -197,7 +197,11 @@ def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
 
 
 def check_trial(trial: Any, executor: Executor | None) -> None:
-    """Raise unless a trial can be run here, or over the executor."""
+    """Check that a trial can be run here, or over the executor.
+
+    Raises:
+        InvalidInputError: it cannot.
+    """
     if not callable(trial) and not isinstance(trial, Each):
         raise InvalidInputError(f"the trial must be a function trial(world, params), got {type(trial).__name__}")
     if executor is not None and not isinstance(executor, Executor):

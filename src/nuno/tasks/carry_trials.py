@@ -213,7 +213,11 @@ def _lay_down(futures: World, plan: CarryPlan, walks: np.ndarray, offsets: np.nd
 
 
 def laid_places(plan: CarryPlan, walks: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Return where the mats' centres begin, (trials, 3) [m]: above the highest part of the arms under them."""
+    """Return where the mats' centres begin, (trials, 3) [m]: above the highest part of the arms under them.
+
+    Raises:
+        InvalidInputError: there is no arm under one.
+    """
     half = 0.5 * mat_size(plan.mat, plan.turned)
     thick = float(np.max(plan.material.thickness)) if isinstance(plan.material, Cloth) else 2.0 * half[2]
     clouds = [_surface_points(plan, walk) for walk in range(len(plan.distances))]
@@ -232,7 +236,11 @@ def laid_places(plan: CarryPlan, walks: np.ndarray, offsets: np.ndarray) -> np.n
 
 
 def check_trunk(plan: CarryPlan, walks: np.ndarray, offsets: np.ndarray) -> None:
-    """Raise where a mat would begin inside the trunk."""
+    """Check that no mat begins inside the trunk.
+
+    Raises:
+        InvalidInputError: one would.
+    """
     half = 0.5 * mat_size(plan.mat, plan.turned)
     trunk = [s for s in range(len(plan.parts)) if plan.sides[s] < 0]
     for walk, offset, place in zip(walks, offsets, laid_places(plan, walks, offsets), strict=True):

@@ -109,6 +109,9 @@ class TowelPicker:
         rest_height: Height of a cloth's middle surface above the table [m].
         device: Where to simulate, as of ``World``.
 
+    Raises:
+        InvalidInputError: a table without ends.
+
     Attributes:
         world: What the robot knows of the room: table, floor, its own links, and the towel once it has been found.
         robot: The robot in that world.
@@ -184,7 +187,7 @@ class TowelPicker:
         Raises:
             EstimationError: the towel has not been found.
         """
-        return self._found().grid_points(*grid)[i, j]
+        return self._found()[1].grid_points(*grid)[i, j]
 
     def pick(self, point: np.ndarray) -> str:
         """Take the towel as cloth, pinch it at a point (3,) [m], lift it into view, and let it come to rest.
@@ -193,12 +196,12 @@ class TowelPicker:
             The hand that did.
 
         Raises:
-            EstimationError: the hand does not get there.
+            EstimationError: the towel has not been found, or the hand does not get there.
         """
+        towel = self._found()[0]
         hand = self._hand = "left_hand" if point[1] >= 0.0 else "right_hand"
         arm = ARMS[hand]
-        assert self.towel is not None
-        self.world.attach(self.towel)
+        self.world.attach(towel)
         above = point + np.array([0.0, 0.0, ABOVE])
         self._go(hand, [above], APPROACH_SECONDS)
         self.driver.move_gripper(arm, OPENING)
@@ -242,10 +245,11 @@ class TowelPicker:
             options: Of ``estimate_pick``.
 
         Raises:
-            EstimationError: the bead on the hand is not seen, or nothing explains the image.
+            EstimationError: nothing has been picked, the bead on the hand is not seen, or nothing explains the image.
         """
-        rectangle, before = self._found(), self._before
-        assert before is not None
+        _, rectangle, before = self._found()
+        if not self._hand:
+            raise EstimationError("the towel has not been picked yet; call pick first")
         after = self.look()
         left = STEREO[0]
         held, spread = self.see_hand(after)
@@ -264,11 +268,13 @@ class TowelPicker:
         """Let the towel in the robot's world hang as the answer says, and return it.
 
         It is picked there at the answer's point, as the most likely cloth, and comes to rest in the hand.
+
+        Raises:
+            EstimationError: the towel has not been found.
         """
-        assert self.towel is not None
+        towel, world = self._found()[0], self.world
         futures = answer.result.futures
         likely = futures.discretisation.spread[answer.result.best_index // futures.candidates]
-        towel, world = self.towel, self.world
         for body in self._own:  # the hand is there already, before the towel comes up to it
             world.ignore_contact(towel, body)
         material = Cloth(
@@ -297,10 +303,10 @@ class TowelPicker:
         held = bead.positions[0] + pose.rotation @ (np.array(PINCH) - BEAD_AT)
         return held, float(bead.deviations[0])
 
-    def _found(self) -> ClothRectangle:
-        if self.rectangle is None:
+    def _found(self) -> tuple[Body, ClothRectangle, Look]:
+        if self.towel is None or self.rectangle is None or self._before is None:
             raise EstimationError("the towel has not been found yet; call find_towel first")
-        return self.rectangle
+        return self.towel, self.rectangle, self._before
 
 
 def pinching(hand: str, point: np.ndarray) -> Coordinates:

@@ -232,7 +232,11 @@ class WireRobot(RobotInterface):
     # Base and hands
 
     def read_base(self) -> Coordinates:
-        """Return where the base link is in the world, as odometry tells; of a robot without, where the model has it."""
+        """Return where the base link is in the world, as odometry tells; of a robot without, where the model has it.
+
+        Raises:
+            RobotTimeoutError: the robot has odometry, and nothing came of it.
+        """
         topic = self.names.full(self.names.odometry)
         told = self._peek(topic, ros.ODOMETRY, lambda m: ros.read_coordinates(ros.field(m, "pose.pose")))
         if told is None and self._has_odometry is None:

@@ -88,6 +88,7 @@ class Connection:
         alive: A server that is silent for so long [s] is no longer there.
 
     Raises:
+        InvalidInputError: another kind of address, or a value out of range.
         MissingPackageError: websockets is not installed.
         NotConnectedError: nobody listens there, or does not speak websockets.
     """

@@ -67,7 +67,11 @@ def field(message: Any, path: str, kind: type | tuple[type, ...] = object, defau
 
 
 def real(message: Any, path: str, default: float | None = None) -> float:
-    """Return a finite number of a message."""
+    """Return a finite number of a message.
+
+    Raises:
+        MessageError: the field holds something else.
+    """
     value = field(message, path, default=default)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise MessageError(f"{path!r} must be a number, got a {type(value).__name__}")
@@ -88,7 +92,11 @@ def vector(message: Any, path: str) -> np.ndarray:
 
 
 def names(message: Any, path: str) -> tuple[str, ...]:
-    """Return strings of a message."""
+    """Return strings of a message.
+
+    Raises:
+        MessageError: the field holds something else.
+    """
     found = field(message, path, list, default=[])
     if not all(isinstance(name, str) for name in found):
         raise MessageError(f"{path!r} must be strings")
@@ -232,7 +240,11 @@ def follow_fields(
 
 
 def read_follow(message: Fields) -> tuple[JointTrajectory, float | None, Tolerances | None]:
-    """Return what a goal of control_msgs/action/FollowJointTrajectory says; see ``read_trajectory``."""
+    """Return what a goal of control_msgs/action/FollowJointTrajectory says; see ``read_trajectory``.
+
+    Raises:
+        MessageError: a field of another kind, or a negative tolerance.
+    """
     trajectory, start = read_trajectory(field(message, "trajectory", Mapping))
     path, goal = _read_tolerances(message, "path_tolerance"), _read_tolerances(message, "goal_tolerance")
     late = seconds(message, "goal_time_tolerance", 0.0)
