@@ -59,8 +59,7 @@ class WalkPlanner:
         floor: Height of the floor [m].
         height: Of the centre of mass above the floor, walking [m].
 
-    Raises:
-        WalkError: the robot does not stand with both soles on the floor, or cannot stand as it is to walk.
+    Raises: as ``plan_walk``.
     """
 
     def __init__(

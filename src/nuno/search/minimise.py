@@ -141,21 +141,17 @@ def minimise(
     worlds = Worlds(source, world if isinstance(world, World) else None) if executor is None else None
     random = np.random.default_rng(count("seed", seed, low=0))
     # CMA-ES needs two dimensions: where there is one parameter, the other has no effect
-    dimensions = max(len(names), 2)
+    begin += [0.5] * (2 - len(names))
     options: dict[str, Any] = {
         "bounds": [0.0, 1.0], "verbose": -9, "maxiter": generations, "seed": np.nan,
         "randn": lambda *shape: random.standard_normal(shape),
     }  # fmt: skip
     if population is not None:
         options["popsize"] = count("population", population, low=3)
-    search = cma.CMAEvolutionStrategy([*begin, *[0.5] * (dimensions - len(names))], step, options)
+    search = cma.CMAEvolutionStrategy(begin, step, options)
     if start:
-        search.inject([[*begin, *[0.5] * (dimensions - len(names))]], force=True)
-    rows: list[dict[str, float]] = []
-    found: list[float] = []
-    history: list[Generation] = []
-    errors: dict[str, None] = {}
-    best: tuple[float, dict[str, float], Trial] | None = None
+        search.inject([begin], force=True)
+    tried = _Tried(value, name_of(trial))
     hidden = None if progress is None else not progress
     reason = ""
     with tqdm(
@@ -167,43 +163,77 @@ def minimise(
                 {name: scaled(float(x), bounds[name], name in logs) for name, x in zip(names, point, strict=False)}
                 for point in points
             ]
-            parameters = from_rows(candidates)
-            results = {
-                result.index: result
-                for finished in outcomes(
-                    trial, source, world, parameters, range(len(candidates)), executor, together, repeats, worlds
-                )
-                for result in finished
-            }
-            losses = np.array([_loss(results[k], value, name_of(trial)) for k in range(len(candidates))])
-            errors |= {result.error: None for result in results.values() if result.error is not None}
-            good = np.flatnonzero(np.isfinite(losses))
-            if len(good):
-                k = int(good[losses[good].argmin()])
-                if best is None or losses[k] < best[0]:
-                    best = (float(losses[k]), candidates[k], results[k])
-            rows += candidates
-            found += losses.tolist()
+            numbers = range(len(candidates))
+            running = outcomes(
+                trial, source, world, from_rows(candidates), numbers, executor, together, repeats, worlds
+            )
+            results = {result.index: result for finished in running for result in finished}
+            losses = tried.take(candidates, [results[k] for k in numbers])
             search.tell(points, _ranked(losses).tolist())
             spread = dict(zip(names, search.stds.tolist(), strict=False))
-            history.append(Generation(
-                float(losses[good].min()) if len(good) else np.nan,
-                float(np.median(losses[good])) if len(good) else np.nan, len(losses) - len(good), spread,
-            ))  # fmt: skip
+            tried.history.append(_generation(losses, spread))
             bar.update(1)
-            if best is not None and best[0] <= target:
+            if tried.lowest <= target:
                 reason = "enough"
             elif max(spread.values()) < tolerance:
                 reason = "tolerance"
             elif search.stop():
                 reason = next(iter(search.stop()))
-    if best is None:
-        raise EstimationError(f"all {len(rows)} trials failed; the first one said: {next(iter(errors), value)}")
-    log.info("lowest %s %g after %d generations (%s)", value, best[0], len(history), reason)
-    return Minimum(
-        best[1], best[0], best[2].values, tuple(history),
-        {name: np.array([row[name] for row in rows]) for name in names}, np.array(found), reason, tuple(errors),
-    )  # fmt: skip
+    found = tried.minimum(reason)
+    log.info("lowest %s %g after %d generations (%s)", value, found.value, len(found.history), reason)
+    return found
+
+
+class _Tried:
+    """All that a minimisation has tried so far.
+
+    Args:
+        value: Name of what the trials return that shall be low.
+        function: What the trial is called.
+    """
+
+    def __init__(self, value: str, function: str) -> None:
+        self.value, self.function = value, function
+        self.history: list[Generation] = []
+        self.lowest = np.inf
+        self._best: tuple[dict[str, float], Trial] | None = None
+        self._rows: list[dict[str, float]] = []
+        self._losses: list[float] = []
+        self._errors: dict[str, None] = {}  # each once, in the order in which they came
+
+    def take(self, candidates: list[dict[str, float]], results: list[Trial]) -> np.ndarray:
+        """Take a generation in; return its losses (n,), NaN where a trial failed."""
+        losses = np.array([_loss(result, self.value, self.function) for result in results])
+        for candidate, result, loss in zip(candidates, results, losses.tolist(), strict=True):
+            if np.isfinite(loss) and loss < self.lowest:
+                self.lowest, self._best = loss, (candidate, result)
+            if result.error is not None:
+                self._errors[result.error] = None
+        self._rows += candidates
+        self._losses += losses.tolist()
+        return losses
+
+    def minimum(self, reason: str) -> Minimum:
+        """Return what was found.
+
+        Raises:
+            EstimationError: every trial failed.
+        """
+        if self._best is None:
+            told = next(iter(self._errors), self.value)
+            raise EstimationError(f"all {len(self._rows)} trials failed; the first one said: {told}")
+        params, trial = self._best
+        return Minimum(
+            params, self.lowest, trial.values, tuple(self.history),
+            {name: np.array([row[name] for row in self._rows]) for name in params}, np.array(self._losses), reason,
+            tuple(self._errors),
+        )  # fmt: skip
+
+
+def _generation(losses: np.ndarray, spread: dict[str, float]) -> Generation:
+    good = losses[np.isfinite(losses)]
+    best, median = (float(good.min()), float(np.median(good))) if len(good) else (np.nan, np.nan)
+    return Generation(best, median, len(losses) - len(good), spread)
 
 
 def _start(bounds: Bounds, start: Any, logs: set[str]) -> list[float]:

@@ -144,13 +144,7 @@ def lift_soft_cube(
     size, made_of = number("edge", edge, above=0.0), RUBBER if material is None else material
     if not isinstance(made_of, Soft) or np.ndim(made_of.friction) or made_of.friction <= 0.0:
         raise InvalidInputError(f"the cube needs a Soft material with one friction above 0, got {made_of!r}")
-    world = World(device=device, substeps=substeps)
-    world.add(plane(name="floor"))
-    world.add(soft_box((size,) * 3, (count("cells", cells),) * 3, name="cube", position=(0.0, 0.0, 0.5 * size)))
-    for name, side in (("left hand", 1.0), ("right hand", -1.0)):
-        # hands that reach past the faces' rims: a rim above a hand would hang on to it, whatever the friction
-        place = (0.0, side * (0.5 * size + 0.5 * THICK + GAP), 0.62 * size)
-        world.add(box((1.2 * size, THICK, 1.2 * size), name=name, position=place, friction=made_of.friction))
+    world = _room(size, count("cells", cells), float(made_of.friction), device, substeps)
     mass, gravity = float(made_of.density) * size**3, float(np.linalg.norm(world.gravity))
     needed = mass * gravity / (2.0 * made_of.friction)
     expected = 0.5 * needed / (float(made_of.youngs_modulus) * size)  # of each hand: half of N a / (E a^2)
@@ -171,17 +165,24 @@ def lift_soft_cube(
         values = {name: swept.values(name) for name in ("force", "sunk", "slip")}
         found.append((squeezes, values["force"], values["sunk"], values["slip"]))
         held = _held(values["sunk"], values["slip"])
-        if held.all():
-            high = float(squeezes[0])
-        elif held.any():
-            first = int(np.flatnonzero(held)[0])
-            low, high = (float(squeezes[first - 1]) if first else low), float(squeezes[first])
-        else:
-            low = float(squeezes[-1])
+        first = int(np.flatnonzero(held)[0]) if held.any() else tries
+        low, high = np.concatenate([[low], squeezes, [high]])[first : first + 2].tolist()
     squeezes, forces, sunk, slip = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order, held = np.argsort(squeezes), _held(sunk, slip)
     forces = np.where(held, forces, np.nan)
     return LiftResult(squeezes[order], forces[order], held[order], sunk[order], mass, float(made_of.friction), gravity)
+
+
+def _room(size: float, cells: int, friction: float, device: str, substeps: int | None) -> World:
+    """Return a world with a cube on the floor, static, between two hands."""
+    world = World(device=device, substeps=substeps)
+    world.add(plane(name="floor"))
+    world.add(soft_box((size,) * 3, (cells,) * 3, name="cube", position=(0.0, 0.0, 0.5 * size)))
+    for name, side in (("left hand", 1.0), ("right hand", -1.0)):
+        # hands that reach past the faces' rims: a rim above a hand would hang on to it, whatever the friction
+        place = (0.0, side * (0.5 * size + 0.5 * THICK + GAP), 0.62 * size)
+        world.add(box((1.2 * size, THICK, 1.2 * size), name=name, position=place, friction=friction))
+    return world
 
 
 def _held(sunk: np.ndarray, slip: np.ndarray) -> np.ndarray:

@@ -107,6 +107,24 @@ def play_fold(
     if 0 in held:
         raise EstimationError(f"the {plan.hands[held.index(0)]} closed on nothing of {cloth.name!r}")
     tell("taken")
+    strayed, released = _carry(robot, cloth, motion, plan, arms, tell)
+    go(plan.leave, UP)
+    rest = settle - (robot.now() - released)
+    if rest > SOON:
+        robot.sleep(rest)
+    tell("folded")
+    vertices = np.asarray(cloth.vertices)
+    return PlayedFold(motion, plan, vertices, held, strayed, compare_fold(motion, vertices))
+
+
+def _carry(
+    robot: SimulatedRobot, cloth: Body, motion: FoldMotion, plan: ArmPlan, arms: list[str], tell: Callable[[str], None]
+) -> tuple[np.ndarray, float]:
+    """Carry the held points along their ways, and let each go when it is due; see ``play_fold``.
+
+    Returns:
+        How far each point was from its way at most (hands,) [m], and when the last was let go [s].
+    """
     begin, strayed = robot.now(), np.zeros(motion.hand_count)
     rows = [dict(zip(plan.joints, row, strict=True)) for row in plan.carry[1:]]
     robot.angle_vector_sequence(rows, list(np.diff(plan.times)))
@@ -122,7 +140,7 @@ def play_fold(
                 tell("laid")
             robot.stop_grasp(arms[ends.pop(0)[1]], wait=False)
             continue
-        robot.sleep(min(1.0 / world.frame_rate, due - robot.now()))
+        robot.sleep(min(1.0 / robot.world.frame_rate, due - robot.now()))
         at = (robot.now() - begin) / plan.stretch
         for _, hand in ends:
             way = [np.interp(at, motion.times, motion.ways[hand, :, axis]) for axis in range(3)]
@@ -130,13 +148,7 @@ def play_fold(
             strayed[hand] = max(strayed[hand], off)
     released = robot.now()
     robot.wait_interpolation()
-    go(plan.leave, UP)
-    rest = settle - (robot.now() - released)
-    if rest > SOON:
-        robot.sleep(rest)
-    tell("folded")
-    vertices = np.asarray(cloth.vertices)
-    return PlayedFold(motion, plan, vertices, held, strayed, compare_fold(motion, vertices))
+    return strayed, released
 
 
 def _held(robot: SimulatedRobot, hand: str, cloth: Body) -> int:
