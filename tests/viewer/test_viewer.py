@@ -230,6 +230,29 @@ def test_modes_are_what_draw_draws():
             assert np.array_equal(sent["triangles"].reshape(-1, 3), drawn.triangles)
 
 
+def test_a_look_that_fails_lets_go_of_the_world(monkeypatch, caplog):
+    """The viewer's thread logs what went wrong and goes on looking; nobody waits for a lock that it keeps."""
+    world = make_world()
+    failed = threading.Event()
+    look = Stage.look
+
+    def fails_once(stage, sparing=False):
+        if sparing and not failed.is_set():
+            failed.set()
+            raise RuntimeError("a body that cannot be drawn")
+        look(stage, sparing)
+
+    with caplog.at_level(logging.ERROR), Viewer(world, frame_rate=200.0) as viewer:
+        feed = Feed(viewer)
+        monkeypatch.setattr(Stage, "look", fails_once)
+        assert failed.wait(5.0)
+        assert world.lock.acquire(timeout=5.0), "the viewer's thread has let go of it"
+        world.lock.release()
+        world.step()
+        feed.wait_for(lambda: feed.commands[-1].get("time") == world.time)
+    assert "could not draw" in caplog.text
+
+
 def test_grips_contacts_and_cameras_are_marked():
     """Held points are where the vertices are, arrows as long as the forces, a camera goes along with its body."""
     world = make_world()

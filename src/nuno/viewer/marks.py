@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,28 @@ from nuno.coordinates import Pose
 from nuno.held_points import held_points
 
 if TYPE_CHECKING:
+    from nuno.body import Body
     from nuno.simulation import Simulation
 
 FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6], dtype=np.uint32)
 """Edges of ``frustum``: from the pinhole to the corners, round the image, and a stroke where up is."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnCamera:
+    """A camera whose frustum is drawn.
+
+    Attributes:
+        camera: The camera, where it was when it was added.
+        carrier: The body that carries it, or None.
+        pose: Where it is: in the frame of its carrier, or in the world.
+        depth: How far the frustum is drawn [m].
+    """
+
+    camera: Camera
+    carrier: Body | None
+    pose: Pose
+    depth: float
 
 
 def all_held_points(world: Simulation, index: int) -> np.ndarray:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno import quaternion as quat
+from nuno.coordinates import Pose
 from nuno.errors import InvalidInputError
 from nuno.shape import Plane
 from nuno.validation import count, number
 from nuno.viewer.actor import Actor, light_of
 from nuno.viewer.cast import Cast, Place
-from nuno.viewer.marks import FRUSTUM, all_held_points, camera_pose, contact_arrows, frustum
+from nuno.viewer.marks import FRUSTUM, DrawnCamera, all_held_points, contact_arrows, frustum
 from nuno.viewer.style import Styles
 from nuno.viewer.wardrobe import Wardrobe
 
@@ -46,8 +47,8 @@ class Stage:
         self._looked: list[Cast] = []
         self._marks: dict[tuple[str, int], Actor] = {}
         self._seen_marks: dict[tuple[str, int], np.ndarray] = {}
-        self._cameras: dict[str, tuple[Any, list[Actor]]] = {}
-        self._camera_poses: list[tuple[Actor, Any]] = []
+        self._cameras: dict[str, tuple[DrawnCamera, list[Actor]]] = {}
+        self._camera_poses: list[tuple[Actor, Pose]] = []
         self._entered: list[Actor] = []
         self._left: list[int] = []
         self._contacts_due = 0.0
@@ -181,12 +182,12 @@ class Stage:
         for name in [n for n, (source, _) in self._cameras.items() if wanted.get(n) is not source]:
             self._left += [actor.number for actor in self._cameras.pop(name)[1]]
         for name, source in wanted.items():
-            camera, carrier, inner, depth = source
             if name not in self._cameras:
-                pose = None if carrier is None else inner
+                inner = None if source.carrier is None else source.pose
                 actors = [
                     Actor(
-                        (place.root, "cameras", name), "lines", frustum(camera, depth), offset=place.offset, inner=pose,
+                        (place.root, "cameras", name), "lines", frustum(source.camera, source.depth),
+                        offset=place.offset, inner=inner,
                         color=light_of("#1f4fa0"), opacity=1.0, lines=FRUSTUM, triangles=np.empty(0, np.uint32),
                     )
                     for place in self.places
@@ -194,11 +195,11 @@ class Stage:
                 self._cameras[name] = (source, actors)
                 self._entered += actors
             for place, actor in zip(self.places, self._cameras[name][1], strict=True):
-                at = camera_pose(camera)
-                if carrier is not None:
-                    carried = self.world._bodies.get(carrier.key, carrier)._pose()
+                at = source.pose
+                if source.carrier is not None:
+                    carried = self.world._bodies.get(source.carrier.key, source.carrier)._pose()
                     p, q = (part[place.index] if part.ndim == 2 else part for part in carried)
-                    at = p + quat.rotate(q, inner[0]), quat.multiply(q, inner[1])
+                    at = p + quat.rotate(q, source.pose[0]), quat.multiply(q, source.pose[1])
                 self._camera_poses.append((actor, at))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,9 @@ from nuno.drawing import Mode, draw
 from nuno.errors import InvalidInputError
 from nuno.soft_shape import SoftShape
 from nuno.validation import number
+
+if TYPE_CHECKING:
+    from nuno.viewer.marks import DrawnCamera
 
 MODES = ("surface", "wireframe", "tetrahedra")
 
@@ -78,7 +81,7 @@ class Styles:
         grips: Whether held points are marked.
         contacts: Whether contact forces are drawn.
         force_scale: Length of a force's arrow [m/N].
-        cameras: By name: a camera, the body that carries it or None, and how deep its frustum is drawn [m].
+        cameras: Those whose frusta are drawn, by name.
     """
 
     usual: Style = Style()
@@ -86,7 +89,7 @@ class Styles:
     grips: bool = True
     contacts: bool = False
     force_scale: float = 0.02
-    cameras: dict[str, Any] = field(default_factory=dict)
+    cameras: dict[str, DrawnCamera] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         # one object for all bodies: what is drawn is made anew where a body's style is another

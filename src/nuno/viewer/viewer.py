@@ -29,7 +29,7 @@ from nuno.simulation import CHUNK
 from nuno.validation import finite_array, number
 from nuno.viewer.changes import changes, clock
 from nuno.viewer.film import Film
-from nuno.viewer.marks import camera_pose
+from nuno.viewer.marks import DrawnCamera, camera_pose
 from nuno.viewer.message import pack
 from nuno.viewer.server import Server
 from nuno.viewer.stage import Stage, checked_places
@@ -213,15 +213,15 @@ class Viewer:
         if not isinstance(camera, Camera):
             raise InvalidInputError(f"a camera is a nuno.Camera, got {type(camera).__name__}")
         far = number("depth", depth, above=0.0)
-        inner, carrier = camera_pose(camera), None
+        pose, carrier = camera_pose(camera), None
         if on is not None:
             with self.world.lock:
                 carrier = self.world._own(on)
                 place, turn = carrier._pose()
             if place.ndim == 2 or turn.ndim == 2:
                 raise InvalidInputError(f"{carrier.name!r} is at another place in each world; give its camera no body")
-            inner = compose(invert((place, turn)), inner)
-        self._styles.cameras[name] = (camera, carrier, inner, far)
+            pose = compose(invert((place, turn)), pose)
+        self._styles.cameras[name] = DrawnCamera(camera, carrier, pose, far)
 
     def remove_camera(self, name: str) -> None:
         """Draw a camera no longer.
@@ -367,11 +367,15 @@ class Viewer:
         The caller holds ``_turn``. While a look is wanted of the thread that makes frames, nothing is settled.
         """
         lock = self.world.lock
-        if wait or lock.acquire(timeout=0.0):
+        if wait:
             with lock:
                 self._wanted = False
-                self._stage.look(sparing=not wait)
-            if not wait:
+                self._stage.look()
+        elif lock.acquire(timeout=0.0):
+            try:
+                self._wanted = False
+                self._stage.look(sparing=True)
+            finally:
                 lock.release()
         else:
             if not self._wanted:
