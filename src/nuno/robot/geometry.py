@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from nuno.errors import MeshError
+from nuno.robot.placement import quaternion_of
 from nuno.shape import Box, Capsule, Cylinder, Shape, Sphere, TriangleMesh
 
 if TYPE_CHECKING:
@@ -116,12 +117,11 @@ class Geometry:
     def _link_shape(self, part: Any, as_hull: bool) -> LinkShape:
         shape, offset = _shape_of(part, as_hull)
         placement = part.placement
-        x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
         position = placement.translation + placement.rotation @ offset
         color = tuple(float(c) for c in np.clip(part.meshColor[:3], 0.0, 1.0))
         return LinkShape(
-            self._link_of(part), int(part.parentJoint), shape, position, np.array([w, x, y, z]),
-            color,  # type: ignore[arg-type]
+            self._link_of(part), int(part.parentJoint), shape, position,
+            quaternion_of(placement.rotation), color,  # type: ignore[arg-type]
         )  # fmt: skip
 
 

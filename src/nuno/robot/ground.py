@@ -25,21 +25,6 @@ def lowest_corners(corners: np.ndarray) -> np.ndarray:
     return corners[..., 2].min(axis=1)
 
 
-def zero_moment_point(force: np.ndarray, torque: np.ndarray, height: float) -> np.ndarray:
-    """Return where (2,) [m] in the plane z = height the moment of a ground reaction is upright; NaN without one.
-
-    Args:
-        force: (3,) [N].
-        torque: (3,) [N m], about the world's origin.
-        height: [m].
-    """
-    along_x, along_y, upward = force.tolist()
-    about_x, about_y, _ = torque.tolist()
-    if not upward > 1e-9:
-        return np.full(2, np.nan)
-    return np.array([height * along_x - about_y, about_x + height * along_y]) / upward
-
-
 class Soles:
     """The soles that stand, and how they share what the ground must do.
 

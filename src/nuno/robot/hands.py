@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
-from nuno import quaternion as quat
 from nuno.body import Body
 from nuno.coordinates import Coordinates, Pose, compose, invert
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.grip import Grip
 from nuno.robot.description import HandOnFrame
+from nuno.robot.placement import pose_of
 from nuno.surface import SurfacePoints
 from nuno.validation import number
 
@@ -187,10 +186,8 @@ def carrier(links: Links, frame: str) -> tuple[Body, Pose]:
     fixed = np.flatnonzero(links._joints == own.parentJoint)
     if not len(fixed):
         raise InvalidInputError(f"no link that is fixed to {frame!r} of {robot.name!r} has a shape in the world")
-    k = next((k for k in fixed if links.names[k] == name), fixed[0])
-    x, y, z, w = pin.Quaternion(own.placement.rotation).coeffs()
-    placed = (np.array(own.placement.translation), quat.unit("quaternion", (w, x, y, z), (4,)))
-    return links.bodies[k], compose(invert((links._offsets[k], links._turns[k])), placed)
+    k = int(next((k for k in fixed if links.names[k] == name), fixed[0]))
+    return links.bodies[k], compose(invert(links.offset_of(k)), pose_of(own.placement))
 
 
 def hands_of(links: Links) -> dict[str, Hand]:

@@ -17,6 +17,7 @@ from nuno.camera.camera import Camera
 from nuno.coordinates import Coordinates, compose, invert
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.description import FileName, find_description
+from nuno.robot.placement import pose_of
 from nuno.robot.support import convex_outline
 from nuno.validation import finite_array, number
 
@@ -333,9 +334,7 @@ class Humanoid(Coordinates):
         super()._moved()
 
     def _pose_of_frame(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        placement = self.update().oMf[self.frame_index(frame)]
-        x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-        return np.array(placement.translation), quat.unit("quaternion", (w, x, y, z), (4,))
+        return pose_of(self.update().oMf[self.frame_index(frame)])
 
     def frame_index(self, frame: str) -> int:
         """Return Pinocchio's index of a frame.

@@ -14,7 +14,7 @@ from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.goal import Goal
 from nuno.robot.joint_interface import JointInterface
 from nuno.robot.readings import ImuReading
-from nuno.robot.support import standing_place
+from nuno.robot.support import standing_place, zero_moment_point
 from nuno.validation import number
 
 logger = logging.getLogger(__name__)
@@ -254,8 +254,7 @@ class RobotInterface(JointInterface):
         if force[2] < LOADED:
             raise RobotModelError(f"{self.robot.name!r} does not stand: its feet bear {force[2]:.2f} N")
         place, turn = self.footprint()._pose()
-        height = place[2]
-        point = np.array([height * force[0] - moment[1], height * force[1] + moment[0], height * force[2]]) / force[2]
+        point = np.append(zero_moment_point(force, moment, place[2]), place[2])
         return point if wrt == "world" else quat.rotate(quat.inverse(turn), point - place)
 
     # State

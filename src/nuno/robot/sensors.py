@@ -11,12 +11,13 @@ import pinocchio as pin
 
 from nuno import quaternion as quat
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.robot.ground import Soles, lowest_corners, moment, zero_moment_point
+from nuno.robot.ground import Soles, lowest_corners, moment
 from nuno.robot.imu import InertialUnit
 from nuno.robot.loads import LinkLoads, Load
 from nuno.robot.sensor_model import Channel, SensorModel
 from nuno.robot.spatial_arrays import placement_arrays, spatial_array
 from nuno.robot.state import RobotState
+from nuno.robot.support import zero_moment_point
 from nuno.robot.wrenches import WrenchSensor
 from nuno.validation import number
 

@@ -1,4 +1,4 @@
-"""The ground that a robot stands on: outlines of its soles, and how far inside a point is."""
+"""Standing: where a robot stands, the outline of its soles, how far inside a point is, the zero moment point."""
 
 from __future__ import annotations
 
@@ -48,6 +48,21 @@ def distance_inside(outline: np.ndarray, point: np.ndarray) -> float:
     """Return how far a point (2,) is from the nearest edge [m], negative outside."""
     normals, offsets = edges_of(outline)
     return float((offsets - normals @ point).min())
+
+
+def zero_moment_point(force: np.ndarray, torque: np.ndarray, height: float) -> np.ndarray:
+    """Return where (2,) [m] in the plane z = height the moment of a ground reaction is upright; NaN without one.
+
+    Args:
+        force: (3,) [N].
+        torque: (3,) [N m], about the world's origin.
+        height: [m].
+    """
+    along_x, along_y, upward = force.tolist()
+    about_x, about_y, _ = torque.tolist()
+    if not upward > 1e-9:
+        return np.full(2, np.nan)
+    return np.array([height * along_x - about_y, about_x + height * along_y]) / upward
 
 
 def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, ReachError, RobotModelError
+from nuno.robot.placement import quaternion_of
 from nuno.robot.support import distance_inside, standing_place
 from nuno.tasks.fold_motion import FoldMotion
 from nuno.tasks.obstacles import Obstacles
@@ -198,8 +198,7 @@ class _Planner:
         for places, time in zip(points, times, strict=True):
             targets: dict[str, Any] = {}
             for name, (rotation, local), place in zip(self.hands, self.holds, places, strict=True):
-                x, y, z, w = pin.Quaternion(rotation).coeffs()
-                targets[name] = Coordinates(place - rotation @ local, (w, x, y, z))
+                targets[name] = Coordinates(place - rotation @ local, quaternion_of(rotation))
             self._reach(targets, f"{where}, at {time:.2f} s of the fold")
             found.append(self.robot.angle_vector())
         return np.array(found)

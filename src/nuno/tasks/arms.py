@@ -14,6 +14,7 @@ from nuno import quaternion as quat
 from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, RobotModelError
 from nuno.robot.geometry import LinkShape
+from nuno.robot.placement import quaternion_of
 from nuno.shape import Box, Hull, TriangleMesh
 from nuno.tasks.simple_hull import simple_hull
 
@@ -194,8 +195,7 @@ def _boxed(part: LinkShape) -> LinkShape:
         return part
     to_box, size = oriented_bounds(part.shape.mesh()[0])
     placement = np.linalg.inv(to_box)
-    x, y, z, w = pin.Quaternion(placement[:3, :3]).coeffs()
     return replace(
         part, shape=Box(tuple(size)), position=part.position + quat.rotate(part.quaternion, placement[:3, 3]),
-        quaternion=quat.multiply(part.quaternion, np.array([w, x, y, z])),
+        quaternion=quat.multiply(part.quaternion, quaternion_of(placement[:3, :3])),
     )  # fmt: skip

@@ -1,0 +1,22 @@
+"""Placements: Pinocchio's poses as Nuno has them, a place and a quaternion (w, x, y, z)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from nuno import quaternion as quat
+from nuno.coordinates import Pose
+
+
+def quaternion_of(rotation: np.ndarray) -> np.ndarray:
+    """Return the quaternion (4,), (w, x, y, z), of a rotation matrix (3, 3)."""
+    x, y, z, w = pin.Quaternion(rotation).coeffs()
+    return np.array([w, x, y, z])
+
+
+def pose_of(placement: Any) -> Pose:
+    """Return place (3,) [m] and unit quaternion (4,) of an SE3, copies."""
+    return np.array(placement.translation), quat.unit("quaternion", quaternion_of(placement.rotation), (4,))
