@@ -20,5 +20,5 @@ def test_every_mesh_is_where_the_robot_has_it(name, request):
     for look, shape in zip(looks, shapes, strict=True):
         place, _ = compose(links.bodies[look.body]._pose(), look.pose)
         np.testing.assert_allclose(place, data.oMi[shape.joint].act(shape.position), atol=1e-12)
-    with_body = {links.joint_of(look.body) for look in looks}
+    with_body = {links.joints[look.body] for look in looks}
     assert ({shape.joint for shape in shapes} - with_body != set()) == (name == "g1")

@@ -5,9 +5,10 @@ import pytest
 from scipy.optimize import nnls
 
 import nuno
-from nuno.robot.ground import Soles, zero_moment_point
+from nuno.robot.ground import Soles
 from nuno.robot.hands import Hand
 from nuno.robot.sensors import Sensors
+from nuno.robot.support import zero_moment_point
 
 G = 9.81
 TOWEL = nuno.Cloth(area_density=0.3, damping=0.02, air_drag=5.0)

@@ -183,10 +183,10 @@ def carrier(links: Links, frame: str) -> tuple[Body, Pose]:
     own = robot.model.frames[robot.frame_index(frame)]
     role = robot.description.frames.get(frame)
     name = frame if role is None else role.link
-    fixed = np.flatnonzero(links._joints == own.parentJoint)
-    if not len(fixed):
+    fixed = [k for k, joint in enumerate(links.joints) if joint == own.parentJoint]
+    if not fixed:
         raise InvalidInputError(f"no link that is fixed to {frame!r} of {robot.name!r} has a shape in the world")
-    k = int(next((k for k in fixed if links.names[k] == name), fixed[0]))
+    k = next((k for k in fixed if links.names[k] == name), fixed[0])
     return links.bodies[k], compose(invert(links.offset_of(k)), pose_of(own.placement))
 
 

@@ -36,6 +36,7 @@ class Links:
     Attributes:
         bodies: One for each shape; a name that the world has already gets a number.
         names: Of the links that those are the shapes of.
+        joints: Pinocchio's indices of the joints that carry them.
 
     Raises:
         InvalidInputError: other meshes, or a batch.
@@ -56,7 +57,8 @@ class Links:
         )
         self.names = tuple(own.link for own in shapes)
         self._keys = tuple(body.key for body in self.bodies)
-        self._joints = np.array([own.joint for own in shapes], dtype=int)
+        self.joints: tuple[int, ...] = tuple(own.joint for own in shapes)
+        self._rows = np.array(self.joints, dtype=int)
         self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
         # by which the quaternion of its joint is multiplied for that of a shape
@@ -73,10 +75,6 @@ class Links:
                 body._position, body._quaternion = position, quaternion
                 world.add(body)
 
-    def joint_of(self, k: int) -> int:
-        """Return Pinocchio's index of the joint that carries the k-th body."""
-        return int(self._joints[k])
-
     def offset_of(self, k: int) -> Pose:
         """Return where the k-th body is in the frame of its joint."""
         return self._offsets[k], self._turns[k]
@@ -84,7 +82,7 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
-        joints = self._joints
+        joints = self._rows
         places = self._joint_places[joints] + np.einsum("kij,kj->ki", self._joint_axes[joints], self._offsets)
         turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
         return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])

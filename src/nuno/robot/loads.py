@@ -71,9 +71,9 @@ class LinkLoads:
 
     def __init__(self, links: Links, groups: Sequence[Hashable] | None = None) -> None:
         self._world = links.world
-        self._groups: Sequence[Hashable] = links._joints.tolist() if groups is None else groups
+        self._groups: Sequence[Hashable] = links.joints if groups is None else groups
         self._index = {body: k for k, body in enumerate(links.bodies)}
-        self._joints: list[int] = links._joints.tolist()
+        self._joints = links.joints
         self._read_at: tuple[float, tuple[str, ...]] | None = None
         self._loads: tuple[Load, ...] = ()
         self._motions: dict[Body, _Motion] = {}

@@ -48,7 +48,7 @@ def looks_of(links: Links) -> list[Look]:
     by_joint: dict[int, int] = {}
     for number, link in enumerate(links.names):
         by_link.setdefault(link, number)
-        by_joint.setdefault(links.joint_of(number), number)
+        by_joint.setdefault(links.joints[number], number)
     frames = _joint_frames(robot)
     found = []
     for shape in robot.geometry.shapes("visual"):

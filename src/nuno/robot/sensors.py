@@ -194,7 +194,7 @@ class Sensors:
         before: dict[str, np.ndarray] = {}
         for load in loads:
             assert self.links is not None
-            joint = self.links.joint_of(load.link)
+            joint = self.links.joints[load.link]
             turning = load.torque + moment(load.point, load.force)
             force -= load.force
             torque -= turning
@@ -250,7 +250,7 @@ class Sensors:
         """For each of the bodies in the world, the wrench sensor beyond which its link is, or else its joint."""
         assert self.links is not None
         groups: list[str | int] = []
-        for k, joint in enumerate(self.links._joints.tolist()):
+        for k, joint in enumerate(self.links.joints):
             behind = [
                 name
                 for name, sensor in self._wrenches.items()

@@ -169,7 +169,7 @@ def external_forces(links: Links, loads: Sequence[Load]) -> Any:
         found.append(pin.Force.Zero())
     placements = links.robot.update().oMi
     for load in loads:
-        joint = links.joint_of(load.link)
+        joint = links.joints[load.link]
         torque = load.torque + np.cross(load.point, load.force)
         found[joint] += placements[joint].actInv(pin.Force(load.force, torque))
     return found

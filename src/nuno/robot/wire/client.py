@@ -282,11 +282,21 @@ class WireRobot(RobotInterface):
     # Sensors
 
     def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return force (3,) [N] and torque (3,) [N m] that the rest of the world exerts on a limb, in a frame."""
+        """Return force (3,) [N] and torque (3,) [N m] of what is beyond a sensor; see ``RobotInterface``.
+
+        Raises:
+            RobotModelError: the robot publishes no such forces.
+            RobotTimeoutError: nothing came.
+        """
         return self._read(self.names.wrench.format(frame=frame), ros.WRENCH, ros.read_wrench)
 
     def read_imu(self) -> ImuReading:
-        """Return what the inertial measurement unit tells."""
+        """Return what the inertial measurement unit tells.
+
+        Raises:
+            RobotModelError: the robot publishes nothing of it.
+            RobotTimeoutError: nothing came.
+        """
         return self._read(self.names.imu, ros.IMU, ros.read_imu)
 
     # Inside
