@@ -51,15 +51,12 @@ class RigidScene:
         for key in [key for key in self._static if key not in seen]:
             self.solver.remove(self._static.pop(key)[0])
         rules = world._rules
+        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored)}
         pairs: dict[tuple[int, int], Any] = {}
-        for pair, mu in rules.friction.items():
+        for pair, mu in exceptions.items():
             if len(pair) == 2 and all(key in slots for key in pair):
                 a, b = pair
                 pairs[slots[a], slots[b]] = mu
-        for pair in rules.ignored:
-            if len(pair) == 2 and all(key in slots for key in pair):
-                a, b = pair
-                pairs[slots[a], slots[b]] = None
         self.solver.set_exceptions(pairs)
         self._version = world._collider_version
 

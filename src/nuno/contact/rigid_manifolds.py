@@ -13,12 +13,11 @@ from nuno.solver.rigid_body import RigidState, inverse_mass_at
 TRAVEL, REACH, SPEED, LISTINGS = 0, 1, 2, 3
 NOTES = 4
 """Per world: how far anything may have gone since the rows were listed [m], how far the list looked [m], the greatest
-speed of
-any surface [m/s], how often it was listed."""
+speed of any surface [m/s], how often it was listed."""
 ENTRIES, OVERFLOW, LEFT, ROUNDS, WAITING = range(5)
 COUNTS = 5
-"""Per world: entries with points, whether a row was too short, substeps that are left of a run,
-rounds, entries that wait for theirs."""
+"""Per world: entries with points, whether a row was too short, substeps that are left of a run, rounds, entries that
+wait for theirs."""
 
 FAR = wp.constant(1.0e6)
 """[m] The gap of a point that nothing can close within the substep: the passes leave it out."""
@@ -26,8 +25,7 @@ NEAR_BY = wp.constant(2.0e-4)
 """[m] What a body that seems at rest may be pushed by others within a substep before this contact is seen."""
 HOLD = wp.constant(3.0e-5)
 """[m] A point that slipped farther than this holds from there on. What sticks slips far less before it is put back;
-where points
-cannot all go back, as in a jam of overlapping bodies, they would otherwise hold the overlap."""
+where points cannot all go back, as in a jam of overlapping bodies, they would otherwise hold the overlap."""
 
 
 @wp.struct

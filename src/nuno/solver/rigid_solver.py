@@ -14,15 +14,15 @@ from nuno.contact.manifold import POINTS
 from nuno.contact.rigid_manifolds import COUNTS, LEFT, OVERFLOW
 from nuno.quaternion import rotate
 from nuno.scene.rigid_shape import RigidPart
-from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED, RigidArrays
+from nuno.solver.rigid_arrays import SAVED, RigidArrays
 from nuno.solver.rigid_frame import RigidSettings, run_rigid
+from nuno.solver.rigid_saving import load_contacts, save_contacts
 
 SUBSTEPS = 10
 """Substeps a frame: at 60 frames a second what rests moves under 1 um, and a sphere's roll is exact to 0.1 %."""
 PASSES = 4
 """Passes over the velocities: with 2, a stack of ten boxes that stand askew sways by millimetres and goes on swaying;
-with 4
-it comes to rest."""
+with 4 it comes to rest."""
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 
@@ -346,17 +346,7 @@ class RigidSolver(RigidArrays):
     def save_state(self, slot: int) -> dict[str, np.ndarray]:
         """Return all that a body's next step depends on, (worlds, ...) each: motion, forces, and its contacts."""
         self._load_contacts()
-        saved = {name: self._read(name, slot).copy() for name in SAVED}
-        rows = self.part_rows[slot]
-        owner = np.full(self.manifolds.parts + 1, -1)
-        which = np.full(self.manifolds.parts + 1, -1)
-        for other, theirs in self.part_rows.items():
-            owner[theirs], which[theirs] = other, np.arange(len(theirs))
-        for name in (*ENTRY, *POINT):
-            saved[f"contact_{name}"] = self._entries(name)[:, rows].copy()
-        partner = saved.pop("contact_partner")
-        saved["partner_slot"], saved["partner_part"] = owner[partner], which[partner]
-        return saved
+        return {name: self._read(name, slot).copy() for name in SAVED} | save_contacts(self, slot)
 
     def load_state(self, slot: int, state: Mapping[str, np.ndarray]) -> None:
         """Take back what `save_state` gave, also of one world for all.
@@ -373,29 +363,7 @@ class RigidSolver(RigidArrays):
         """Write the contacts of loaded states, now that the bodies that they are with may have come too."""
         loaded, self._loaded = self._loaded, {}
         for slot, state in loaded.items():
-            rows = self.part_rows[slot]
-            width = state["contact_count"].shape[2]
-            while width > self.manifolds.row:
-                self._lengthen_rows()
-            partner = np.full(state["partner_slot"].shape, -1, dtype=np.int32)
-            for other, theirs in self.part_rows.items():
-                for k, row in enumerate(theirs):
-                    partner[(state["partner_slot"] == other) & (state["partner_part"] == k)] = row
-            for name in (*ENTRY, *POINT):
-                values = partner if name == "partner" else state[f"contact_{name}"]
-                shaped = getattr(self.manifolds, name).reshape(self._entry_shape(name))
-                for k, row in enumerate(rows):
-                    block = np.broadcast_to(values[:, k], (self.world_count, *values.shape[2:]))
-                    shaped[:, row, :width].assign(np.ascontiguousarray(block))
-            count = np.where(partner < 0, 0, state["contact_count"])
-            shaped = self.manifolds.count.reshape(self._entry_shape("count"))
-            for k, row in enumerate(rows):
-                block = np.broadcast_to(count[:, k], (self.world_count, width))
-                shaped[:, row, :width].assign(np.ascontiguousarray(block, dtype=np.int32))
-                if width < self.manifolds.row:
-                    partners = self.manifolds.partner.reshape(self._entry_shape("partner"))
-                    partners[:, row, width:].fill_(-1)
-                    shaped[:, row, width:].fill_(0)
+            load_contacts(self, slot, state)
 
 
 def _bits(mask: int) -> int:

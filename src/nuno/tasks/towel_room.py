@@ -12,6 +12,7 @@ from nuno.body import Body
 from nuno.camera.picture import Chequer
 from nuno.camera.table import Table
 from nuno.errors import BodyStateError
+from nuno.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.head_cameras import STEREO, HeadCameras
 from nuno.robot.humanoid import Humanoid
@@ -53,24 +54,26 @@ class TowelRoom:
         return {name: picture.color.numpy() for name, picture in self.cameras.look().items()}
 
     def held(self) -> np.ndarray:
-        """Return where, on the towel as it lay, the hands truly hold it: (3,) [m]; for a judge, not for the robot."""
+        """Return where, on the towel as it lay, the hands truly hold it: (3,) [m]; for a judge, not for the robot.
+
+        Raises:
+            BodyStateError: no hand holds it.
+        """
         return self._mean_held(self.lay)
 
     def held_at(self) -> np.ndarray:
-        """Return where what the hands truly hold is now: (3,) [m]; for a judge, not for the robot."""
+        """Return where what the hands truly hold is now: (3,) [m]; for a judge, not for the robot.
+
+        Raises:
+            BodyStateError: no hand holds it.
+        """
         return self._mean_held(self.towel.vertices)
 
     def _mean_held(self, vertices: np.ndarray) -> np.ndarray:
-        specs = [grip._spec for hand in self.driver.hands.values() for grip in hand.grips if grip.body is self.towel]
-        if not specs:
+        grips = [grip for hand in self.driver.hands.values() for grip in hand.grips if grip.body is self.towel]
+        if not grips:
             raise BodyStateError("no hand holds the towel")
-        points = [
-            vertices[spec.vertices[0]]
-            if spec.vertices is not None
-            else np.einsum("kc,kcx->kx", spec.barycentric[0], vertices[spec.corners[0]])
-            for spec in specs
-        ]
-        return np.concatenate(points).mean(axis=0)
+        return np.concatenate([held_points(grip, 0, vertices) for grip in grips]).mean(axis=0)
 
 
 def make_room(
