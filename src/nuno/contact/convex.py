@@ -5,6 +5,8 @@ and convex meshes are seen twice: as they are, and as a core that is smaller all
 radius. The direction between two parts is taken between their cores, which stay apart while the parts press into each
 other by a little; how far apart the parts are is then measured along that direction on the parts as they are.
 
+Of two parts a stands at x, turned by q, in the frame of b; directions are in that frame, and normals look from b to a.
+
 After Gilbert, Johnson, Keerthi 1988; closest points of simplices after Ericson, Real-Time Collision Detection, 2005.
 """
 

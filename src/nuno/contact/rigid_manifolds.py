@@ -2,6 +2,9 @@
 
 A manifold's normal and its points stand in the frames of the two bodies, so that they follow them. Points that are
 found again keep their forces and where they stuck.
+
+Names in all functions of rigid contact: e is an entry, a pair's place in its row; p and q are the parts of its owner
+and its partner, a and b the slots of their bodies, i and j where these stand in `RigidState`; o is a point.
 """
 
 import warp as wp

@@ -223,21 +223,29 @@ def keep_within(parts: Parts, p: int):
 
 
 @wp.func
-def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int, dt: float, down: float):
-    """Find the entry's points anew where that is due."""
-    q = c.partner[e]
+def margin_for(s: RigidState, parts: Parts, world: int, p: int, q: int, away: wp.vec3, dt: float, down: float):
+    """Up to how far apart two parts may touch within the substep [m]; ``away`` is from q's body to p's [m]."""
     a = parts.slot[p]
     b = parts.slot[q]
     i = world * s.capacity + a
     j = world * s.capacity + b
     speed = moves(s, i, a) * (wp.length(s.velocity[i]) + parts.radius[p] * wp.length(s.spin[i]))
     # a partner's spin counts where the owner is
-    away = s.position[i] - s.position[j]
     far = wp.min(wp.length(away) + parts.radius[p], parts.radius[q] + wp.length(parts.place[q]))
     speed = speed + moves(s, j, b) * (wp.length(s.velocity[j]) + far * wp.length(s.spin[j]))
     margin = NEAR + 1.25 * dt * (speed + down * dt)
+    return wp.min(margin, 0.1 * parts.smallest[p] + 1.25 * dt * (speed + down * dt))
+
+
+@wp.func
+def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int, dt: float, down: float):
+    """Find the entry's points anew where that is due."""
+    q = c.partner[e]
+    i = world * s.capacity + parts.slot[p]
+    j = world * s.capacity + parts.slot[q]
+    away = s.position[i] - s.position[j]
+    margin = margin_for(s, parts, world, p, q, away, dt, down)
     kept = keep_within(parts, p)
-    margin = wp.min(margin, 0.1 * parts.smallest[p] + 1.25 * dt * (speed + down * dt))
     qa = s.rotation[i] * parts.turn[p]
     qb = s.rotation[j] * parts.turn[q]
     x = away + wp.quat_rotate(s.rotation[i], parts.place[p]) - wp.quat_rotate(s.rotation[j], parts.place[q])
