@@ -3,6 +3,7 @@
 import json
 import time
 
+import numpy as np
 from websockets.sync.client import connect
 
 PATIENCE = 10.0
@@ -34,3 +35,33 @@ def until(condition):
     while not condition():
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.002)
+
+
+def advance(client, duration=0.1, heard=None):
+    """Let time pass, and return the answer: proof that the simulation goes on. What comes before it goes to a list."""
+    nanosec = round(1e9 * duration)
+    client.say({
+        "op": "call_service", "id": "go on", "service": "/simulation/advance",
+        "args": {"duration": {"sec": nanosec // 10**9, "nanosec": nanosec % 10**9}},
+    })  # fmt: skip
+    while (message := client.hear()).get("id") != "go on":
+        if heard is not None:
+            heard.append(message)
+    return message
+
+
+def goal(robot, controller="larm_controller", seconds=1, change=0.2, **message):
+    """A goal of one point, as a client sends it."""
+    joints = robot.controller_param_table[controller][0]["joint_names"]
+    positions = [robot.angles[joint] + change for joint in joints]
+    point = {"positions": positions, "time_from_start": {"sec": seconds, "nanosec": 0}}
+    return {
+        "op": "send_action_goal", "id": "g", "action": f"/{controller}/follow_joint_trajectory",
+        "action_type": "control_msgs/action/FollowJointTrajectory", "feedback": True,
+        "args": {"trajectory": {"joint_names": joints, "points": [point]}},
+    } | message  # fmt: skip
+
+
+def angles(robot, controller="larm_controller"):
+    """Where a controller's joints are."""
+    return np.array([robot.angles[joint] for joint in robot.controller_param_table[controller][0]["joint_names"]])
