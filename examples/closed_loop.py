@@ -11,6 +11,7 @@ import numpy as np
 
 import nuno
 from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.tasks.onlooker import onlooker
 from nuno.tasks.pick_towel import TowelPicker
 from nuno.tasks.towel_room import TABLE, make_room
 
@@ -42,12 +43,7 @@ assert miss < 0.01 and apart.mean() < 0.03, "half of a step of the grid"
 if len(sys.argv) > 3:
     import matplotlib.pyplot as plt
 
-    eye, middle = np.array((1.75, 1.0, 1.5)), np.array((0.45, 0.0, 0.95))
-    ahead = (middle - eye) / np.linalg.norm(middle - eye)
-    right = np.cross(ahead, (0, 0, 1)) / np.linalg.norm(np.cross(ahead, (0, 0, 1)))
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = np.stack([right, np.cross(ahead, right), ahead], axis=1), eye
-    camera = nuno.Camera(640, 480, 640, 640, 319.5, 239.5, camera_to_world=pose)
+    camera = onlooker((1.75, 1.0, 1.5), (0.45, 0.0, 0.95), 640, 480, 640.0)
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), layout="constrained")
     imagined = talos.world.masks(talos.cameras.camera("head_left"), towel).numpy()
     for ax, title, image in (

@@ -9,6 +9,7 @@ import numpy as np
 from nuno.bodies import mesh
 from nuno.camera.camera import Camera
 from nuno.color import rgb
+from nuno.tasks.onlooker import onlooker
 from nuno.world import World
 
 if TYPE_CHECKING:
@@ -92,19 +93,9 @@ def picture(robot: Humanoid, q: np.ndarray, vertices: np.ndarray, faces: np.ndar
     world.add(mesh((vertices, faces), color=MAT))
     colours = np.array([*(rgb(body.color) for body in world.bodies), (0.0, 0.0, 0.0)])
     colours[:-2] = 0.35 + 0.55 * colours[:-2]  # Talos' black parts would be flat spots
-    camera = _camera()
+    camera = onlooker(EYE, AIM, WIDTH, HEIGHT, FOCAL)
     depth, ids = world.depth(camera).numpy(), world.ids(camera).numpy()
     return _shaded(camera, depth, ids, colours)
-
-
-def _camera() -> Camera:
-    ahead = (AIM - EYE) / np.linalg.norm(AIM - EYE)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(ahead, right), ahead], axis=1)
-    pose[:3, 3] = EYE
-    return Camera(WIDTH, HEIGHT, FOCAL, FOCAL, 0.5 * WIDTH, 0.5 * HEIGHT, camera_to_world=pose)
 
 
 def _shaded(camera: Camera, depth: np.ndarray, ids: np.ndarray, colours: np.ndarray) -> np.ndarray:

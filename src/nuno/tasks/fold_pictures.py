@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.camera.camera import Camera
 from nuno.robot.head_cameras import HeadCameras
 from nuno.robot.simulated_robot import SimulatedRobot
 from nuno.robot.support import standing_place
+from nuno.tasks.onlooker import onlooker
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,13 +42,7 @@ class FoldPictures:
         middle = np.asarray(cloth.vertices).mean(axis=0)
         c, s = math.cos(yaw), math.sin(yaw)
         eye = middle + np.array((c * AHEAD - s * ASIDE, s * AHEAD + c * ASIDE, OVER))
-        z = middle + np.array((0.0, 0.0, LIFTED)) - eye
-        z /= np.linalg.norm(z)
-        x = np.cross(z, (0.0, 0.0, 1.0))
-        x /= np.linalg.norm(x)
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = np.stack([x, np.cross(z, x), z], axis=1), eye
-        self.camera = Camera(WIDTH, HEIGHT, FOCAL, FOCAL, 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1), pose)
+        self.camera = onlooker(eye, middle + np.array((0.0, 0.0, LIFTED)), WIDTH, HEIGHT, FOCAL)
         self.pictures: dict[str, np.ndarray] = {}
 
     def __call__(self, moment: str) -> None:
