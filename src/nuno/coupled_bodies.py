@@ -70,7 +70,6 @@ class CoupledBodies:
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
-        self._slots = slots
         self.coupling = Coupling(solvers, rigid, slots, elements, self._make_ties(), self._make_holds())
 
     def is_current(self) -> bool:
