@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from matching import inner_faces_match
 
-from nuno.mesh.tetrahedra import FACES, FIVE, boundary_faces, box_tetrahedra, inner_faces_match, volumes
+from nuno.mesh.tetrahedra import FACES, FIVE, boundary_faces, box_tetrahedra, volumes
 
 CELLS = [(1, 1, 1), (2, 1, 1), (1, 3, 2), (3, 4, 5)]
 

@@ -15,6 +15,7 @@ def test_the_least_squeeze_is_coulombs(mu):
     assert found.closed_form == pytest.approx(0.2 * 9.81 / (2.0 * mu))
     assert found.least_force == pytest.approx(found.closed_form, rel=0.1)
     first = int(np.flatnonzero(found.held)[0])
+    assert found.least_squeeze == found.squeezes[first] and found.least_force == found.forces[first]
     assert 0 < first and found.held[first:].all()  # one threshold, below which all are dropped
     assert (found.sunk[:first] > 0.05).all()  # on the floor, while the hands rose by 0.06 m
     assert np.isnan(found.forces[:first]).all()

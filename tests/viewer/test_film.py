@@ -132,11 +132,12 @@ def test_the_file_needs_nothing_else(tmp_path):
     """No address is loaded; what the scripts' licences ask for is in it; it is as small as is said."""
     world = make_world()
     with Viewer(world) as viewer, viewer.record(tmp_path / "film.html") as film:
+        assert film.is_recording
         world.run(2.0)
     page = (tmp_path / "film.html").read_text()
     assert "src=" not in page.split("<!--\n")[0] and "WebSocket" in page
     assert "Copyright 2010-2021 Three.js Authors" in page and "Robin Deits" in page
-    assert len(film) == 61
+    assert not film.is_recording and len(film) == 61
     # 0.86 MB of it are meshcat's page; the rest is mostly 61 frames of 49 vertices
     assert len(page) < 1.0e6
     assert "srcdoc" in film._repr_html_()

@@ -98,13 +98,3 @@ def volumes(vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """Return (..., m) [m3], negative where a tetrahedron is inside out, of vertices (..., n, 3) [m]."""
     a, b, c, d = (vertices[..., tets[:, corner], :] for corner in range(4))
     return np.einsum("...x,...x->...", np.cross(b - a, c - a), d - a) / 6.0
-
-
-def inner_faces_match(tets: np.ndarray) -> bool:
-    """Return whether every face belongs to one tetrahedron, or to two that see it from its two sides."""
-    faces = tets[:, FACES].reshape(-1, 3).astype(np.int64)
-    # Turned so that the smallest index is first, a face is the same in both only if seen from the same side.
-    turned = np.take_along_axis(faces, (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    _, seen = np.unique(turned, axis=0, return_counts=True)
-    _, shared = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
-    return bool(seen.max() == 1 and shared.max() <= 2)

@@ -29,7 +29,6 @@ STRING = "std_msgs/msg/String"
 FOLLOW = "control_msgs/action/FollowJointTrajectory"
 GRIPPER = "control_msgs/action/GripperCommand"
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
-LIST_CONTROLLERS = "controller_manager_msgs/srv/ListControllers"
 ADVANCE = "nuno_msgs/srv/Advance"
 GO_VELOCITY = "nuno_msgs/action/GoVelocity"
 
