@@ -208,6 +208,35 @@ def test_images_of_a_plain_cloth_change_nothing(small, seen):
     np.testing.assert_array_equal(masks.scores, small.scores)
 
 
+def test_a_sure_answer_ends_the_stages(small, seen):
+    """Once a candidate is as likely as `sure`, later stages are left out, bit for bit; 1 runs them all."""
+    stages = [QUICK, replace(QUICK, spread=SPREAD[1:3], best=3)]
+    given = options(seen, candidates=(3, 2), discretisations=stages)
+    early = nuno.estimate_pick(None, None, **given, sure=small.confidence)
+    np.testing.assert_array_equal(early.scores, small.scores)
+    late = nuno.estimate_pick(None, None, **given, sure=1.0)
+    looked = late.scores != small.scores
+    assert looked.sum() == 3 and looked[small.order[:3]].all()
+
+
+def test_a_doubtful_answer_says_how_likely_it_is(small):
+    """Below `LOW_CONFIDENCE` the warning gives the probability of the answer and names the next; above it says none."""
+    scores = np.full(6, -50.0)
+    scores[[4, 1, 3]] = np.log((0.6, 0.3, 0.1))
+    order = np.argsort(-scores, kind="stable")
+    doubtful = replace(small, scores=scores, order=order)
+    assert doubtful.confidence == pytest.approx(0.6)
+    (warning,) = doubtful.warnings
+    assert (
+        warning == "low confidence: (2, 0) is right with a probability of 60 %, (0, 1) with 30 % and (1, 1) with 10 %"
+    )
+    assert not replace(small, scores=np.where(scores > -1, scores, -50.0), order=order).warnings
+    other = replace(
+        small, scores=np.array((0.9, 0.5, 0.5, 0.89, 0.1, 0.1)), score_name="iou", order=np.array([0, 3, 1, 2, 4, 5])
+    )
+    assert "(1, 1)" in other.warnings[0] and "almost as well" in other.warnings[0]
+
+
 @pytest.mark.parametrize(("score", "name"), [("iou", "iou"), ("eq1", "eq1")])
 def test_other_scores(score, name, result, seen):
     """They rank by another measure; the paper's is what eq1 reports."""
@@ -254,6 +283,7 @@ BAD = {
     "an unknown score": (dict(score="best"), InvalidInputError, "chamfer"),
     "no mesh": (dict(discretisations=[]), InvalidInputError, "discretisation"),
     "no turn of 0": (dict(turns=(0.1,)), InvalidInputError, "turns"),
+    "sure beyond all doubt": (dict(sure=1.5), InvalidInputError, "sure"),
     "no such device": (dict(device="gpu"), InvalidInputError, "device"),
     "a camera without entries": (dict(camera={}), InvalidInputError, "width"),
     "a table of nan": (dict(table_height=np.nan), InvalidInputError, "table_height"),

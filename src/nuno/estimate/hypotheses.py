@@ -68,27 +68,39 @@ def spread(
 SPREAD = spread(1000.0, 300.0)
 """Guesses for a mesh of one's own choice."""
 
+LIMP = (5e-6, 3e-5, 1e-4, 3e-4, 1e-3)
+"""[N m] Lower ones, for coarse meshes that give in their plane: they stay open longer than a real cloth."""
+
 FIRM = spread(1000.0, 40.0)
 """Guesses for a coarse mesh."""
+LOOSE = spread(150.0, 15.0, LIMP)
+"""Guesses at a cloth that gives in its plane, for a coarse mesh.
+
+A coarse mesh that hardly stretches cannot fold in two directions at once and holds a lifted cloth open. One that gives
+falls into pleats, as a limp cloth on a finer mesh does (docs/accuracy.md).
+"""
+SHEARING = spread(1000.0, 10.0, LIMP)
+"""Guesses at a cloth that gives on the bias alone, for a coarse mesh."""
 
 
-def loose(*rigidities: float) -> tuple[Hypothesis, ...]:
-    """Guesses at a cloth that gives in its plane, for a coarse mesh.
-
-    A coarse mesh that hardly stretches cannot fold in two directions at once and holds a lifted cloth open. One that
-    gives falls into pleats, as a limp cloth on a finer mesh does (docs/performance.md).
-    """
-    return spread(150.0, 15.0, rigidities)
+def _some(guesses: tuple[Hypothesis, ...], *indices: int) -> tuple[Hypothesis, ...]:
+    return tuple(guesses[k] for k in indices)
 
 
 DISCRETISATIONS = (
-    Discretisation(20, 14, FIRM[::2] + loose(1e-4, 1e-3)),
-    Discretisation(20, 14, FIRM[1::2] + loose(5e-6, 3e-5, 3e-4), best=8),
-    Discretisation(25, 20, spread(3000.0, 1200.0), best=4),
+    Discretisation(20, 14, _some(FIRM, 1, 8) + _some(LOOSE, 3, 6)),
+    Discretisation(20, 14, _some(FIRM, 0, 2, 4, 6) + _some(LOOSE, 2, 4, 7, 9), best=12),
+    Discretisation(20, 14, _some(FIRM, 3, 5, 7, 9) + _some(LOOSE, 0, 1, 5, 8), best=8),
+    Discretisation(25, 20, spread(3000.0, 1200.0), best=6),
+    Discretisation(20, 14, SHEARING, best=6),
 )
-"""Half of the guesses at firm and loose coarse cloths tell for every candidate, the other half for the best, and a
-finer and stiffer weave for the best of these. How a lifted cloth buckles depends on how it stretches and shears and on
-the mesh: those that differ in all three had more right answers than any one (docs/performance.md)."""
+"""Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).
+
+Four guesses that differ as far as they may, firm and loose, limp and stiff, slippery and not, look at every candidate;
+the others of both kinds at the best, and a finer and stiffer weave and one that shears at the best of these. How a
+lifted cloth buckles depends on how it stretches and shears and on the mesh: those that differ in all three had more
+right answers than any one (docs/accuracy.md).
+"""
 
 
 def cell_counts(long_m: float, short_m: float, cells: int, grid: tuple[int, int]) -> tuple[int, int]:

@@ -26,7 +26,7 @@ from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
-from nuno.estimate.ranking import EVIDENCE, RANKINGS, Comparison, rank
+from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
 from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
 from nuno.estimate.turns import TURNS, checked_turns
 from nuno.progress import with_bar, with_clock
@@ -61,6 +61,7 @@ def estimate_pick(
     hint: ArrayLike | None = None,
     rectangle: ClothRectangle | None = None,
     discretisations: Sequence[Discretisation] = DISCRETISATIONS,
+    sure: float = SURE,
     turns: Sequence[float] = TURNS,
     score: str = "evidence",
     device: str = "auto",
@@ -97,6 +98,7 @@ def estimate_pick(
         rectangle: The cloth before, instead of measuring it.
         discretisations: Meshes, steps and guesses at the material, in the order in which they are run; the first
             one must look at all candidates.
+        sure: The rest of them is left out once a candidate is as likely as this, where evidence ranks; 1 runs all.
         turns: Angles [rad] about the hand's vertical by which every future is turned to be compared, 0 among them;
             "chamfer", "iou" and "eq1" look at 0 only.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
@@ -125,6 +127,7 @@ def estimate_pick(
     labels, uv, grid = _candidates(candidates)
     number("rest_height", rest_height, above=0.0)
     number("lift_seconds", lift_seconds, above=0.0)
+    number("sure", sure, above=0.0, high=1.0)
     if score not in RANKINGS:
         raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
     if not discretisations or discretisations[0].best is not None:
@@ -164,11 +167,12 @@ def estimate_pick(
     seconds["imagine"] = seconds["compare"] = 0.0
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
+    ranked: Ranked | None = None
     for discretisation in with_bar(discretisations, "imagining", progress, "mesh"):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
-        if comparisons and discretisation.best is not None:
-            chosen = np.sort(rank(comparisons, score, len(uv)).order[: discretisation.best])
+        if ranked is not None and discretisation.best is not None:
+            chosen = np.sort(ranked.order[: discretisation.best])
         futures = imagine_picks(
             rectangle, uv[chosen], grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
             device=device, lift_seconds=lift_seconds,
@@ -187,8 +191,11 @@ def estimate_pick(
             None if seen.pattern is None else values["pattern"],
         ))  # fmt: skip
         batches.append(futures)
+        ranked = rank(comparisons, score, len(uv))
         seconds["compare"] += time.perf_counter() - clock
-    ranked = rank(comparisons, score, len(uv))
+        if ranked.settled(sure):
+            break
+    assert ranked is not None
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
     clock = time.perf_counter()

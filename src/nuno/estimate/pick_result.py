@@ -13,7 +13,7 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
-from nuno.estimate.ranking import confidence
+from nuno.estimate.ranking import confidence, probabilities
 from nuno.estimate.similarity import Silhouette
 from nuno.estimate.turns import turn
 from nuno.shape import Plane
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 WORST = -1.0e9
 
-LOW_CONFIDENCE = 0.5
-"""Of 60 cases made for choosing, in two looks each, 9 of the 23 below this were right, 86 of the 97 above."""
+LOW_CONFIDENCE = 0.8
+"""Below this an answer carries a warning: above it about 1 of 20 is wrong (docs/accuracy.md)."""
 
 
 @dataclass(eq=False)
@@ -91,23 +91,38 @@ class PickResult:
 
     @property
     def confidence(self) -> float:
-        """How much worse the second is, from 0 (as good) to 1; see `nuno.estimate.ranking.confidence`."""
-        finite = [int(k) for k in self.order if np.isfinite(self.scores[k])]
-        if len(finite) < 2:
-            return 1.0
-        return confidence(self.score_name, float(self.scores[finite[0]]), float(self.scores[finite[1]]))
+        """The probability of the best candidate where evidence ranks, from 0 to 1.
+
+        Other scores tell no probability: there it is how much worse the second is, see
+        `nuno.estimate.ranking.confidence`.
+        """
+        return confidence(self.score_name, self.scores)
+
+    @property
+    def probabilities(self) -> np.ndarray | None:
+        """(k,) float by candidate, how likely each is; None where something else than evidence ranks."""
+        return probabilities(self.score_name, self.scores)
 
     @cached_property
     def warnings(self) -> list[str]:
         """What a reader of the answer should know, in plain words."""
         found = [*self.rectangle.warnings, *self.seen_warnings]
         if self.confidence < LOW_CONFIDENCE:
-            second = self._label(int(self.order[1]))
-            found.append(
-                f"low confidence: {second} explains the image almost as well as {self.best} "
-                f"(confidence {self.confidence:.2f}, usual is above {LOW_CONFIDENCE})"
-            )
+            found.append(self._doubt())
         return found
+
+    def _doubt(self) -> str:
+        """What else the answer might be, in words."""
+        others = [int(k) for k in self.order[1:3]]
+        likely = self.probabilities
+        if likely is None:
+            second = self._label(others[0])
+            return (
+                f"low confidence: {second} explains the image almost as well as {self.best} "
+                f"(confidence {self.confidence:.2f})"
+            )
+        listed = " and ".join(f"{self._label(k)} with {100.0 * likely[k]:.0f} %" for k in others)
+        return f"low confidence: {self.best} is right with a probability of {100.0 * self.confidence:.0f} %, {listed}"
 
     @property
     def world(self) -> World:
@@ -138,6 +153,7 @@ class PickResult:
 
     def to_dict(self) -> dict[str, Any]:
         """The answer as plain data, as it is written to result.json."""
+        likely = self.probabilities
         return {
             "format": 1,
             "pick": list(self.best),
@@ -145,6 +161,7 @@ class PickResult:
             "ranking": [[i, j, max(score, WORST)] for i, j, score in self.ranking],
             "score_name": self.score_name,
             "eq1": [float(self.eq1[k]) for k in self.order],
+            "probabilities": None if likely is None else [float(likely[k]) for k in self.order],
             "confidence": self.confidence,
             "turn_rad": self.turn,
             "warnings": self.warnings,

@@ -7,7 +7,7 @@ likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a consta
 heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
 independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
-(docs/performance.md).
+(docs/accuracy.md).
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ OVERLAP_WEIGHT = 10.0
 PATTERN_WEIGHT = 25.0
 EVIDENCE = ("evidence", "silhouette")
 """The rankings that average over guesses and turns."""
+SURE = 0.95
+"""A candidate as likely as this after some of the guesses stayed the best one after all, in all cases made for choosing
+(docs/accuracy.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +88,17 @@ class Ranked:
         """(k,) int, candidates from best to worst."""
         return np.argsort(-self.scores, kind="stable")
 
+    def settled(self, sure: float) -> bool:
+        """Whether one candidate is as likely as ``sure``, which is below 1, so that no more guesses are needed."""
+        likely = probabilities(self.name, self.scores)
+        return sure < 1.0 and likely is not None and bool(likely.max() >= sure)
+
 
 def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
     """Combine the comparisons of all meshes.
 
-    The evidence of a candidate that a mesh did not look at takes a likelihood of zero from it: such a mesh looks at
-    the best only, and the others stay behind them. The other scores take the best guess of each mesh and average
-    over the meshes that looked at the candidate.
+    The evidence of a candidate is the mean likelihood over all guesses that looked at it. The other scores take the
+    best guess of each mesh and average over the meshes that looked at the candidate.
 
     Args:
         comparisons: One for each mesh.
@@ -99,7 +106,7 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
         count: Number of candidates.
     """
     looked, similar = np.zeros(count), np.zeros(count)
-    total, guesses = np.zeros(count), 0
+    total, guesses = np.zeros(count), np.zeros(count)
     errors = np.zeros(count)
     # scaled by the best of all, for exp would underflow far from it
     kind = score if score in EVIDENCE else "evidence"
@@ -109,7 +116,7 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
         at = comparison.candidates
         looked[at] += 1
         similar[at] += 1.0 - np.minimum(comparison.error("eq1").min(axis=(0, 1)), 1.0)
-        guesses += len(comparison.finite)
+        guesses[at] += len(comparison.finite)
         total[at] += np.exp(offset - comparison.error(kind)).sum(axis=(0, 1))
         errors[at] += comparison.error(score).min(axis=(0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -123,12 +130,34 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
         return Ranked(score, 1.0 - mean, similar / looked)
 
 
-def confidence(name: str, first: float, second: float) -> float:
-    """How much worse the second candidate is, from 0 (as good) to 1.
+def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:
+    """How likely each candidate is by its log evidence, all being alike before: (k,) float that add up to 1.
 
-    For the evidence it is 1 - the ratio of both candidates' likelihoods, else 1 - the ratio of their errors.
+    Args:
+        name: What the scores are, see `Ranked`: None is returned where they are no evidence.
+        scores: (k,) float, higher is better; -inf where there is none. None is returned where there is none at all.
     """
-    if name.startswith("log_evidence"):
-        return float(1.0 - np.exp(min(second - first, 0.0)))
-    a, b = (-first, -second) if name == "negative_chamfer_px" else (1.0 - first, 1.0 - second)
+    if not name.startswith("log_evidence") or not np.isfinite(scores).any():
+        return None
+    likely = np.exp(scores - scores.max())
+    return np.asarray(likely / likely.sum())
+
+
+def confidence(name: str, scores: np.ndarray) -> float:
+    """How far the best candidate may be trusted, from 0 to 1.
+
+    For the evidence it is the probability of the best candidate, else 1 - the ratio of the errors of the best and the
+    second: 0 where they are equal. 1 where there is no second.
+
+    Args:
+        name: What the scores are, see `Ranked`.
+        scores: (k,) float, higher is better; -inf where there is none.
+    """
+    likely = probabilities(name, scores)
+    if likely is not None:
+        return float(likely.max())
+    finite = np.sort(scores[np.isfinite(scores)])[::-1]
+    if len(finite) < 2:
+        return 1.0
+    a, b = -finite[:2] if name == "negative_chamfer_px" else 1.0 - finite[:2]
     return float(np.clip(1.0 - a / b, 0.0, 1.0)) if b > 0 else 0.0

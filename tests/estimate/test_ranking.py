@@ -1,0 +1,54 @@
+"""From comparisons to a ranking: what the evidence, the probabilities and the confidence are."""
+
+import numpy as np
+import pytest
+
+from nuno.estimate.ranking import Comparison, confidence, probabilities, rank
+
+
+def looked_at(candidates, chamfer):
+    """One unturned guess or more (guesses, c) at some candidates whose overlap is perfect."""
+    chamfer = np.atleast_2d(np.asarray(chamfer, dtype=float))[None]
+    return Comparison(
+        np.asarray(candidates), np.zeros(1), chamfer, np.ones_like(chamfer), 1 - chamfer / 100,
+        np.ones(chamfer.shape[1:], dtype=bool),
+    )  # fmt: skip
+
+
+def test_the_evidence_is_the_mean_over_the_guesses_that_looked():
+    """Likelihood 1 / (1 + chamfer)^5; a candidate that a stage passed over keeps the mean of those before."""
+    first = looked_at([0, 1, 2], [[0.0, 1.0, 3.0], [1.0, 1.0, 3.0]])
+    second = looked_at([0, 1], [[3.0, 0.0]])
+    expected = [(1 + 2.0**-5 + 4.0**-5) / 3, (2.0**-5 + 2.0**-5 + 1) / 3, 4.0**-5]
+    np.testing.assert_allclose(np.exp(rank([first, second], "evidence", 3).scores), expected, rtol=1e-12)
+
+
+def test_probabilities_are_shares_of_the_evidence():
+    """They add up to 1 and are in proportion to the mean likelihoods; one without a finite future gets 0."""
+    scores = np.log([0.5, 0.25, 1.25, 0.0 + 1e-300]) - 4000.0  # far below what exp can hold
+    scores[3] = -np.inf
+    np.testing.assert_allclose(probabilities("log_evidence", scores), (0.25, 0.125, 0.625, 0.0), rtol=1e-12)
+    assert confidence("log_evidence_with_pattern", scores) == pytest.approx(0.625, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["negative_chamfer_px", "iou", "eq1"])
+def test_other_scores_tell_no_probability(name):
+    """The confidence is 1 - the ratio of the best and the second error then, here 2 and 8 px or their hundredths."""
+    scores = {"negative_chamfer_px": np.array((-8.0, -2.0, -9.0))}.get(name, np.array((0.92, 0.98, 0.91)))
+    assert probabilities(name, scores) is None
+    assert confidence(name, scores) == pytest.approx(0.75, rel=1e-9)
+
+
+def test_nothing_finite_has_no_probability():
+    """Without a single finite future there is nothing to share out, and no second to compare with."""
+    assert probabilities("log_evidence", np.full(3, -np.inf)) is None
+    assert confidence("log_evidence", np.full(3, -np.inf)) == 1.0
+
+
+def test_a_ranking_is_settled_by_a_sure_candidate():
+    """By likelihoods of 1 and 2^-5 the first has 0.97; 1 asks for all stages, and other scores are never settled."""
+    comparisons = [looked_at([0, 1], [0.0, 1.0])]
+    ranked = rank(comparisons, "evidence", 2)
+    assert ranked.settled(0.96) and not ranked.settled(0.98)
+    assert not ranked.settled(1.0)
+    assert not rank(comparisons, "chamfer", 2).settled(0.01)
