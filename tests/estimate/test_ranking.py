@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nuno.estimate.ranking import Comparison, confidence, probabilities, rank
+from nuno.estimate.ranking import Comparison, Ranked, confidence, probabilities, rank
 
 
 def looked_at(candidates, chamfer):
@@ -52,3 +52,15 @@ def test_a_ranking_is_settled_by_a_sure_candidate():
     assert ranked.settled(0.96) and not ranked.settled(0.98)
     assert not ranked.settled(1.0)
     assert not rank(comparisons, "chamfer", 2).settled(0.01)
+
+
+def test_what_is_plausible_holds_most_of_the_probability():
+    """97 % of it, in two candidates at least and in no more than are asked for; other scores tell no probability."""
+    flat = Ranked("log_evidence", np.log([0.3, 0.1, 0.5, 0.05, 0.05]), np.zeros(5))
+    assert list(flat.plausible(9)) == [0, 1, 2, 3, 4]
+    assert list(flat.plausible(3)) == [0, 1, 2]
+    steep = Ranked("log_evidence", np.log([0.25, 0.73, 0.01, 0.01]), np.zeros(4))
+    assert list(steep.plausible(4)) == [0, 1]
+    sure = Ranked("log_evidence", np.log([0.01, 0.98, 0.01]), np.zeros(3))
+    assert list(sure.plausible(3)) == [0, 1]
+    assert list(Ranked("iou", np.array((0.9, 0.1, 0.8)), np.zeros(3)).plausible(2)) == [0, 2]

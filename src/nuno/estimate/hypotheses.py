@@ -39,7 +39,8 @@ class Discretisation:
             that candidates are vertices.
         substeps: Substeps per 1/60 s.
         spread: The hypotheses that are run on it.
-        best: It looks at so many of the candidates that are best so far; None is all.
+        best: It looks at so many of the candidates that are best so far at most, and at no more than are plausible
+            (`nuno.estimate.ranking.SHARE`); None is all.
     """
 
     cells: int
@@ -89,8 +90,8 @@ def _some(guesses: tuple[Hypothesis, ...], *indices: int) -> tuple[Hypothesis, .
 
 DISCRETISATIONS = (
     Discretisation(20, 14, _some(FIRM, 1, 8) + _some(LOOSE, 3, 6)),
-    Discretisation(20, 14, _some(FIRM, 0, 2, 4, 6) + _some(LOOSE, 2, 4, 7, 9), best=12),
-    Discretisation(20, 14, _some(FIRM, 3, 5, 7, 9) + _some(LOOSE, 0, 1, 5, 8), best=8),
+    Discretisation(20, 14, _some(FIRM, 0, 2, 4, 6) + _some(LOOSE, 2, 4, 7, 9), best=20),
+    Discretisation(20, 14, _some(FIRM, 3, 5, 7, 9) + _some(LOOSE, 0, 1, 5, 8), best=10),
     Discretisation(25, 20, spread(3000.0, 1200.0), best=6),
     Discretisation(20, 14, SHEARING, best=6),
 )

@@ -172,7 +172,7 @@ def estimate_pick(
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
         if ranked is not None and discretisation.best is not None:
-            chosen = np.sort(ranked.order[: discretisation.best])
+            chosen = ranked.plausible(discretisation.best)
         futures = imagine_picks(
             rectangle, uv[chosen], grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
             device=device, lift_seconds=lift_seconds,

@@ -28,6 +28,8 @@ EVIDENCE = ("evidence", "silhouette")
 SURE = 0.95
 """A candidate as likely as this after some of the guesses stayed the best one after all, in all cases made for choosing
 (docs/accuracy.md)."""
+SHARE = 0.97
+"""Further guesses look at the candidates that together hold so much of the probability."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +89,19 @@ class Ranked:
     def order(self) -> np.ndarray:
         """(k,) int, candidates from best to worst."""
         return np.argsort(-self.scores, kind="stable")
+
+    def plausible(self, most: int) -> np.ndarray:
+        """The best candidates, in the order of their numbers: (m,) int.
+
+        Where evidence ranks, they are the fewest that hold `SHARE` of the probability, but two at least.
+
+        Args:
+            most: No more than so many.
+        """
+        order, likely = self.order, probabilities(self.name, self.scores)
+        if likely is not None:
+            most = min(most, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), SHARE))))
+        return np.sort(order[:most])
 
     def settled(self, sure: float) -> bool:
         """Whether one candidate is as likely as ``sure``, which is below 1, so that no more guesses are needed."""
