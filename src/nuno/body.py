@@ -123,6 +123,13 @@ class Body(Coordinates):
         return self._shape.is_solid
 
     @property
+    def missed_contacts(self) -> Any:
+        """Whether contacts of a cloth with itself were passed over, as memory ran out: a bool, in a batch (worlds,)."""
+        solver = getattr(self._dynamics, "solver", None)
+        missed = np.array(getattr(solver, "missed", np.zeros(1, dtype=bool)))
+        return missed if len(missed) > 1 else bool(missed[0])
+
+    @property
     def friction(self) -> Any:
         """Coulomb's coefficient, a number or (worlds,); ``attach`` takes the material's over."""
         return self._friction

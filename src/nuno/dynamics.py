@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from nuno.body import Body
     from nuno.simulation import Simulation
 
+
+logger = logging.getLogger(__name__)
 
 State = dict[str, np.ndarray]  # of a solver: "local" and "origin", which add up to positions, "velocities" ...
 SOON = 1e-9  # [s], below which two instants are the same
@@ -210,6 +213,19 @@ class ParticleDynamics(Dynamics):
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether all positions and velocities are finite."""
         return self.solver.finite()
+
+    def make_room(self, body: Body) -> bool:
+        """Make lists longer that were too short in the last run; return whether that must be gone through again."""
+        known, longer = bool(self.solver.missed.any()), bool(self.solver.make_room())
+        if longer:
+            logger.info("%r touches itself at more places than expected: made room for them", body.name)
+        elif not known and self.solver.missed.any():
+            logger.warning(
+                "%r touches itself at more places than there is memory for: some contacts are passed over, now and "
+                "later, and %r.missed_contacts says in which worlds; coarser or thinner cloth has fewer",
+                body.name, body.name,
+            )  # fmt: skip
+        return longer
 
 
 def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> Dynamics:

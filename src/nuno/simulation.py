@@ -22,6 +22,7 @@ from nuno.dynamics import SOON, Dynamics, ParticleDynamics, make_colliders, make
 from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
 from nuno.grip import Grip
 from nuno.motion import Schedule, arrive, convoys_of, is_led, make_schedule
+from nuno.run_start import RunStart
 from nuno.stepping import Stepping
 from nuno.validation import count, finite_array, number
 
@@ -60,6 +61,7 @@ class Simulation:
         self._led: list[Body] | None = None  # bodies that follow a path or a body that does; None: to be found anew
         self._schedule: Schedule | None = None
         self._rests = False  # whether led bodies are where they were in the frame before
+        self._told = 0.0  # [s], up to when the present run has told of itself
         self._resting: tuple[Any, ...] | None = None  # what led bodies followed when they were told to rest
         self.drivers: list[Driver] = []  # asked around every frame, such as a simulated robot
         self._background: Background | None = None
@@ -243,11 +245,13 @@ class Simulation:
 
     def _advance(
         self, duration: float, end: float | None = None, look: Callable[[float], None] | None = None,
-        instants: np.ndarray | None = None,
+        instants: np.ndarray | None = None, again: Callable[[], None] | None = None,
     ) -> None:  # fmt: skip
         """Advance everything, or leave the world as it was and raise.
 
-        ``look`` is called with the time [s] at each of ``instants`` (k,), or else at the end of each frame.
+        ``look`` is called with the time [s] at each of ``instants`` (k,), or else at the end of each frame. Where the
+        run is gone through once more, as a list of contacts was too short, ``again`` is called first and ``look``
+        anew for every instant; without ``again`` lists are looked at before each call, which is for good.
         """
         start = self._time
         finish = start + duration if end is None else end
@@ -255,33 +259,17 @@ class Simulation:
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
         self._rests = False
-        saved = [(d, d.keep()) for d in moving.values() if isinstance(d, ParticleDynamics)]
-        rigid = None if self._rigid is None else self._rigid.save()
+        before = RunStart(self, moving)
         self._bring_colliders()
         try:
-            ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
-            stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
-            now = start
-            for body, dynamics in moving.items():
-                if isinstance(dynamics, ParticleDynamics):
-                    dynamics.set_self_contact(self._rules.touches_itself(body))
-            for stop in stops:
-                if moving:
-                    self._schedule_led(now, stop - now)
-                if look is None:
-                    self._stepping.run(now, stop)
-                else:
-                    self._run_looking(now, stop, look, instants)
-                now = stop
-            for body, dynamics in moving.items():
-                finite = np.atleast_1d(dynamics.finite())
-                if not finite.all():
-                    raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
+            self._told = start
+            while not self._go_through(moving, finish, look, instants, again is None):
+                before.go_back()
+                if again is not None:
+                    self._told = start
+                    again()
         except BaseException:
-            for own, state in saved:
-                own.put_back(state)
-            if self._rigid is not None and rigid is not None:
-                self._rigid.load(rigid)
+            before.go_back()
             for driver in self.drivers:
                 driver.cancel_frame()
             raise
@@ -297,10 +285,45 @@ class Simulation:
         for watcher in tuple(self._watchers):
             watcher.seen()
 
+    def _go_through(
+        self, moving: dict[Body, Dynamics], finish: float, look: Callable[[float], None] | None,
+        instants: np.ndarray | None, careful: bool,
+    ) -> bool:  # fmt: skip
+        """Advance all bodies to ``finish`` [s]; return whether no list was too short: else all are longer now."""
+        start = now = self._time
+        ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
+        stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
+        for body, dynamics in moving.items():
+            if isinstance(dynamics, ParticleDynamics):
+                dynamics.set_self_contact(self._rules.touches_itself(body))
+        for stop in stops:
+            if moving:
+                self._schedule_led(now, stop - now)
+            if look is None:
+                self._stepping.run(now, stop)
+            elif not self._run_looking(now, stop, look, instants, careful):
+                return False
+            now = stop
+        broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
+        if self._make_room():
+            return False
+        for body, finite in broken:
+            if not finite.all():
+                raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
+        return True
+
+    def _make_room(self) -> bool:
+        """Make lists longer that were too short since this was asked last; return whether any is."""
+        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := b._dynamics, ParticleDynamics)])
+
     def _run_looking(
-        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None
-    ) -> None:
-        """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each."""
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None, careful: bool
+    ) -> bool:
+        """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each.
+
+        Returns:
+            Whether no list was too short, as far as this was looked at: ``careful``, before each instant.
+        """
         if instants is None:
             frame = 1.0 / self.frame_rate
             ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
@@ -311,7 +334,12 @@ class Simulation:
         now = time
         for end in ends.tolist():
             self._stepping.run(now, end)
-            look(end)
+            if end > self._told + SOON:
+                if careful and self._make_room():
+                    return False
+                look(end)
+                self._told = end
             now = end
         if stop - now > SOON:
             self._stepping.run(now, stop)
+        return True

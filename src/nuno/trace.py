@@ -45,6 +45,10 @@ class Trace:
             dynamics.solver.positions_on_device(self._rows[self._count])
             self._count += 1
 
+    def drop(self) -> None:
+        """Forget what was taken since the last time `take` was asked."""
+        self._told, self._count = [], 0
+
     def take(self) -> np.ndarray:
         """Return the vertices at the instants since the last time this was asked, (k, worlds, n, 3) float32 [m]."""
         if self._rows is None:
@@ -68,7 +72,7 @@ def run_traced(world: Running, body: Body, instants: np.ndarray) -> np.ndarray:
             trace.look(world.time)
         else:
             end = float(near[-1])
-            world._advance(end - world.time, end, trace.look, near)
+            world._advance(end - world.time, end, trace.look, near, trace.drop)
         found.append(trace.take())
         ahead = ahead[len(near) :]
     return np.concatenate(found)

@@ -12,7 +12,7 @@ import warp as wp
 from nuno.contact.flat_blocks import in_flat
 from nuno.contact.nearness import append, near_edges, near_triangle
 from nuno.solver.lanes import barrier, window
-from nuno.solver.state import StateFloat, Topology
+from nuno.solver.state import LEFT_OUT, StateFloat, Topology
 from nuno.solver.warps import WARP, claim, sync_warp, told
 
 BATCH, LONG_BATCH = wp.constant(8), wp.constant(24)
@@ -210,6 +210,8 @@ def search_batch(t: StateFloat, topo: Topology, far: float, first: int, last: in
         # what has no room behind others is noted once more when they are out of the way, at last by itself
         fits = (noted & 0xFFFF) <= half and (noted >> 16) <= half
         if fits or (counts == 0 and together == 1):
+            if not fits and thread % WARP == 0:
+                wp.atomic_max(t.pair_count, LEFT_OUT, wp.max(noted & 0xFFFF, noted >> 16))
             counts = noted
             k += together
             together = TOGETHER

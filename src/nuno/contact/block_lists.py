@@ -9,7 +9,7 @@ import warp as wp
 
 from nuno.contact.nearness import GROUP, raise_to
 from nuno.solver.lanes import barrier, window
-from nuno.solver.state import THICKNESS, StateFloat, Topology
+from nuno.solver.state import MANY_BLOCKS, THICKNESS, StateFloat, Topology
 from nuno.solver.warps import WARP, claim, lowest
 
 WIDE = wp.constant(5.0)
@@ -154,6 +154,8 @@ def list_blocks(t: StateFloat, topo: Topology, margin: float, thread: int, threa
             count = -1
     if thread == 0:
         t.near_blocks[0] = wp.min(count, room)
+        if count > room:
+            t.pair_count[MANY_BLOCKS] = wp.max(t.pair_count[MANY_BLOCKS], count)
         t.listed[3 * topo.particles + GONE] = 0.0
         t.listed[3 * topo.particles + WIDTH] = width
     barrier(threads)

@@ -7,7 +7,7 @@ from nuno.contact.block_lists import GONE, WIDTH, closed_in, list_blocks, measur
 from nuno.contact.flat_blocks import forget_flat, mark_flat, mark_uncreased
 from nuno.contact.helping import find_with_help
 from nuno.contact.nearness import bound_blocks, middles
-from nuno.contact.pair_lists import FORGET, find_creases, pick_touching, swept
+from nuno.contact.pair_lists import FORGET, begin_list, find_creases, pick_touching, swept
 from nuno.solver.lanes import barrier
 from nuno.solver.state import LISTINGS, THICKNESS, TRAVEL, Settings, StateFloat, Topology
 from nuno.solver.warps import anyone, leads_warp, most_of_warp
@@ -43,8 +43,7 @@ def find_together(t: StateFloat, topo: Topology, run: Settings, thread: int, thr
         if anyone(again or most > left):
             fresh = 1
             if thread == 0:
-                t.pair_count[0] = 0
-                t.pair_count[1] = 0
+                begin_list(t)
                 t.notes[TRAVEL] = 0.0
                 t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
                 t.listed[3 * n + GONE] = gone

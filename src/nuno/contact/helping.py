@@ -10,12 +10,13 @@ import warp as wp
 
 from nuno.contact.batches import BATCH, queue_blocks, search_batch
 from nuno.solver.lanes import barrier, window
-from nuno.solver.state import THICKNESS, Settings, Sizes, StateFloat, Topology, view
+from nuno.solver.state import COUNTS, LEFT_OUT, THICKNESS, Settings, Sizes, StateFloat, Topology, view
 from nuno.solver.warps import WARP, anyone, sync_warp, told
 
 FOUND, QUEUED = wp.constant(2), wp.constant(5)
 """Where in `State.help` the counts of listed pairs stand, and how many pairs of blocks are queued. Before them are the
-batches left and those done, between them whether the world's launch is over."""
+batches left and those done, between them whether the world's launch is over. Counts are read from place 2 on, so that
+what warps had no room for comes to stand at 6."""
 
 
 @wp.func_native("""
@@ -24,6 +25,7 @@ int* h = help.data;
 h[1] = 0;
 h[2] = first;
 h[3] = second;
+h[6] = 0;
 h[5] = queued;
 // all that the block wrote before is there for who takes a batch
 __threadfence();
@@ -122,7 +124,7 @@ def find_with_help(t: StateFloat, topo: Topology, far: float, thread: int, threa
     """List the elements of listed blocks that are nearer than ``far``, with whoever helps."""
     queued = queue_blocks(t, topo, far, thread, threads)
     own = t.pair_count
-    t.pair_count = window(t.help, FOUND, 2)
+    t.pair_count = window(t.help, FOUND, COUNTS)
     barrier(threads)
     if thread == 0:
         offer(t.help, queued, BATCH, own[0], own[1])
@@ -133,6 +135,7 @@ def find_with_help(t: StateFloat, topo: Topology, far: float, thread: int, threa
         await_all(t.help, (queued + BATCH - 1) / BATCH)
         own[0] = t.help[FOUND]
         own[1] = t.help[FOUND + 1]
+        own[LEFT_OUT] = wp.max(own[LEFT_OUT], t.help[FOUND + LEFT_OUT])
     t.pair_count = own
     barrier(threads)
 
@@ -146,7 +149,7 @@ def help_out(s: StateFloat, topo: Topology, size: Sizes, run: Settings, helper: 
     t.x = window(t.listed, 0, n)
     t.y = window(t.listed, n, n)
     t.z = window(t.listed, 2 * n, n)
-    t.pair_count = window(t.help, FOUND, 2)
+    t.pair_count = window(t.help, FOUND, COUNTS)
     t.touch_edge = window(s.help_room, helper * t.touch_edge.shape[0], t.touch_edge.shape[0])
     far = t.scalars[THICKNESS] + 1.01 * run.margin
     while anyone(thread == 0 and await_work(t.help)):

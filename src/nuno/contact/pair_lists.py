@@ -30,12 +30,29 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
     within,
 )
-from nuno.solver.state import PICK_REACH, PICKED, SPEED, THICKNESS, Settings, StateFloat, Topology
+from nuno.solver.state import (
+    MOST_LISTED,
+    PICK_REACH,
+    PICKED,
+    SPEED,
+    THICKNESS,
+    Settings,
+    StateFloat,
+    Topology,
+)
 
 PICK_AHEAD = wp.constant(1.5)
 """Substeps for which the pairs that may touch are picked, at the speed of the moment."""
 FORGET = wp.constant(1.0e8)
 """[m] A travel beyond this says that there is no list."""
+
+
+@wp.func
+def begin_list(t: StateFloat):
+    """Count anew, and keep what the last list came to: one thread's work."""
+    for k in range(2):
+        t.pair_count[MOST_LISTED + k] = wp.max(t.pair_count[MOST_LISTED + k], t.pair_count[k])
+        t.pair_count[k] = 0
 
 
 @wp.func

@@ -20,7 +20,7 @@ from nuno.contact.closing import (
 )
 from nuno.contact.flat_blocks import in_flat, mark_flat, mark_uncreased
 from nuno.contact.nearness import append, bound_blocks, middles, near_edges, near_triangle, next_place
-from nuno.contact.pair_lists import FORGET, find_creases, pick_near, swept
+from nuno.contact.pair_lists import FORGET, begin_list, find_creases, pick_near, swept
 from nuno.contact.renewal import look_ahead
 from nuno.solver.lanes import barrier, window
 from nuno.solver.state import LISTINGS, PICK_REACH, PICKED, THICKNESS, TRAVEL, Settings, StateFloat, Topology
@@ -237,8 +237,7 @@ def list_anew(t: StateFloat, topo: Topology, run: Settings, lists: Lists, world:
     """List the pairs that are nearer than the thickness and the margin, by a team."""
     if team.turn == 0:
         lists.noted[world] = 0
-        t.pair_count[0] = 0
-        t.pair_count[1] = 0
+        begin_list(t)
     # the flags of flat windows where `nuno.contact.flat_blocks` has them
     moved = t.moved
     t.moved = window(lists.flat, 2 * topo.particles * world, 2 * topo.particles)

@@ -16,7 +16,7 @@ from nuno.contact.flat_windows import survey_world
 from nuno.contact.near_lanes import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
 from nuno.contact.world_room import ROOM, bound_world, copy_world
 from nuno.scene.blocks import WINDOW
-from nuno.solver.state import Topology
+from nuno.solver.state import MOST_LISTED, Topology
 
 RANGES = 48
 """Ranges of consecutive blocks near a block that are kept apart."""
@@ -79,7 +79,11 @@ auto test_edges = [&](int count) ALONE {
     const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
     keep(hit & ((1u << count) - 1), a, b, c, d, pair_count, 1, pairs, most_pairs);
 };
-((int*)pair_count)[0] = ((int*)pair_count)[lanes] = 0;
+for (int c = 0; c < 2; ++c) {
+    int *listed = (int*)pair_count + c * lanes, *most_listed = listed + MOST_LISTED * lanes;
+    if (*listed > *most_listed) *most_listed = *listed;
+    *listed = 0;
+}
 for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
 for (int a = 0; a < blocks; ++a) {
     float low[3], high[3];
@@ -185,7 +189,9 @@ for (int k = 0; k < creases; k += 16) {
     keep(hit, a, b, c, d, pair_count, 1, pairs, most_pairs);
 }
 #endif
-""".replace("RANGES", str(RANGES)).replace("WINDOW", str(WINDOW))
+""".replace("RANGES", str(RANGES))
+    .replace("WINDOW", str(WINDOW))
+    .replace("MOST_LISTED", str(MOST_LISTED))
 )
 def search_world(
     face: wp.array(dtype=wp.vec3i),

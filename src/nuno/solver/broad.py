@@ -12,7 +12,7 @@ import warp as wp
 
 from nuno.contact.closing import box_moves, boxes, join_boxes, moves_start
 from nuno.contact.flat_blocks import mark_flat
-from nuno.contact.pair_lists import FORGET, find_creases
+from nuno.contact.pair_lists import FORGET, begin_list, find_creases
 from nuno.contact.team_listing import (
     Lists,
     keep_places,
@@ -84,8 +84,7 @@ def decide(s: StateFloat, topo: Topology, size: Sizes, run: Settings, lists: Lis
     if worst > margin_left(t, run):
         due[world] = LIST
         lists.noted[world] = 0
-        t.pair_count[0] = 0
-        t.pair_count[1] = 0
+        begin_list(t)
         t.notes[TRAVEL] = 0.0
         t.notes[PICKED] = FORGET
         t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0

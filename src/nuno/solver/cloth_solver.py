@@ -18,6 +18,7 @@ from nuno.solver.frame import run_lanes, run_worlds
 from nuno.solver.grid import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.large import LargePlan
+from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import (
     FEW_THREADS,
@@ -29,27 +30,27 @@ from nuno.solver.shared import (
 )
 from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES
 from nuno.solver.stages import divide, make_work
-from nuno.solver.state import HELP, LISTINGS, NOTES, ORIGIN, SCALARS, Settings, Sizes, StateFloat, StateLanes, Topology
+from nuno.solver.state import (
+    COUNTS,
+    HELP,
+    LISTINGS,
+    NOTES,
+    ORIGIN,
+    SCALARS,
+    TRAVEL,
+    Settings,
+    Sizes,
+    StateFloat,
+    StateLanes,
+    Topology,
+)
 from nuno.solver.substeps import default_substeps
 from nuno.solver.upload import upload
-from nuno.solver.warps import WARP
 from nuno.solver.wide import run_wide, widen_topology
 
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
-SUSPECTS = 512
-"""Pairs of elements that a warp that lists pairs can note at least: more than any two blocks of neighbouring vertices
-have."""
-PAIRS = 6, 16
-"""Room for candidates, vertex-triangle and edge-edge ones, for each vertex; those that do not fit are passed over.
-Crumpled cloths have under 3 and 8, two layers that lie on each other up to 7 and 14."""
-MORE = 4.0
-"""Times that room where memory allows: four layers have 15 and 43 candidates a vertex, many 20 and 56."""
-PAIR_BYTES = 32
-"""[B] A candidate's four vertices, among all and among those that are picked."""
-LISTS = 4.0e9
-"""[B] That the lists of all worlds may take together for this."""
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
@@ -175,13 +176,7 @@ class ClothSolver(ParticleSolver):
         alone = not self._cuda and self.plan not in LARGE
         middle = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
         size.middle = middle if self.self_contact else 1
-        least = self.world_count * n * sum(PAIRS) * PAIR_BYTES
-        room = int(min(max(LISTS / least, 1.0), MORE) * n)
-        size.vertex_triangle, size.edge_edge = PAIRS[0] * room + 64, PAIRS[1] * room + 128
-        if size.near_blocks > 1:
-            # the room in which a list is made: a queue of pairs of blocks, and each warp's suspects
-            size.vertex_triangle = max(size.vertex_triangle, -(-size.near_blocks // 4))
-            size.edge_edge = max(size.edge_edge, SUSPECTS * FEW_THREADS // WARP // 2)
+        size_lists(size, n, self.world_count)
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
         size.moved = 4 * n if self._cuda or self.plan in LARGE else 1
@@ -193,9 +188,15 @@ class ClothSolver(ParticleSolver):
         state.bounds = empty(size.blocks, self._number)
         state.listed = empty(size.listed, self._number)
         state.middle = empty(size.middle, self._number)
+        state.moved = empty(size.moved, int)
+        self._allocate_lists()
+
+    def _allocate_lists(self) -> None:
+        """Room for candidate pairs, none of them listed."""
+        state, size, empty = self._state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
         state.edge_edge = self._list(4 * size.edge_edge)
-        state.pair_count = empty(2, self._integer)
+        state.pair_count = empty(COUNTS, self._integer)
         if self.plan == "large":  # solves all listed pairs, which a whole device looks at in no time
             state.touch_triangle, state.touch_edge = state.vertex_triangle, state.edge_edge
             state.touch_count = state.pair_count
@@ -204,7 +205,7 @@ class ClothSolver(ParticleSolver):
             state.touch_edge = self._list(4 * size.edge_edge)
             state.touch_count = empty(2, self._integer)
         state.near_blocks = empty(size.near_blocks, self._integer)
-        state.moved = empty(size.moved, int)
+        self._counts = state.pair_count
         self._allocate_help()
 
     def _list(self, count: int) -> wp.array:
@@ -227,12 +228,36 @@ class ClothSolver(ParticleSolver):
     @property
     def pair_counts(self) -> np.ndarray:
         """(worlds, 2) int: listed vertex-triangle and edge-edge candidates, those that did not fit included."""
-        return self._get(self._state.pair_count, 2)
+        return self._get(self._state.pair_count, COUNTS)[:, :2]
 
     @property
     def listings(self) -> np.ndarray:
         """(worlds,) float, how often pairs were listed since the state was set."""
         return self._get(self._state.notes, NOTES)[:, LISTINGS]
+
+    def make_room(self) -> bool:
+        """Make lists longer that were too short by the last counts; return whether any is.
+
+        The run's state is then not to be used: contacts were passed over in it.
+        """
+        counts = self._get(self._state.pair_count, COUNTS) if self._counted is None else self._counted
+        self._counted = None
+        missed = find_missed(self._size, counts)
+        if not missed.any():
+            return False
+        rows = max(self.group_count, self._state.helpers)
+        longer = lengthen_lists(self._size, counts, self.group_count * self.lanes, rows, self.device)
+        if longer:
+            self._allocate_lists()
+            self._forget_launches()
+        else:
+            self.missed |= missed
+            self._state.pair_count.zero_()  # tells of what comes after this
+        # what is listed now is gone
+        notes = self._get(self._state.notes, NOTES).copy()
+        notes[:, TRAVEL] = 1.0e9
+        wp.copy(self._state.notes, self._put(notes))
+        return longer
 
     def _advance(self, run: Settings, substeps: int) -> None:
         if self.plan in LARGE:

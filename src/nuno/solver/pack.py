@@ -98,12 +98,20 @@ def find_broken(
         broken[world] = 1
 
 
-def finite_worlds(state: Any, worlds: int, n: int, device: str) -> np.ndarray:
-    """(worlds,) bool: whether every position and velocity is finite, found on the device."""
-    broken = wp.zeros(worlds, dtype=int, device=device)
+def finite_worlds(
+    state: Any, worlds: int, n: int, device: str, counts: wp.array | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """(worlds,) bool: whether every position and velocity is finite, found on the device; and (worlds, k) ``counts``.
+
+    All comes in one piece, which the device is waited for once.
+    """
+    told = wp.zeros(worlds + (0 if counts is None else counts.size), dtype=int, device=device)
     arrays = [getattr(state, name) for name in ("x", "y", "z", "vx", "vy", "vz")]
-    wp.launch(find_broken, dim=(worlds, n), inputs=[*arrays, n, broken], device=device)
-    return np.asarray(broken.numpy() == 0)
+    wp.launch(find_broken, dim=(worlds, n), inputs=[*arrays, n, told], device=device)
+    if counts is not None:
+        wp.copy(told, counts, dest_offset=worlds)
+    values = told.numpy()
+    return np.asarray(values[:worlds] == 0), None if counts is None else values[worlds:].reshape(worlds, -1)
 
 
 def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None) -> wp.array:

@@ -60,6 +60,7 @@ class ParticleSolver:
         plan: How kernels are launched.
         lanes: Worlds in a vector, 16 in a batch on the CPU and else 1.
         mass: (worlds, n) [kg].
+        missed: (worlds,) bool, where contacts of the body with itself were ever passed over for want of memory.
     """
 
     substeps: int
@@ -86,6 +87,9 @@ class ParticleSolver:
         self.group_count = -(-self.world_count // self.lanes)
         self._number: Any = lane if self.lanes > 1 else float
         self._integer: Any = lane_int if self.lanes > 1 else int
+        self.missed = np.zeros(self.world_count, dtype=bool)
+        self._counts: wp.array | None = None  # read on CUDA along with `finite`, so that nobody waits twice
+        self._counted: np.ndarray | None = None
 
     def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set the first state; nothing acts yet."""
@@ -225,11 +229,16 @@ class ParticleSolver:
 
         s, n = self._state, self.particle_count
         if self._cuda:
-            return finite_worlds(s, self.world_count, n, self.device)
+            finite, self._counted = finite_worlds(s, self.world_count, n, self.device, self._counts)
+            return finite
         arrays = (s.x, s.y, s.z, s.vx, s.vy, s.vz)
         if all(np.isfinite(a.numpy()).all() for a in arrays):  # lanes beyond the last world repeat it
             return np.ones(self.world_count, dtype=bool)
         return np.all([np.isfinite(self._get(a, n)).all(axis=1) for a in arrays], axis=0)
+
+    def make_room(self) -> bool:
+        """Make room for what did not fit in the run before, which must then be gone through again."""
+        return False
 
     def positions_on_device(self, out: wp.array | None = None) -> wp.array:
         """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy, into ``out`` if given."""

@@ -12,7 +12,7 @@ from nuno.contact.helping import help_out, send_home
 from nuno.solver.frame import advance
 from nuno.solver.lanes import barrier
 from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES, column, counts, figures, whole
-from nuno.solver.state import Settings, Shapes, Sizes, StateFloat, Topology, view
+from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFloat, Topology, view
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
@@ -34,12 +34,13 @@ def advance_block(
     scalars = t.scalars
     notes = t.notes
     t.pair_count = counts(0)
-    t.touch_count = counts(2)
+    t.touch_count = counts(COUNTS)
     t.scalars = figures(0)
     t.notes = figures(8)
     if thread == 0:
-        for k in range(2):
+        for k in range(COUNTS):
             t.pair_count[k] = listed[k]
+        for k in range(2):
             t.touch_count[k] = picked[k]
         for k in range(7):
             t.scalars[k] = scalars[k]
@@ -49,8 +50,9 @@ def advance_block(
     advance(t, topo, run, shapes, substeps, thread, threads)
     barrier(threads)
     if thread == 0:
-        for k in range(2):
+        for k in range(COUNTS):
             listed[k] = t.pair_count[k]
+        for k in range(2):
             picked[k] = t.touch_count[k]
         for k in range(6):
             notes[k] = t.notes[k]

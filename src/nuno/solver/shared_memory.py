@@ -57,14 +57,14 @@ def figures(first: int) -> wp.array(dtype=float):  # type: ignore[valid-type]
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-__shared__ int counts[4];
+__shared__ int counts[8];
 return wp::array_t<wp::int32>(counts + first, 0);
 #else
 return {};
 #endif
 """)
 def counts(first: int) -> wp.array(dtype=int):  # type: ignore[valid-type]
-    """Four counts in the block's own memory, from number ``first`` on."""
+    """Eight counts in the block's own memory, from number ``first`` on."""
     ...
 
 

@@ -17,6 +17,12 @@ TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
 PICKED, PICK_REACH = 4, 5
 NOTES = 6
 
+# Counts of candidate pairs in `State.pair_count`: vertex-triangle and edge-edge ones of the present list, the most of
+# each in an earlier list; and where there was no room for them, pairs of elements that a warp found to look at in two
+# blocks, and pairs of near blocks.
+MOST_LISTED, LEFT_OUT, MANY_BLOCKS = 2, 4, 5
+COUNTS = 6
+
 HELP = 8
 """Numbers in `State.help`: see `nuno.contact.helping`."""
 
@@ -235,7 +241,7 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.touch_triangle = window(s.touch_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
     t.touch_edge = window(s.touch_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
     t.touch_count = window(s.touch_count, group * 2, 2)
-    t.pair_count = window(s.pair_count, group * 2, 2)
+    t.pair_count = window(s.pair_count, group * COUNTS, COUNTS)
     t.moved = window(s.moved, group * size.moved, size.moved)
     t.near = window(s.near, group * size.near, size.near)
     t.help = window(s.help, group * HELP, HELP)
