@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 KINDS = {BALL: SPHERE, BLOCK: BOX, ROD: CAPSULE, DRUM: CYLINDER, HULL: SOLID_MESH}
 SKIN = 5e-4
 """[m] How far from the surface of a soft body others stay: edges that meet at no distance at all have no side."""
+PRESSED = 5e5
+"""[Pa] Young's modulus of a cloth across its thickness. Fabrics give ten times as easily, rubber as much. Between two
+hard fingers a cloth that gives nothing is held by whichever few corners and vertices happen to be nearest, by µm; one
+that gives spreads the load: between 2e5 and 1e6 Pa what holds is 2 mu N."""
 RIM_POINTS = 16
 """Corners that stand for the rim of a cylinder."""
 
@@ -59,7 +63,9 @@ class CoupledBodies:
             total += solver.particle_count
         self._meshes: list[Any] = []
         surfaces = [
-            SurfaceOfParticles(solver.particle_count, np.asarray(body.faces), _radius(body, solver), body.is_solid)
+            SurfaceOfParticles(
+                solver.particle_count, np.asarray(body.faces), *_surface_rules(body, solver), solid=body.is_solid
+            )
             for body, solver in zip(self.particles, solvers, strict=True)
         ]
         elements = make_elements(
@@ -295,6 +301,10 @@ class CoupledBodies:
         holds.turn.assign(wp.array(turns, dtype=wp.quat, device=device))
 
 
-def _radius(body: Body, solver: Any) -> np.ndarray:
-    """How far (worlds,) [m] others stay from the triangles of a cloth or a soft body."""
-    return np.asarray(np.maximum(0.5 * solver._scalars[:, THICKNESS], SKIN if body.is_solid else 0.0))
+def _surface_rules(body: Body, solver: Any) -> tuple[np.ndarray, np.ndarray]:
+    """How far (worlds,) [m] others stay from a body's triangles, and how a contact presses it together [m/N]."""
+    half = 0.5 * np.asarray(solver._scalars[:, THICKNESS])
+    if body.is_solid:  # which gives by itself
+        return np.maximum(half, SKIN), np.zeros_like(half)
+    # as half the thickness of a cell's area does
+    return half, half / (PRESSED * solver._cell_size**2)

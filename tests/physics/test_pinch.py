@@ -9,12 +9,7 @@ GRAVITY = 9.81
 FORCE = 5.0  # [N] of each finger
 
 
-CREEPS = pytest.mark.xfail(
-    strict=True, reason="fingers' corners press on cells of 10 mm, creased there: at 1.05 it slips 0.8 mm, at 1.2 4 mm"
-)
-
-
-def pinched(mu, mass, lift, duration, *, cells=16, finger=0.03, **more):
+def pinched(mu, mass, lift, duration, *, cells=16, finger=0.03, force=FORCE, **more):
     """Return the world, its cloth, its fingers and the vertex in their middle, once they have closed."""
     world = nuno.World(device="cpu")
     size = 0.16
@@ -29,7 +24,7 @@ def pinched(mu, mass, lift, duration, *, cells=16, finger=0.03, **more):
         keys = [place, place, place + np.array([0.0, 0.0, lift])]
         path = nuno.Path([0.0, 0.5, 0.5 + duration], keys, interpolation="minimum_jerk")
         world.grip(box, to=path, free=(0.0, 1.0, 0.0))
-        world.push(box, (0.0, -side * FORCE, 0.0))
+        world.push(box, (0.0, -side * force, 0.0))
         fingers.append(box)
     world.ignore_contact(*fingers)
     near = int(np.argmin(np.linalg.norm(cloth.vertices - [0.0, 0.0, 0.66], axis=1)))
@@ -54,18 +49,20 @@ def test_a_lifted_cloth_does_not_creep(seconds):
     assert cloth.vertices[:, 2].min() > low + 0.08  # it came along
 
 
-COARSE, FINE = {"cells": 16, "finger": 0.03}, {"cells": 24, "finger": 0.05}
+SIZES = {
+    "coarse": {"cells": 16, "finger": 0.03},
+    "fine": {"cells": 24, "finger": 0.05},
+    "coarsest": {"cells": 12, "finger": 0.04},
+}
 
 
-@pytest.mark.parametrize(
-    ("part", "holds", "size"),
-    [(0.95, True, COARSE), pytest.param(1.05, False, COARSE, marks=CREEPS), (0.95, True, FINE), (1.05, False, FINE)],
-)
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(("part", "holds"), [(0.95, True), (1.05, False)])
 def test_the_cloth_slips_where_it_is_too_heavy(part, holds, size):
     """Coulomb: two fingers at N hold 2 mu N; a weight of 0.95 of that stays and one of 1.05 slips."""
     mu, mass = 0.1, 2.0 * 0.1 * FORCE / GRAVITY
     world, cloth, fingers, near = pinched(
-        0.6, part * mass, lift=0.0, duration=1.0, damping=0.05, air_drag=20.0, **size
+        0.6, part * mass, lift=0.0, duration=1.0, damping=0.05, air_drag=20.0, **SIZES[size]
     )  # fmt: skip
     world.run(2.0)  # at rest at first: a cloth that swings pulls by more than its weight
     start = slip(cloth, fingers, near)
@@ -73,6 +70,21 @@ def test_the_cloth_slips_where_it_is_too_heavy(part, holds, size):
         world.set_friction(cloth, finger, mu)
     world.run(0.75)
     fallen = start[2] - slip(cloth, fingers, near)[2]
-    # free of all but 5 % of its weight it falls 0.05 / 2 * 9.81 * 0.75^2 = 0.13 m less drag; 2 mm is a slip. The fine
-    # one falls 4.9 mm and is then caught where the next row of vertices comes between the fingers
+    # free of all but 5 % of its weight it falls 0.05 / 2 * 9.81 * 0.75^2 = 0.13 m less drag; 2 mm is a slip. Coarse
+    # ones fall 4.5 to 5 mm and are then caught where the next row of vertices comes between the fingers
     assert fallen < 0.5e-3 if holds else fallen > 2e-3
+
+
+def test_a_cloth_gives_little_and_then_no_more():
+    """Pressed together by Hooke's law, 5e5 Pa across the thickness, to 95 % of its 4 mm, which then are hard."""
+    gaps = []
+    for force in (5.0, 200.0):
+        world, _, fingers, _ = pinched(0.6, 0.1, lift=0.0, duration=1.0, force=force)
+        world.run(1.0)
+        gaps.append(fingers[1].position[1] - fingers[0].position[1] - 0.02)
+    # each half gives to 9 vertices and 4 corners, each of them as the half thickness of a cell of 1 cm^2
+    softness = 0.002 / (5e5 * 0.01**2)  # [m/N]
+    # they share the force within a quarter of the mean
+    assert gaps[0] == pytest.approx(0.004 - 2.0 * softness * 5.0 / 13.0, abs=0.25 * 2.0 * softness * 5.0 / 13.0)
+    # 24 passes leave 0.04 mm at this force, also where nothing gives
+    assert 0.0038 - 0.06e-3 < gaps[1] < 0.0038

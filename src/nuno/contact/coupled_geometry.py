@@ -20,6 +20,9 @@ from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SPHERE, distance_box,
 from nuno.contact.nearness import closest_on_edges
 from nuno.solver.rigid_body import RigidState, point_before
 
+SQUEEZE = wp.constant(0.05)
+"""Share of the distance by which a cloth is pressed together at most; beyond that it is hard, and nothing comes in."""
+
 
 @wp.func
 def over_triangle(x: wp.vec3, a: wp.vec3, b: wp.vec3, c: wp.vec3):
@@ -136,6 +139,9 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
     rows.normal[r] = n
     rows.weights[r] = weights
     rows.distance[r] = wp.min(apart, gap + LEAVE_SPEED * dt)
+    of = world * elements.bodies
+    rows.soft[r] = (elements.soft[of + bodies[0]] + elements.soft[of + bodies[1]]) / (dt * dt)
+    rows.squeeze[r] = SQUEEZE * apart
     rows.friction[r] = elements.friction[(world * elements.bodies + bodies[0]) * elements.bodies + bodies[1]]
     rows.push[r] = 0.0
     rows.drag[r] = wp.vec3(0.0, 0.0, 0.0)

@@ -44,6 +44,7 @@ class Elements:
     touch: wp.array(dtype=int)
     friction: wp.array(dtype=float)
     radius: wp.array(dtype=float)
+    soft: wp.array(dtype=float)  # how far a contact presses a cloth together [m/N]
     party: wp.array(dtype=int)  # in each world, the first body of those that go together
     reach: wp.array(dtype=float)  # in each world, what bounds how far a body's contacts come in a substep [m]
     solid: wp.array(dtype=int)  # by body, whether its triangles enclose it

@@ -62,6 +62,8 @@ class Rows:
     normal: wp.array(dtype=wp.vec3)
     distance: wp.array(dtype=float)
     friction: wp.array(dtype=float)
+    soft: wp.array(dtype=float)  # how far a unit of its multiplier presses the cloth in it together [1/kg]
+    squeeze: wp.array(dtype=float)  # and how far that goes at most [m]
     push: wp.array(dtype=float)
     drag: wp.array(dtype=wp.vec3)
     # those that may touch in this substep
@@ -172,11 +174,16 @@ def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, r
 def push_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, threads: int):
     """One projection of a row along its normal; returns how far it was from where it asks to be [m]."""
     n = rows.normal[r]
-    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r]
     push = rows.push[r]
+    soft = float(rows.soft[r])
+    pressed = float(soft * push)
+    if pressed > rows.squeeze[r]:
+        pressed = rows.squeeze[r]
+        soft = 0.0
+    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r] + pressed
     wrong = wp.max(-gap, 0.0)
     if gap < 0.0 or push > 0.0:
-        more = wp.max(push - gap / row_weight(particles, rigid, first, start, rows, r, n, threads), 0.0)
+        more = wp.max(push - gap / (row_weight(particles, rigid, first, start, rows, r, n, threads) + soft), 0.0)
         rows.push[r] = more
         apply_row(particles, rigid, first, start, rows, r, n * (more - push), threads)
         if push > 0.0:

@@ -20,12 +20,14 @@ class SurfaceOfParticles:
         particles: Particles of the body, inner ones included.
         faces: (m, 3) int, their corners among the particles.
         radius: (worlds,) float [m], half the thickness.
+        soft: (worlds,) float [m/N], how far a contact presses it together.
         solid: Whether the faces enclose the body, corners anticlockwise from outside.
     """
 
     particles: int
     faces: np.ndarray
     radius: np.ndarray
+    soft: np.ndarray
     solid: bool = False
 
 
@@ -130,10 +132,10 @@ def make_elements(
     made.parts, made.points = made.part_slot.shape[0], made.point.shape[0]
     made.touch = put(touch.astype(int).ravel(), int)
     made.friction = put(friction.ravel(), float)
-    radius = np.zeros((worlds, bodies))
+    radius, soft = np.zeros((worlds, bodies)), np.zeros((worlds, bodies))
     for body, surface in enumerate(particles):
-        radius[:, body] = surface.radius
-    made.radius = put(radius.ravel(), float)
+        radius[:, body], soft[:, body] = surface.radius, surface.soft
+    made.radius, made.soft = put(radius.ravel(), float), put(soft.ravel(), float)
     made.party = wp.zeros(worlds * bodies, dtype=int, device=device)
     made.reach = wp.zeros(worlds * bodies, dtype=float, device=device)
     made.solid = put([*(surface.solid for surface in particles), *(False for _ in rigid)], int)

@@ -99,8 +99,8 @@ class Coupling:
         rows.active_count = wp.zeros(worlds, dtype=int, device=self.device)
         kinds = {
             "corners": wp.vec4i, "kind": int, "slot": int, "part": int, "bodies": wp.vec2i, "point": wp.vec3,
-            "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "push": float,
-            "drag": wp.vec3, "active": int,
+            "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "soft": float,
+            "squeeze": float, "push": float, "drag": wp.vec3, "active": int,
         }  # fmt: skip
         for name, dtype in kinds.items():
             setattr(rows, name, wp.zeros(worlds * room, dtype=dtype, device=self.device))
