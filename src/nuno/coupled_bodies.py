@@ -12,10 +12,10 @@ from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coordinates import compose
-from nuno.dynamics import ParticleDynamics
+from nuno.dynamics import ParticleDynamics, touches_itself
 from nuno.grip import Grip
 from nuno.rigid_dynamics import RigidDynamics
-from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, make_elements
+from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
 from nuno.solver.coupling import Coupling
 from nuno.solver.state import THICKNESS
 from nuno.tie import HoldSpec, TieSpec
@@ -64,7 +64,11 @@ class CoupledBodies:
         self._meshes: list[Any] = []
         surfaces = [
             SurfaceOfParticles(
-                solver.particle_count, np.asarray(body.faces), *_surface_rules(body, solver), solid=body.is_solid
+                solver.particle_count,
+                np.asarray(body.faces),
+                *_surface_rules(body, solver),
+                solid=body.is_solid,
+                joined=joined_particles(solver.topology.tets) if touches_itself(world, body) else None,
             )
             for body, solver in zip(self.particles, solvers, strict=True)
         ]
@@ -130,7 +134,7 @@ class CoupledBodies:
             return []
         own, found = self.bodies.index(body), []
         for world, pair, point, normal, force in self.coupling.contacts():
-            if own in pair and self.kept[body][world]:
+            if own in pair and pair[0] != pair[1] and self.kept[body][world]:
                 sign = 1.0 if pair[0] == own else -1.0
                 other = self.bodies[pair[1] if pair[0] == own else pair[0]]
                 found.append((point, sign * normal, sign * force, other.name, world))
@@ -144,7 +148,9 @@ class CoupledBodies:
         friction = np.zeros((worlds, count, count))
         for a, one in enumerate(self.bodies):
             for b, other in enumerate(self.bodies):
-                if a != b and not (one in self.rigid and other in self.rigid):
+                if a == b:
+                    touch[a, b] = touches_itself(self._world, one)
+                elif not (one in self.rigid and other in self.rigid):
                     touch[a, b] = rules.touch(one, other)
                 mu = rules.friction.get(frozenset((one.key, other.key)))
                 mean = np.sqrt(np.asarray(one.friction) * np.asarray(other.friction))

@@ -228,6 +228,11 @@ class ParticleDynamics(Dynamics):
         return longer
 
 
+def touches_itself(world: Simulation, body: Body) -> bool:
+    """Return whether contacts of a soft body with itself are looked for, which takes it through a frame by parts."""
+    return isinstance(body.material, Soft) and body.material.self_contact and world._rules.touches_itself(body)
+
+
 def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> Dynamics:
     """Return dynamics for a body, in a state that dynamics of its kind gave.
 

@@ -176,10 +176,12 @@ class Soft(Material):
         friction: Coulomb's coefficient, against other bodies by the geometric mean with theirs.
         damping: Time constant of the internal damping [s].
         air_drag: Rate at which still air takes the velocity away [1/s].
+        self_contact: Whether parts of the body touch each other; one value for all worlds. It takes the body through
+            its frames by parts of substeps, which costs time also while nothing touches.
 
     Raises:
-        InvalidInputError: a value is not finite, negative, zero where it must be positive, or a Poisson ratio of 0.5
-            or more.
+        InvalidInputError: a value is not finite, negative, zero where it must be positive, a Poisson ratio of 0.5
+            or more, or a ``self_contact`` that is neither true nor false.
     """
 
     density: Value = 200.0
@@ -188,9 +190,10 @@ class Soft(Material):
     friction: Value = 0.5
     damping: Value = 0.0
     air_drag: Value = 0.0
+    self_contact: bool = False
 
     PER_ELEMENT = ("density", "youngs_modulus", "poisson_ratio")
-    MAY_BE_ZERO = ("poisson_ratio", "friction", "damping", "air_drag")
+    MAY_BE_ZERO = ("poisson_ratio", "friction", "damping", "air_drag", "self_contact")
     PRESETS = {  # noqa: RUF012 (the base declares it a ClassVar)
         "sponge": {"density": 30.0, "youngs_modulus": 3e4, "poisson_ratio": 0.25, "damping": 0.01},
         "foam_mat": {"density": 100.0, "youngs_modulus": 5e5, "poisson_ratio": 0.2, "damping": 0.01},
@@ -198,7 +201,10 @@ class Soft(Material):
     }
 
     def __post_init__(self) -> None:
+        if np.ndim(self.self_contact) or self.self_contact not in (False, True):
+            raise InvalidInputError(f"self_contact must be True or False, got {self.self_contact!r}")
         super().__post_init__()
+        object.__setattr__(self, "self_contact", bool(self.self_contact))
         if np.max(self.poisson_ratio) >= 0.5:
             raise InvalidInputError(f"poisson_ratio must be at least 0 and below 0.5, got {self.poisson_ratio!r}")
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.dynamics import SOON
+from nuno.dynamics import SOON, touches_itself
 from nuno.frame_runs import FrameRuns
 from nuno.parties import Parties, find_parties
 from nuno.path import Path
@@ -83,8 +83,10 @@ class Stepping:
             body._dynamics.prepare(time, 1.0 / self._world.frame_rate)  # type: ignore[union-attr]
 
     def _may_meet(self, moving: list[Body], rigid: list[Body]) -> bool:
-        """Whether two bodies could touch that different solvers move, or any are tied."""
+        """Whether two bodies could touch that different solvers move, a soft one itself, or any are tied."""
         if any(grip.is_tie for body in moving for grip in body._dynamics.grips):  # type: ignore[union-attr]
+            return True
+        if any(touches_itself(self._world, body) for body in moving):
             return True
         particles = [body for body in moving if body not in rigid]
         rules = self._world._rules
@@ -112,7 +114,8 @@ class Stepping:
             bodies = [moving[k] for k in group]
             grips = [grip for body in bodies for grip in body._dynamics.grips]  # type: ignore[union-attr]
             kinds = {body._dynamics.is_rigid for body in bodies}  # type: ignore[union-attr]
-            if not any(grip.is_tie for grip in grips) and (len(bodies) == 1 or kinds == {True}):
+            by_itself = len(bodies) == 1 and not touches_itself(self._world, bodies[0])
+            if not any(grip.is_tie for grip in grips) and (by_itself or kinds == {True}):
                 alone += bodies
             else:
                 party = np.searchsorted(group, first[group])

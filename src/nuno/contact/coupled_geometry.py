@@ -132,7 +132,11 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
         inside = wp.min(b[0], wp.min(b[1], b[2])) + 1.0e-3
     if inside <= 0.0 or gap > apart + reach:
         return
-    if kind != VERTEX_RIGID and gap < -(apart + reach):
+    inner = apart + reach
+    if bodies[0] == bodies[1]:
+        # the far side of a thin part is inside of it too
+        inner = apart
+    if kind != VERTEX_RIGID and gap < -inner:
         # far inside a solid body, this is not the face that it came through
         return
     rows.active[world * rows.room + wp.atomic_add(rows.active_count, world, 1)] = r

@@ -48,6 +48,9 @@ class Elements:
     party: wp.array(dtype=int)  # in each world, the first body of those that go together
     reach: wp.array(dtype=float)  # in each world, what bounds how far a body's contacts come in a substep [m]
     solid: wp.array(dtype=int)  # by body, whether its triangles enclose it
+    # by particle, where the sorted numbers start of those near it within its own body, if that touches itself
+    near_start: wp.array(dtype=int)
+    near: wp.array(dtype=int)
     low: wp.array(dtype=wp.vec3)
     high: wp.array(dtype=wp.vec3)
 
@@ -141,10 +144,28 @@ def near_triangle(particles: Particles, first: int, x: wp.vec3, f: wp.vec3i, far
 
 
 @wp.func
+def is_near(elements: Elements, i: int, j: int):
+    """Whether particle j is one of those near particle i within their body."""
+    low = int(elements.near_start[i])
+    high = int(elements.near_start[i + 1])
+    end = int(high)
+    while low < high:
+        middle = (low + high) / 2
+        if elements.near[middle] < j:
+            low = middle + 1
+        else:
+            high = middle
+    found = bool(False)
+    if low < end:
+        found = elements.near[low] == j
+    return found
+
+
+@wp.func
 def list_vertex(
     particles: Particles, elements: Elements, rows: Rows, bvh: wp.uint64, root: int, world: int, k: int, far: float
 ):
-    """Triangles of other bodies near vertex k."""
+    """Triangles near vertex k, of other bodies or of other parts of its own."""
     i = elements.vertex[k]
     body = elements.vertex_body[k]
     x = place(particles, world * particles.count + i)
@@ -154,18 +175,21 @@ def list_vertex(
     while wp.bvh_query_next(query, hit):
         t = hit - world * elements.triangles
         other = elements.triangle_body[t]
-        if other != body and may_touch(elements, world, body, other):
+        if may_touch(elements, world, body, other):
             f = elements.triangle[t]
-            add_row(
-                rows, world, VERTEX_TRIANGLE, wp.vec4i(i, f[0], f[1], f[2]), -1, -1, wp.vec2i(body, other), wp.vec3()
-            )
+            joined = bool(False)
+            if other == body:
+                joined = is_near(elements, i, f[0]) or is_near(elements, i, f[1]) or is_near(elements, i, f[2])
+            if not joined:
+                corners = wp.vec4i(i, f[0], f[1], f[2])
+                add_row(rows, world, VERTEX_TRIANGLE, corners, -1, -1, wp.vec2i(body, other), wp.vec3())
 
 
 @wp.func
 def list_edge(
     particles: Particles, elements: Elements, rows: Rows, bvh: wp.uint64, root: int, world: int, k: int, far: float
 ):
-    """Edges of later bodies near edge k."""
+    """Edges near edge k, of later bodies or of other parts of its own."""
     e = elements.edge[k]
     body = elements.edge_body[k]
     first = world * particles.count
@@ -177,11 +201,16 @@ def list_edge(
     while wp.bvh_query_next(query, hit):
         t = hit - world * elements.triangles
         other = elements.triangle_body[t]
-        if other > body and may_touch(elements, world, body, other):
+        if other >= body and may_touch(elements, world, body, other):
             edges = elements.triangle_edges[t]
             for c in range(3):
-                if edges[c] >= 0:
-                    f = elements.edge[edges[c]]
+                f = elements.edge[wp.max(edges[c], 0)]
+                joined = edges[c] < 0
+                if other == body and not joined:
+                    # each pair once
+                    joined = edges[c] <= k or is_near(elements, e[0], f[0]) or is_near(elements, e[0], f[1])
+                    joined = joined or is_near(elements, e[1], f[0]) or is_near(elements, e[1], f[1])
+                if not joined:
                     c0 = place(particles, first + f[0])
                     s = wp.closest_point_edge_edge(a, b, c0, place(particles, first + f[1]), 1.0e-9)
                     if s[2] < far:

@@ -22,6 +22,8 @@ class SurfaceOfParticles:
         radius: (worlds,) float [m], half the thickness.
         soft: (worlds,) float [m/N], how far a contact presses it together.
         solid: Whether the faces enclose the body, corners anticlockwise from outside.
+        joined: (k, 2) int, where the body touches itself: pairs of its particles whose surroundings do not touch, each
+            in both orders; else None.
     """
 
     particles: int
@@ -29,6 +31,7 @@ class SurfaceOfParticles:
     radius: np.ndarray
     soft: np.ndarray
     solid: bool = False
+    joined: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,7 @@ def make_elements(
     worlds, bodies = friction.shape[0], len(particles) + len(rigid)
     vertex, vertex_body, triangle, triangle_body, edge, edge_body, owner = [], [], [], [], [], [], []
     first, edges_before = 0, 0
+    near: list[np.ndarray] = []
     for body, surface in enumerate(particles):
         used = np.unique(surface.faces)
         vertex.append(used + first)
@@ -96,6 +100,8 @@ def make_elements(
         edge.append(found + first)
         edge_body.append(np.full(len(found), body))
         owner.append(np.where(listed >= 0, listed + edges_before, -1))
+        if surface.joined is not None:
+            near.append(surface.joined + first)
         first += surface.particles
         edges_before += len(found)
     parts = [(surface.slot, len(particles) + k, part) for k, surface in enumerate(rigid) for part in surface.parts]
@@ -136,6 +142,10 @@ def make_elements(
     for body, surface in enumerate(particles):
         radius[:, body], soft[:, body] = surface.radius, surface.soft
     made.radius, made.soft = put(radius.ravel(), float), put(soft.ravel(), float)
+    pairs = joined(near, 2).astype(int)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    made.near_start = put(np.searchsorted(pairs[:, 0], np.arange(first + 1)), int)
+    made.near = put(pairs[:, 1] if len(pairs) else [0], int)
     made.party = wp.zeros(worlds * bodies, dtype=int, device=device)
     made.reach = wp.zeros(worlds * bodies, dtype=float, device=device)
     made.solid = put([*(surface.solid for surface in particles), *(False for _ in rigid)], int)
@@ -151,3 +161,20 @@ def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     listed = np.full(len(sides), -1)
     listed[firsts] = np.arange(len(edges))
     return edges, listed.reshape(-1, 3)
+
+
+def joined_particles(tets: np.ndarray) -> np.ndarray:
+    """Return (k, 2) int, particles of tetrahedra (m, 4) that at most two edges part, in both orders, and each itself.
+
+    Between these a mesh does not fold: where they come near, the material between them is pressed together.
+    """
+    ends = np.array([[a, b] for a in range(4) for b in range(4) if a != b]).T
+    edges = np.unique(np.stack([tets[:, ends[0]].ravel(), tets[:, ends[1]].ravel()], axis=1), axis=0)
+    n = int(tets.max()) + 1
+    starts = np.searchsorted(edges[:, 0], np.arange(n + 1))
+    count = np.diff(starts)[edges[:, 1]]
+    # the neighbours of each edge's second end
+    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    second = edges[np.repeat(starts[edges[:, 1]], count) + rank, 1]
+    pairs = np.stack([np.repeat(edges[:, 0], count), second], axis=1)
+    return np.unique(np.concatenate([edges, pairs]), axis=0)
