@@ -156,6 +156,9 @@ class Coupling:
         reach = float(reaches.max())
         margin = max(min(self._margin, (1 + substeps / 3) * reach), 1.5 * reach)
         every = max(1, int((margin - reach) / reach))
+        if self._is_apart(substeps * reach):
+            self._solvers[0]._launch(time, dt, substeps, substeps)
+            return
         for k in range(substeps):
             for solver in self._solvers:
                 solver.step_parts(k, MOTION | PULLS | LAYERS)
@@ -168,6 +171,21 @@ class Coupling:
                 solver.step_parts(k, SHAPES | VELOCITIES)
             if self._rigid is not None:
                 self._rigid.finish()
+
+    def _is_apart(self, reach: float) -> bool:
+        """Whether this is one body that touches itself, and no two of its parts come nearer than ``reach`` [m].
+
+        It then goes through the frame in one launch, with the same bits.
+        """
+        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count or self.holds.count:
+            return False
+        layout = self._layouts[0]
+        wp.launch(
+            collect, dim=(self.world_count, layout.particles), inputs=[layout, self._particles, self._start],
+            device=self.device,
+        )  # fmt: skip
+        self._list(reach)
+        return self._listed == 0
 
     def _touch(self, k: int, every: int, margin: float, dt: float, fraction: float) -> None:
         worlds, particles, rows, elements = self.world_count, self._particles, self._rows, self._elements
