@@ -19,6 +19,8 @@ from nuno.camera.regions import grow, shrink
 
 _BLUR = 0.8  # [px] both images are smoothed by this before they are compared pixel by pixel
 _SHADE = (0.2, 0.93)  # a shadow leaves between these shares of the light
+_LIGHT = (0.12, 1.3)  # a lifted cloth shows from this to this share of the light it had when flat
+_TABLES_TINT = 0.85  # [nats] a darker pixel is more likely the table's than the cloth's in tint by this, on average, or more
 _ODDS = 3.0  # [nats] 20 to 1 that coarse texture is the table's, or is not
 _UNKNOWN = 0.01 / COLOUR_VOLUME  # density of something else entirely: a reflection, a cable
 
@@ -38,8 +40,9 @@ class Background:
         noise: Standard deviation of a channel of view - scene where nothing changed [levels].
         grain: (h, w) float32, logarithm of how much better the background's fine texture explains the view
             than the cloth's does.
-        shade: The share of the light that the cloth's shadow leaves on the table; None where no shadow was
-            found.
+        cloth: (h, w) float32, the probability density of the view's colours where the cloth is.
+        shades: The shares of the light that the cloth's shadows leave on the table: none where no shadow was
+            found, two of two lamps.
     """
 
     view: np.ndarray
@@ -50,7 +53,8 @@ class Background:
     shares: np.ndarray
     noise: float
     grain: np.ndarray
-    shade: float | None
+    cloth: np.ndarray
+    shades: tuple[float, ...]
 
     def density(self) -> np.ndarray:
         """(h, w) float32, the probability density of the view's colours where the cloth is not."""
@@ -72,14 +76,14 @@ class Background:
         self, view: np.ndarray, colour: np.ndarray, noise2: np.ndarray, spread: float, table: np.ndarray
     ) -> np.ndarray:
         """Density of the view if the colour is lit, in the usual shadow on the table, or in some shadow."""
-        usual, some = (0.25, 0.05) if self.shade is not None else (0.0, 0.15)
+        usual, some = (0.25, 0.05) if self.shades else (0.0, 0.15)
         at = np.where(table, 1.0, 0.25).astype(np.float32)  # a shadow falls on the table first
         total = (1.0 - at * (usual + some)) * normal_density(view, colour, noise2 + (spread * colour) ** 2)
         total += at * some * shaded_density(view, colour, self.noise, *_SHADE)
-        if self.shade is not None:
-            shaded = np.float32(self.shade) * colour
+        for shade in self.shades:
+            shaded = np.float32(shade) * colour
             variance = noise2 + ((spread + 0.02) * shaded) ** 2
-            total += at * usual * normal_density(view, shaded, variance)
+            total += at * (usual / len(self.shades)) * normal_density(view, shaded, variance)
         return total
 
 
@@ -112,10 +116,20 @@ def compare(
     scene = np.where(hidden[..., None], field, first)
     inside = shrink(mask, 3)
     grain = _grain(first, view, scene, hidden, ring, inside if inside.any() else mask)
+    cloth = _cloth(before, inside if inside.any() else mask, view, noise)
     darkest = float(colours[shares > 0.03].mean(axis=-1).min(initial=1.0))
     limit = np.where(hidden, np.float32(0.9 * darkest), np.float32(0.9))
-    shade = _shade(view, scene, grain, table, noise, limit, table & ~hidden)
-    return Background(view, scene, hidden, table, colours, shares, noise, grain, shade)
+    shades = _shades(view, scene, grain, cloth, table, noise, limit, table & ~hidden)
+    return Background(view, scene, hidden, table, colours, shares, noise, grain, cloth, shades)
+
+
+def _cloth(before: np.ndarray, where: np.ndarray, view: np.ndarray, noise: float) -> np.ndarray:
+    """Density (h, w) of the view's colours if it shows what was ``where`` (h, w) before, in more or less light."""
+    colours, shares = palette(before[where].astype(np.float32), 6)
+    found = sum(
+        share * shaded_density(view, colour, noise, *_LIGHT) for colour, share in zip(colours, shares, strict=True)
+    )
+    return np.asarray(found + np.float32(0.02 / COLOUR_VOLUME))
 
 
 def _gains(first: np.ndarray, second: np.ndarray, use: np.ndarray) -> tuple[np.ndarray, float]:
@@ -203,18 +217,18 @@ def _roughness_ratio(found: np.ndarray, noise: np.ndarray, table: np.ndarray, cl
     return evidence
 
 
-def _shade(
-    view: np.ndarray, scene: np.ndarray, grain: np.ndarray, where: np.ndarray, noise: float, limit: np.ndarray,
-    seen: np.ndarray,
-) -> float | None:  # fmt: skip
-    """The share of light in the cloth's shadow on the table, or None.
+def _shades(
+    view: np.ndarray, scene: np.ndarray, grain: np.ndarray, cloth: np.ndarray, where: np.ndarray, noise: float,
+    limit: np.ndarray, seen: np.ndarray,
+) -> tuple[float, ...]:  # fmt: skip
+    """The shares of light in the cloth's shadows on the table, two at most.
 
-    A lamp's shadow is equally dark all over an even table and leaves its texture; a cloth of the table's
-    colour has its own shading and not the table's texture. So the ratios of the pixels that got darker are
-    counted for a shadow where the fine texture is the table's, and against it where it is not. Only ratios
-    under ``limit`` (h, w) count: a speckle of the table is no shadow. Coarse texture, of the size of wood's
-    grain, decides where the table was ``seen`` (h, w) before: a share that it speaks against is no shadow's,
-    and one that it speaks for needs no fine texture.
+    A lamp's shadow is equally dark all over an even table and leaves its tint and its texture; a cloth has its own
+    colour and shading, and not the table's texture. So the ratios of the pixels that got darker are counted for a
+    shadow where tint and fine texture are the table's, and against it where they are not. Only ratios under ``limit``
+    (h, w) count: a speckle of the table is no shadow. Coarse texture, of the size of wood's grain, decides where the
+    table was ``seen`` (h, w) before: a share that it speaks against is no shadow's, and one that it speaks for needs
+    neither tint nor fine texture.
     """
     grey, dimmed = brightness(scene), brightness(view)
     where = where & (grey > 15) & (dimmed < (limit + 0.05) * grey) & (dimmed > 0.9 * _SHADE[0] * grey)
@@ -224,27 +238,32 @@ def _shade(
     across = (second * second).sum(axis=-1) - share * share * length2
     dark = (share > _SHADE[0]) & (share < limit[where]) & (across < (3 * noise) ** 2 + 0.03**2 * length2)
     if dark.sum() < 60:
-        return None
+        return ()
     shares = share[dark]
-    weights = np.clip(cv2.blur(grain, (7, 7))[where][dark], -1.0, 1.0)
+    tint = np.log(shaded_density(second[dark], first[dark], noise, *_SHADE) + 1e-12) - np.log(cloth[where][dark])
+    weights = np.clip(cv2.blur(grain, (7, 7))[where][dark], -1.0, 1.0) + np.clip(2.0 * (tint - _TABLES_TINT), -1.0, 1.0)
     # Texture is compared where most pixels count: others as dark show a cloth of another tint.
     counted = np.zeros(where.shape, dtype=np.float32)
     counted[where] = dark
     seen = (seen & (cv2.blur(counted, (5, 5)) > 0.5))[::2, ::2]
     old, now = (cv2.blur(image, (5, 5))[::2, ::2] for image in (grey, dimmed))
+    found: list[float] = []
     # Both thresholds are a few square centimetres of table.
-    for weight, least, needed in ((weights, 30.0, -_ODDS), (np.ones_like(shares), 300.0, _ODDS)):
+    for weight, least, needed in ((weights, 150.0, -_ODDS), (np.ones_like(shares), 300.0, _ODDS)):
         counts, edges = np.histogram(shares, bins=70, range=(0.2, 0.9), weights=weight)
         sharp = np.convolve(counts, np.ones(5), "same")
-        for _ in range(3):
+        for _ in range(4):
             best = int(sharp.argmax())
-            if sharp[best] < least:
+            if sharp[best] < least or len(found) == 2:
                 break
             peak = 0.5 * (edges[best] + edges[best + 1])
             if _goes_on(old, now, peak, seen, noise) > needed:
-                return float(np.median(shares[np.abs(shares - peak) < 0.03]))
+                found.append(float(np.median(shares[np.abs(shares - peak) < 0.03])))
+                least = max(least, 0.25 * float(sharp[best]))  # a second lamp's is much like the first's
             sharp[max(best - 5, 0) : best + 6] = -np.inf
-    return None
+        if found:
+            break
+    return tuple(found)
 
 
 def _goes_on(old: np.ndarray, now: np.ndarray, share: float, seen: np.ndarray, noise: float) -> float:

@@ -6,16 +6,15 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.camera.appearance import COLOUR_VOLUME, discriminant, guided_filter, palette, shaded_density
+from nuno.camera.appearance import discriminant, guided_filter
 from nuno.camera.background import compare
 from nuno.camera.camera import Camera
 from nuno.camera.flat import first_look, refine
 from nuno.camera.image import check_image, check_mask
-from nuno.camera.regions import fill_doubtful_holes, parts_at, sharpen, shrink
+from nuno.camera.regions import fill_doubtful_holes, parts_at, sharpen
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, InvalidInputError
 
-_LIGHT = (0.12, 1.3)  # a lifted cloth shows from this to this share of the light it had when flat
 _CERTAIN = 6.0  # [nats] no single pixel says more than this
 
 
@@ -95,13 +94,7 @@ def segment_after(
     if covered is not None:
         top, elsewhere = top & ~covered, reach | covered
     background = compare(before, rgb, mask, top, elsewhere)
-    inside = shrink(mask, 3)
-    colours, shares = palette(before[inside if inside.any() else mask].astype(np.float32), 6)
-    cloth = sum(
-        share * shaded_density(background.view, colour, background.noise, *_LIGHT)
-        for colour, share in zip(colours, shares, strict=True)
-    )
-    ratio = np.log((cloth + np.float32(0.02 / COLOUR_VOLUME)) / background.density())
+    ratio = np.log(background.cloth / background.density())
     grip = _sphere(camera, hand, hand_radius)
     if covered is not None:
         grip |= covered
