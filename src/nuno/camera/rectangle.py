@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.edges import edge_in_image, edge_in_mask, side_pixels
 from nuno.camera.image import check_image, check_mask
+from nuno.camera.rim_shadow import cloth_beside_shadow
 from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
@@ -158,11 +159,15 @@ def _fit_to_edges(
     """Measure the edge along the sides, in a soft mask (h, w) or also in the image, and fit to it."""
     corners = pose.corners()
     ground, weights, sides = [], [], []
-    for side in range(4):
-        pixels, normals, seen = side_pixels(corners[side], corners[(side + 1) % 4], camera, height, _ENDS)
+    lines = [side_pixels(corners[side], corners[(side + 1) % 4], camera, height, _ENDS) for side in range(4)]
+    shadows = [None] * 4 if image is None else _shadows(image, lines, camera, height)
+    for side, (pixels, normals, seen) in enumerate(lines):
         pixels, normals, count = pixels[seen], normals[seen], len(seen)
         edge = edge_in_mask(mask, pixels, normals)
-        if image is not None:
+        beside = shadows[side]
+        if beside is not None:
+            edge = pixels + beside[:, None] * normals
+        elif image is not None:
             edge = _refined(pixels, normals, edge, edge_in_image(image, pixels, normals))
         good = np.isfinite(edge).all(axis=1)
         edge, normals = edge[good], normals[good]
@@ -179,6 +184,19 @@ def _fit_to_edges(
         sides.append(np.full(len(edge), side))
     fitted, residual = _least_squares(pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights))
     return fitted, residual
+
+
+def _shadows(
+    image: np.ndarray, lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]], camera: Camera, height: float
+) -> list[np.ndarray | None]:
+    """The cloth's edge along each side that casts a shadow; of two opposite sides only one can: others are a border."""
+    found: list[np.ndarray | None] = []
+    for pixels, normals, seen in lines:
+        middle = len(pixels) // 2
+        ground = camera.back_project(np.stack([pixels[middle], pixels[middle] + normals[middle]]), height)
+        metres = float(np.linalg.norm(ground[1] - ground[0]))
+        found.append(cloth_beside_shadow(image, pixels[seen], normals[seen], metres))
+    return [None if found[(side + 2) % 4] is not None else found[side] for side in range(4)]
 
 
 def _refined(line: np.ndarray, normals: np.ndarray, rough: np.ndarray, fine: np.ndarray) -> np.ndarray:
