@@ -16,6 +16,8 @@ _NARROWEST = 1.0  # [px] of a strip that tells itself from a blurred edge
 _WIDEST = 0.012  # [m] of one: the shadow of 3 mm, in a light and seen by a camera from 25 degrees each
 _LIGHT = (0.2, 0.9)  # a shadow leaves between these shares of the table's light
 _BETTER = 0.36  # a strip must leave at most this share of the squares that one edge leaves
+_INSIDE = np.arange(-40.0, -7.0, 1.5)  # [px] where a pattern that runs along the side would show its other stripes
+_ALIKE = 12.0  # [levels] between colours that may be one: four times a camera's noise
 _EVEN = 0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark, patterns are not
 
 
@@ -39,8 +41,7 @@ def cloth_beside_shadow(
     """
     if len(pixels) < 2 * _GROUP:
         return None
-    at = (pixels[:, None] + _OFFSETS[None, :, None] * normals[:, None]).astype(np.float32)
-    values = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values = _along(image, pixels, normals, _OFFSETS)
     parts = np.array_split(np.arange(len(pixels)), len(pixels) // _GROUP)
     found = np.stack([values[part].mean(axis=0) for part in parts])
     edges, widths, cost, share = _fit(found)
@@ -55,6 +56,13 @@ def cloth_beside_shadow(
         return None
     if np.median(np.abs(width - np.median(width))) > 0.5 or edge.min() < edges.min() + 0.5:
         return None
+    dark = middle * np.median(values[:, _TABLE], axis=(0, 1))
+    if np.abs(_strip_colour(found, best) - dark).max() > _ALIKE:
+        return None
+    # A colour that the cloth has elsewhere, and not all over, is a stripe of it.
+    inside = np.abs(_along(image, pixels, normals, _INSIDE) - dark).max(axis=-1) < _ALIKE
+    if 0.03 < inside.mean() < 0.9:
+        return None
     middles = np.array([part.mean() for part in parts])
     keep = np.ones(len(parts), dtype=bool)
     for _ in range(2):  # the second time without what is far off the first line
@@ -62,6 +70,22 @@ def cloth_beside_shadow(
         away = np.abs(edge - np.polyval(line, middles))
         keep = away <= max(2.0 * float(np.median(away)), 0.5)
     return np.asarray(np.polyval(line, np.arange(len(pixels))))
+
+
+def _strip_colour(found: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """Colour (3,) of the strip in profiles (g, m, 3), whatever it is, if edge and width are the ones numbered best (g,)."""
+    _, _, cloth, strip, table = _profiles()
+    colours = []
+    for profile, k in zip(found, best, strict=True):
+        seen = profile - table[k][:, None] * profile[_TABLE].mean(axis=0)
+        colours.append(np.linalg.lstsq(np.column_stack([cloth[k], strip[k]]), seen, rcond=None)[0][1])
+    return np.asarray(np.median(colours, axis=0))
+
+
+def _along(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Values (k, m, 3) of an image at offsets (m,) [px] along normals."""
+    at = (pixels[:, None] + offsets[None, :, None] * normals[:, None]).astype(np.float32)
+    return cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 @cache
