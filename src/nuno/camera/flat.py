@@ -17,6 +17,7 @@ _STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture
 _DIFFERENT = 4.0  # standard deviations of the table's own colour
 _CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a stain
 _SMALLEST = 20  # [blocks] of a region that may be a cloth
+_HELP = "a box around the cloth as a hint, or its mask, would help"
 _DOUBT = 1.0  # [nats] a bay in a flat cloth's outline is one only if the colours in it say so by more than this
 _RECTANGLE = 0.8  # share of the smallest rectangle around it that a flat cloth fills; a disc has 0.785
 
@@ -70,23 +71,68 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     pixel = None if box is not None else hint
     if box is not None:
         return _choose(found, distance, pixel, None), surface
-    # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
-    # surface surrounds is looked for, as where the table's extents are not known.
+    failed = None
     try:
         blob = _choose(found, distance, pixel, xy if hint is None else None)
+        if _likeness(blob, xy) >= _RECTANGLE:
+            return blob, surface
     except ClothNotFoundError as error:
-        try:
-            return _surrounded(small, xy, hint)
-        except ClothNotFoundError:
-            raise error from None
-    if _likeness(blob, xy) < _RECTANGLE:
-        with suppress(ClothNotFoundError):
-            return _surrounded(small, xy, hint)
+        failed = error
+    # A cloth much like the table may show by less difference over more blocks, and by its texture.
+    with suppress(ClothNotFoundError):
+        return _faint(flat, _texture(rgb, h, w), rim, surface, xy, pixel), surface
+    # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
+    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth.
+    with suppress(ClothNotFoundError):
+        other, even = _surrounded(small, xy, hint)
+        if failed is None or (other & surface).sum() > 0.9 * other.sum():
+            return other, even
+    if failed is not None:
+        raise ClothNotFoundError(f"{failed}; {_HELP}") from None
     return blob, surface
 
 
+def _texture(rgb: np.ndarray, h: int, w: int) -> np.ndarray:
+    """(h, w) float32, the logarithm of the deviation of brightness within 9 x 9 px, at blocks of an image."""
+    grey = cv2.cvtColor(rgb[: h * _STEP, : w * _STEP], cv2.COLOR_RGB2GRAY).astype(np.float32)
+    variance = cv2.blur(grey * grey, (9, 9)) - cv2.blur(grey, (9, 9)) ** 2
+    return 0.5 * np.log(cv2.resize(np.maximum(variance, 0.0), (w, h), interpolation=cv2.INTER_AREA) + 1.0)
+
+
+def _faint(
+    flat: np.ndarray, texture: np.ndarray, rim: np.ndarray, surface: np.ndarray, xy: np.ndarray,
+    pixel: np.ndarray | None,
+) -> np.ndarray:  # fmt: skip
+    """A rectangle (h, w) bool on the table that differs little from it, but in colours or texture all over.
+
+    Args:
+        flat: (h, w, 3) float32, the image without the table's light, logarithms.
+        texture: (h, w) float32.
+        rim: (h, w) bool, where the table is seen.
+        surface: (h, w) bool, its whole top.
+        xy: (h, w, 2) float, coordinates on the plane [m].
+        pixel: (2,) of a hint, or None.
+    """
+    inner = shrink(surface, 2)  # the table's edge is a texture too
+    if (rim & inner).sum() < 30:
+        raise ClothNotFoundError("no cloth: too little of the table is seen")
+    distance = _difference(np.dstack([cv2.blur(flat, (3, 3)), texture]), rim & inner, inner)
+    # Checks differ from the table one by one, and not in the mean: so it is their differences that are averaged.
+    distance = np.where(inner, np.minimum(distance, 10.0), 0.0).astype(np.float32)
+    weight = np.maximum(cv2.blur(inner.astype(np.float32), (5, 5)), np.float32(1e-3))
+    distance = cv2.blur(distance, (5, 5)) / weight
+    limit, _ = cv2.threshold((25.0 * distance[inner]).astype(np.uint8), 0, 255, cv2.THRESH_OTSU)
+    found = ((25.0 * distance > limit) & inner).astype(np.uint8)
+    blob = _choose(cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), distance, pixel, xy)
+    beside = inner & ~grow(blob, 3)
+    even = beside.sum() > 30 and np.quantile(distance[blob], 0.2) > np.quantile(distance[beside], 0.95)
+    if not even or _likeness(blob, xy) < _RECTANGLE:
+        raise ClothNotFoundError("no cloth: nothing like a rectangle differs from the table")
+    return blob
+
+
 def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.ndarray:
-    """How many standard deviations of the table's own colour each pixel differs from it.
+    """How many standard deviations of the table's own colour each pixel of an image (h, w, channels) differs from it.
 
     The table's colours are those of its rim (h, w) bool and of all that is like them on its surface (h, w)
     bool. Of the rim only the half nearest to its median counts at first: a cloth may cover much of it.
@@ -96,7 +142,7 @@ def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.nd
     away = np.linalg.norm(values - centre, axis=1)
     values, widen = values[away <= np.median(away)], 2.5  # half of a normal cloud has 0.4 times its spread
     for _ in range(4):
-        covariance = widen**2 * np.cov((values - centre).T) + 0.015**2 * np.eye(3)
+        covariance = widen**2 * np.cov((values - centre).T) + 0.015**2 * np.eye(flat.shape[-1])
         offset = flat - centre
         distance = np.sqrt(np.einsum("...i,ij,...j->...", offset, np.linalg.inv(covariance), offset))
         inliers = surface & (distance < 3.0)
