@@ -37,14 +37,32 @@ def scene(*, cloth: bool, texture: float = 0.05) -> tuple[np.ndarray, ...]:
 def test_shadow_is_told_from_a_cloth_as_dark_by_the_table_under_it(cloth: bool) -> None:
     """The table's streaks go on in a shadow, and not on a cloth in its own shade that is as dark as one."""
     before, after, mask, everywhere = scene(cloth=cloth)
-    found = compare(before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)).shade
+    found = compare(before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)).shades
     # The shares are counted in hundredths, and the median of a bright or dark streak is 0.01 off.
-    assert found == pytest.approx(SHADOW, abs=0.02)
+    assert found == pytest.approx((SHADOW,), abs=0.02)
 
 
 def test_a_cloth_alone_is_no_shadow() -> None:
     """An even patch as dark as a shadow is none where the table's streaks do not go on in it."""
     before, after, mask, everywhere = scene(cloth=True)
     after[150:215, 175:260] = before[150:215, 175:260]
-    found = compare(before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)).shade
-    assert found is None
+    found = compare(before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)).shades
+    assert found == ()
+
+
+def test_shadow_on_an_even_table_is_told_by_its_tint() -> None:
+    """Without any texture, what has the table's tint and not the cloth's is a shadow."""
+    before, after, mask, everywhere = scene(cloth=False, texture=0.0)
+    before[mask] = (170, 60, 50)
+    assert compare(
+        before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)
+    ).shades == pytest.approx((SHADOW,), abs=0.02)
+
+
+def test_two_lamps_cast_two_shadows() -> None:
+    """Each lamp's shadow has a darkness of its own."""
+    before, after, mask, everywhere = scene(cloth=False, texture=0.0)
+    before[mask] = (170, 60, 50)
+    after[20:100, 175:260] = np.round(0.7 * before[20:100, 175:260].astype(float)).astype(np.uint8)
+    found = compare(before, after, mask, everywhere, np.zeros_like(mask) | (np.arange(320) < 280)).shades
+    assert sorted(found) == pytest.approx([SHADOW, 0.7], abs=0.02)

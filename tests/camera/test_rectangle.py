@@ -92,6 +92,21 @@ def test_mask_alone_is_unbiased() -> None:
     assert abs(found.long_m - 0.5) < 0.0008 and abs(found.short_m - 0.36) < 0.0008
 
 
+def test_the_cloths_own_shadow_is_left_out() -> None:
+    """A shadow 4 mm wide along one side, in the mask as in the image, moves no corner."""
+    size, yaw = (0.5, 0.35), 0.3
+    wide, _ = draw(BESIDE, (0.1, 0.0), (size[0] + 0.004, size[1]), yaw)
+    middle = (0.1 + 0.002 * np.cos(yaw), 0.002 * np.sin(yaw))
+    cloth, _ = draw(BESIDE, middle, size, yaw)
+    image = np.where(wide[..., None], 0.45 * np.array([130.0, 132.0, 135.0]), (130.0, 132.0, 135.0))
+    image = np.where(cloth[..., None], (190.0, 60.0, 50.0), image).astype(np.float32)
+    image = cv2.GaussianBlur(image, (0, 0), 0.5).round().astype(np.uint8)
+    true = corners_of(middle, size, yaw)
+    assert farthest(fit_rectangle(wide, None, BESIDE, HEIGHT), true) > 0.003
+    # Half a pixel, which is 2 to 4 mm here.
+    assert farthest(fit_rectangle(wide, image, BESIDE, HEIGHT), true) < 0.0015
+
+
 def test_ragged_mask_is_mended() -> None:
     """A mask that bites into the cloth and juts out at places is corrected by the image's edges."""
     mask, image = draw(BESIDE, (0.1, 0.0), (0.5, 0.36), 0.3)

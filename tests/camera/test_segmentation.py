@@ -11,7 +11,7 @@ from synthetic import LOOKS, Pair, look_at, make_pair
 
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
-from nuno.camera.segmentation import segment_after, segment_before
+from nuno.camera.segmentation import look_after, segment_after, segment_before
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, ImageError, InvalidInputError
 
@@ -100,6 +100,47 @@ def test_what_lies_beyond_the_table_is_no_cloth_on_it() -> None:
     """A floor in one of the cloth's colours, 3 mm from the cloth, stays out of the mask."""
     image, camera, table, cloth = checks((60, 62, 60), (160, 120, 90), (60, 62, 60), -0.397)
     assert overlap(segment_before(image, camera, table), cloth) > 0.96  # a pixel of the whole outline is 0.97
+
+
+def faint(difference: tuple[int, ...]) -> tuple:
+    """A cloth of 5 cm checks, every other in the speckled table's colour, the others darker by a difference."""
+    rng = np.random.default_rng(0)
+    table = Table(0.7, (0.4, 0.5), (0.0, 0.0))
+    camera = look_at(np.array([-1.0, 0.0, 1.3]), np.array([0.0, 0.0, 0.7]), 520.0)
+    xy = plane_coordinates(camera, table.height)
+    squares = (np.floor(xy / 0.05).sum(axis=-1) % 2 == 0)[..., None]
+    cloth = (np.abs(xy[..., 0]) < 0.2) & (np.abs(xy[..., 1]) < 0.25)
+    speckles = cv2.GaussianBlur(rng.normal(size=cloth.shape), (0, 0), 4.0)
+    wood = np.array((150.0, 125.0, 95.0))
+    top = wood * (1.0 + 0.09 * speckles / speckles.std())[..., None]
+    image = np.where((table_margin(table, xy) > 0)[..., None], top, (60, 90, 60))
+    image = np.where(cloth[..., None], np.where(squares, wood, wood - difference), image)
+    image = cv2.GaussianBlur(image, (0, 0), 0.5) + rng.normal(0.0, 3.0, image.shape)
+    return np.clip(np.round(image), 0, 255).astype(np.uint8), camera, table, cloth
+
+
+def test_a_cloth_hardly_unlike_the_table() -> None:
+    """Differences no larger than the table's speckles make a cloth where they fill a rectangle."""
+    image, camera, table, cloth = faint((28, -8, 0))
+    # Without the squares that are like the table it would be 0.5; with all but those at the outline 0.8.
+    assert overlap(segment_before(image, camera, table), cloth) > 0.9
+
+
+def test_a_cloth_too_like_the_table() -> None:
+    """Where nothing tells, the error says what would help; the table's top, which the floor surrounds, is no cloth."""
+    image, camera, table, _ = faint((4, -4, 0))
+    with pytest.raises(ClothNotFoundError, match="hint"):
+        segment_before(image, camera, table)
+
+
+@pytest.mark.parametrize("name", sorted(AMBIGUOUS))
+def test_doubt_is_told(name: str) -> None:
+    """Much of a cloth in the table's colour is said to be in doubt, and next to nothing of one that is unlike it."""
+    for look, doubtful in ((name, True), ("red on brown", False)):
+        scene = pair(look)
+        mask, doubt = look_after(scene.after, scene.camera, scene.table, scene.before, scene.mask_before, scene.hand)
+        # From 0.13 to 0.38 of the three, and at most 0.002 of all others.
+        assert (doubt.sum() > 0.1 * mask.sum()) == doubtful
 
 
 def test_one_mask_serves_the_other(striped: Pair) -> None:

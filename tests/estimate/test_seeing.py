@@ -7,7 +7,7 @@ import nuno
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate.seeing import _oddities, begin_to_see
+from nuno.estimate.seeing import _doubts, _oddities, begin_to_see
 
 POSE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
 CAMERA = Camera(80, 60, 60.0, 60.0, 39.5, 29.5, POSE)
@@ -67,3 +67,13 @@ def test_a_cloth_that_is_not_at_the_hand_is_odd():
     (warning,) = _oddities(far, ignored)
     # 25 px both ways between the hand's last pixel and the cloth's first; OpenCV's 5 x 5 distance is right to 2 %
     assert "away from the hand" in warning and 33 <= int(warning.split(" px")[0].split()[-1]) <= 36
+
+
+def test_a_mask_in_doubt_gets_a_warning():
+    """A tenth of the cloth may be in doubt without a word; a mask that was given never is."""
+    doubt = np.zeros((60, 80), dtype=bool)
+    doubt[20:24, 20:50] = True  # 120 of 1,200 px
+    assert _doubts(square(), None) == _doubts(square(), doubt) == ()
+    doubt[24] = True
+    (warning,) = _doubts(square(), doubt)
+    assert "17%" in warning and "after_mask" in warning  # 200 px

@@ -82,10 +82,12 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     with suppress(ClothNotFoundError):
         return _faint(flat, _texture(rgb, h, w), rim, surface, xy, pixel), surface
     # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
-    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth.
+    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth on it, and
+    # its whole top, which the floor surrounds, is none either.
     with suppress(ClothNotFoundError):
         other, even = _surrounded(small, xy, hint)
-        if failed is None or (other & surface).sum() > 0.9 * other.sum():
+        on = (other & surface).sum()
+        if failed is None or 0.9 * other.sum() < on < 0.9 * surface.sum():
             return other, even
     if failed is not None:
         raise ClothNotFoundError(f"{failed}; {_HELP}") from None

@@ -18,12 +18,12 @@ _LIGHT = (0.2, 0.9)  # a shadow leaves between these shares of the table's light
 _BETTER = 0.36  # a strip must leave at most this share of the squares that one edge leaves
 _INSIDE = np.arange(-40.0, -7.0, 1.5)  # [px] where a pattern that runs along the side would show its other stripes
 _ALIKE = 12.0  # [levels] between colours that may be one: four times a camera's noise
-_EVEN = 0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark, patterns are not
+_EVEN = (
+    0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark, patterns are not
+)
 
 
-def cloth_beside_shadow(
-    image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float
-) -> np.ndarray | None:
+def cloth_beside_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float) -> np.ndarray | None:
     """Where the cloth ends along a side that has its shadow beside it.
 
     Along the normal three colours follow each other: the cloth's, the table's in shadow, and the table's. Where that
@@ -121,9 +121,7 @@ def _fit(found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndar
     own = (cloth * cloth).sum(axis=1)
     cross_table, cross_strip = (cloth * table).sum(axis=1), (cloth * strip).sum(axis=1)
     # What the table leaves of the profile, without what the cloth's colour, whatever it is, explains.
-    left2 = sum(
-        (found[..., k] @ cloth.T - colour[:, k, None] * cross_table) ** 2 for k in range(3)
-    )
+    left2 = sum((found[..., k] @ cloth.T - colour[:, k, None] * cross_table) ** 2 for k in range(3))
     squares = (found**2).sum(axis=(1, 2))[:, None] - 2.0 * (along_colour @ table.T)
     squares = squares + length2 * (table * table).sum(axis=1) - left2 / own
     width = length2 * ((strip * strip).sum(axis=1) - cross_strip**2 / own)

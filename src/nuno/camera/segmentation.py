@@ -11,11 +11,13 @@ from nuno.camera.background import compare
 from nuno.camera.camera import Camera
 from nuno.camera.flat import first_look, refine
 from nuno.camera.image import check_image, check_mask
-from nuno.camera.regions import fill_doubtful_holes, parts_at, sharpen
+from nuno.camera.regions import fill_doubtful_holes, grow, parts_at, sharpen, shrink
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, InvalidInputError
 
 _CERTAIN = 6.0  # [nats] no single pixel says more than this
+_IN_DOUBT = 2.0  # [nats] a smoothed ratio below this says little
+_NEAR = 12  # [px] around the cloth what is in doubt counts
 
 
 def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None) -> np.ndarray:
@@ -74,6 +76,21 @@ def segment_after(
         ClothNotFoundError: nothing near the hand looks like the cloth.
         InvalidInputError: a hand position or radius that is not finite.
     """
+    return look_after(
+        image, camera, table, before_image, before_mask, hand_position, hand_radius=hand_radius, hidden=hidden
+    )[0]
+
+
+def look_after(
+    image: ArrayLike, camera: Camera, table: Table, before_image: ArrayLike, before_mask: ArrayLike,
+    hand_position: ArrayLike, *, hand_radius: float = 0.014, hidden: ArrayLike | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The same as ``segment_after``, and besides what is in doubt.
+
+    Returns:
+        The cloth, and the regions in and beside it of which colours and texture hardly tell whether they are the
+        cloth: two (h, w) bool. The outline, which is always a mixture, is not among them.
+    """
     rgb = check_image(image, camera, "the image after")
     before = check_image(before_image, camera, "the image before")
     mask = check_mask(before_mask, camera, "the mask before")
@@ -102,17 +119,30 @@ def segment_after(
     ratio[grip | ~reach] = -_CERTAIN
     likely, unlikely = (ratio > 2.0) & reach, (ratio < -2.0) & reach
     if likely.sum() < 20:
-        raise ClothNotFoundError("no cloth: nothing within reach of the hand has the colours of the cloth before")
+        raise ClothNotFoundError(
+            "no cloth: nothing within reach of the hand has the colours of the cloth before; a mask would help"
+        )
     if unlikely.sum() >= 20:
         guide = discriminant(background.view, likely, unlikely)
         ratio = guided_filter(ratio, guide, radius=3, epsilon=0.05)
     found = parts_at((ratio > 0) & ~grip, ratio, grip, camera.project(hand))
     if found.sum() < 20:
-        raise ClothNotFoundError("no cloth: nothing near the hand has the colours of the cloth before")
+        raise ClothNotFoundError(
+            "no cloth: nothing near the hand has the colours of the cloth before; a mask would help"
+        )
     # A cloth has no holes; the table is seen through a loop of it only where the colours say so twice as clearly.
     found = fill_doubtful_holes(found, ratio, area=12, doubt=2.0)
     found = sharpen(found, background.view, background.noise) & reach
-    return found if covered is None else found & ~covered
+    if covered is not None:
+        found &= ~covered
+    return found, _doubtful(found, ratio, reach & ~grip)
+
+
+def _doubtful(found: np.ndarray, ratio: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Where in and beside what was found (h, w) bool the ratio (h, w), where the scene is seen, says little."""
+    outline = grow(found, 2) & ~shrink(found, 2)
+    doubt = (np.abs(ratio) < _IN_DOUBT) & grow(found, _NEAR) & ~outline & seen
+    return cv2.morphologyEx(doubt.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).astype(bool)
 
 
 def _check_hint(hint: ArrayLike | None, camera: Camera) -> np.ndarray | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
-from nuno.camera.segmentation import segment_after
+from nuno.camera.segmentation import look_after
 from nuno.camera.table import Table
 from nuno.errors import ImageError
 from nuno.estimate.appearance import Pattern, find_pattern
@@ -22,6 +22,8 @@ TURNED_SCALE = 0.25
 """Turned futures are compared at a quarter: they are right to a few degrees only, and it takes a third of the time."""
 FAR_FROM_HAND = 10.0
 """[px] of the full image. A cloth that a hand holds is seen beside it; nearer than this, fine folds may be missed."""
+MUCH_DOUBT = 0.1
+"""Share of the cloth's area that may be in doubt before a warning says so: 5 % of masks that were good have more."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as cloth nor as background."""
 
@@ -70,10 +72,10 @@ def begin_to_see(
     """
 
     def look() -> Seen:
-        mask = mask_after
+        mask, doubt = mask_after, None
         if mask is None:
             assert before is not None and after is not None and mask_before is not None
-            mask = segment_after(
+            mask, doubt = look_after(
                 after, camera, table, before, mask_before, hand, hand_radius=hand_radius, hidden=hidden
             )
         ignored = _hidden(camera, hand, hand_radius)
@@ -84,7 +86,7 @@ def begin_to_see(
         pattern = None
         if with_pattern and before is not None and after is not None:
             pattern = find_pattern(before, after, mask & ~ignored, rectangle, camera, hand)
-        return Seen(mask, small, silhouette, coarse, pattern, _oddities(mask, ignored))
+        return Seen(mask, small, silhouette, coarse, pattern, _oddities(mask, ignored) + _doubts(mask, doubt))
 
     if not meanwhile:
         seen = look()
@@ -105,6 +107,17 @@ def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
     if away <= max(float(np.sqrt(ignored.sum() / np.pi)), FAR_FROM_HAND):
         return ()
     return (f"the cloth found in the image after begins {away:.0f} px away from the hand: does it hold the cloth?",)
+
+
+def _doubts(mask: np.ndarray, doubt: np.ndarray | None) -> tuple[str, ...]:
+    """A warning where much of the mask (h, w) found in the image after, or beside it, is in doubt (h, w)."""
+    share = 0.0 if doubt is None else float(doubt.sum() / max(mask.sum(), 1))
+    if share <= MUCH_DOUBT:
+        return ()
+    return (
+        f"the cloth in the image after is much like the table or its shadow: {share:.0%} of it is in doubt; "
+        "a mask, after_mask, would help",
+    )
 
 
 def _hidden(camera: Camera, hand: np.ndarray, radius: float) -> np.ndarray:
