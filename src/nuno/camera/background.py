@@ -20,9 +20,7 @@ from nuno.camera.regions import grow, shrink
 _BLUR = 0.8  # [px] both images are smoothed by this before they are compared pixel by pixel
 _SHADE = (0.2, 0.93)  # a shadow leaves between these shares of the light
 _LIGHT = (0.12, 1.3)  # a lifted cloth shows from this to this share of the light it had when flat
-_TABLES_TINT = (
-    0.85  # [nats] a darker pixel is more likely the table's than the cloth's in tint by this, on average, or more
-)
+_TABLES_TINT = 0.85  # [nats] the tint of a pixel that got darker speaks for the table by more than this, or does not
 _ODDS = 3.0  # [nats] 20 to 1 that coarse texture is the table's, or is not
 _UNKNOWN = 0.01 / COLOUR_VOLUME  # density of something else entirely: a reflection, a cable
 

@@ -82,8 +82,8 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     with suppress(ClothNotFoundError):
         return _faint(flat, _texture(rgb, h, w), rim, surface, xy, pixel), surface
     # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
-    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth on it, and
-    # its whole top, which the floor surrounds, is none either.
+    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth on it,
+    # and its whole top, which the floor surrounds, is none either.
     with suppress(ClothNotFoundError):
         other, even = _surrounded(small, xy, hint)
         on = (other & surface).sum()
@@ -300,7 +300,7 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
         if inside.sum() < 20 or around.sum() < 20:
             break
     if labels.sum() < 0.5 * blob.sum() * _STEP**2:
-        raise ClothNotFoundError("no cloth: what looked like one dissolved on a closer look")
+        raise ClothNotFoundError(f"no cloth: what looked like one dissolved on a closer look; {_HELP}")
     mask = np.zeros((h, w), dtype=bool)
     mask[window] = labels
     return mask

@@ -18,9 +18,7 @@ _LIGHT = (0.2, 0.9)  # a shadow leaves between these shares of the table's light
 _BETTER = 0.36  # a strip must leave at most this share of the squares that one edge leaves
 _INSIDE = np.arange(-40.0, -7.0, 1.5)  # [px] where a pattern that runs along the side would show its other stripes
 _ALIKE = 12.0  # [levels] between colours that may be one: four times a camera's noise
-_EVEN = (
-    0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark, patterns are not
-)
+_EVEN = 0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark all along
 
 
 def cloth_beside_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float) -> np.ndarray | None:
@@ -73,7 +71,7 @@ def cloth_beside_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarr
 
 
 def _strip_colour(found: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """Colour (3,) of the strip in profiles (g, m, 3), whatever it is, if edge and width are the ones numbered best (g,)."""
+    """Colour (3,) of the strip in profiles (g, m, 3), whatever it is, with edges and widths as numbered (g,)."""
     _, _, cloth, strip, table = _profiles()
     colours = []
     for profile, k in zip(found, best, strict=True):
