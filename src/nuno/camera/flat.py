@@ -82,8 +82,8 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     with suppress(ClothNotFoundError):
         return _faint(flat, _texture(rgb, h, w), rim, surface, xy, pixel), surface
     # A table that is mostly covered, or larger than the picture's, says little of its own colour: then what an even
-    # surface surrounds is looked for, as where the table's extents are not known. What stands under it is no cloth on it,
-    # and its whole top, which the floor surrounds, is none either.
+    # surface surrounds is looked for, as where the table's extents are not known.
+    # What stands under the table is no cloth, nor is its whole top, which the floor surrounds.
     with suppress(ClothNotFoundError):
         other, even = _surrounded(small, xy, hint)
         on = (other & surface).sum()
