@@ -1,4 +1,4 @@
-"""Nothing passes through: fast cloths, thin plates, meshes, edges, and how deep a coarse cloth is cut."""
+"""Nothing passes through: fast cloths, thin plates, meshes, edges."""
 
 import numpy as np
 import pytest
@@ -132,8 +132,8 @@ def test_what_starts_deep_inside_leaves_without_an_explosion(kind):
 
 
 @pytest.mark.parametrize("cell", [0.01, 0.02, 0.04])
-def test_how_deep_the_edge_of_a_box_cuts_into_a_coarse_cloth(cell):
-    """Geometry: a straight cell over a right angle cuts its edge by at most half a cell, less half the thickness."""
+def test_the_edge_of_a_box_does_not_cut_into_a_coarse_cloth(cell):
+    """Invariant: neither a vertex nor any point of an edge of the cloth is inside."""
     count = round(0.4 / cell)
     table = nuno.box((0.2, 1.0, 0.2), position=(0, 0, -0.1))
     sheet = nuno.sheet((0.4, 0.4), cells=(count, count), position=(0.3 * cell, 0, 0.5 * THICKNESS))
@@ -147,7 +147,7 @@ def test_how_deep_the_edge_of_a_box_cuts_into_a_coarse_cloth(cell):
     s = np.linspace(0.0, 1.0, 11)[:, None, None]
     points = ((1.0 - s) * x[edges[:, 0]] + s * x[edges[:, 1]]).reshape(-1, 3)
     depth = np.minimum(np.minimum(points[:, 0] + 0.1, 0.1 - points[:, 0]), -points[:, 2])
-    assert depth.max() < 0.5 * cell - 0.3 * THICKNESS  # the diagonal of a cell lies flatter over the edge
+    assert depth.max() < 0.0  # carried by vertices alone, a straight cell over a right angle loses up to half of it
     own = np.minimum(np.minimum(x[:, 0] + 0.1, 0.1 - x[:, 0]), -x[:, 2])
     assert own.max() < 1e-5  # no vertex is inside
 

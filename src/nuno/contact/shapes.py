@@ -273,16 +273,25 @@ def along_box(t: Any, shapes: Shapes, row: int, axis: int, centre: Any):
 
 
 @wp.func
+def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
+    """How much farther than a cloth's particles and a shape's surface are now they may come to meet [m].
+
+    That is within ``ahead`` seconds.
+    """
+    # 1.5 times the present speed, what gravity adds in the time, and 2 cm for what constraints throw
+    grow = root(t.notes[SPEED]) * (1.5 * ahead) + fill(t.x[0], 10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
+    # and as far as the fastest shape may throw it
+    return grow + fill(t.x[0], shapes.haste[0] * ahead)
+
+
+@wp.func
 def select_shapes(t: Any, shapes: Shapes, ahead: float, thread: int, threads: int):
     """List the shapes that a particle could touch within ``ahead`` seconds.
 
     The list of a group of lanes is the union over its worlds; a shape that a world does not touch changes no bit.
     """
     like = t.x[0]
-    # 1.5 times the present speed, what gravity adds in the time, and 2 cm for what constraints throw
-    grow = root(t.notes[SPEED]) * (1.5 * ahead) + fill(like, 10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
-    # and as far as the fastest shape may throw it
-    grow = grow + fill(like, shapes.haste[0] * ahead)
+    grow = reach_of_frame(t, shapes, ahead)
     for s in range(thread, shapes.count, threads):
         row = s * COLUMNS
         cx = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row) - t.scalars[ORIGIN]

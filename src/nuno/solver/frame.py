@@ -9,9 +9,11 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.renewal import renew_lists, shares_work
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
+from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
 from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
@@ -218,6 +220,25 @@ def near_shapes(t: Any, n: int, run: Settings, shapes: Shapes, thread: int, thre
 
 
 @wp.func
+def near_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+    """Choose the edges and triangles that sharp shapes may touch in the next frame; after `near_shapes`."""
+    forget_sharp(t, topo, thread)
+    barrier(threads)
+    mark_sharp(t, topo, run, shapes, thread, threads)
+    barrier(threads)
+    list_sharp(t, topo, thread, threads)
+    barrier(threads)
+
+
+@wp.func
+def meet_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+    """Edges and triangles against sharp shapes, where there are any nearby."""
+    if t.sharp[0] > 0:
+        touch_sharp(t, topo, run, shapes, thread, threads)
+        barrier(threads)
+
+
+@wp.func
 def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
     """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for."""
     n = topo.particles
@@ -225,6 +246,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(t, n, run, shapes, thread, threads)
+                near_sharp(t, topo, run, shapes, thread, threads)
                 forget_loads(t, run, thread, threads)
             # before the listing, which asks how far anything went in the substep before
             tick(t, run, thread)
@@ -247,6 +269,7 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
                 take_moves(t, n, thread, threads)
                 barrier(threads)
         if run.parts & SHAPES != 0:
+            meet_sharp(t, topo, run, shapes, thread, threads)
             read_loads(t, run, thread, threads)
             barrier(threads)
             meet_shapes(t, n, shapes, run.dt, thread, threads)

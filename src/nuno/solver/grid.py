@@ -14,8 +14,10 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
+from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.team_listing import Lists, renew_by_team
 from nuno.solver.grips import forget_loads, pull_points
 from nuno.solver.integrate import reset_speed, tick
@@ -37,15 +39,21 @@ wp.get_module("nuno.solver.run_grid").options["fast_math"] = True  # as in the p
 
 
 @wp.func
-def near_shapes(t: StateFloat, n: int, run: Settings, shapes: Shapes, team: Team):
-    """Choose the shapes that matter for the next frame."""
+def near_shapes(t: StateFloat, topo: Topology, run: Settings, shapes: Shapes, team: Team):
+    """Choose the shapes that matter for the next frame, and what sharp ones may touch between vertices."""
+    n = topo.particles
     reset_box(t, team.turn)
+    forget_sharp(t, topo, team.turn)
     meet(team)
     measure_box(t, n, team.turn, team.turns)
     meet(team)
     select_shapes(t, shapes, float(run.frame) * run.dt, team.turn, team.turns)
     meet(team)
     sort_shapes(t, team.turn)
+    meet(team)
+    mark_sharp(t, topo, run, shapes, team.turn, team.turns)
+    meet(team)
+    list_sharp(t, topo, team.turn, team.turns)
     meet(team)
 
 
@@ -78,7 +86,7 @@ def advance_by_team(
     forget_loads(t, run, team.turn, team.turns)
     if team.turn == 0:
         speeds[2 * world] = 0.0
-    near_shapes(t, n, run, shapes, team)
+    near_shapes(t, topo, run, shapes, team)
     for k in range(substeps):
         tick(t, run, team.thread)
         barrier(team.threads)
@@ -99,6 +107,15 @@ def advance_by_team(
                 touch_edge_edge(t, n, run, team.turn, team.turns)
                 touch_vertex_triangle(t, n, run, team.turn, team.turns)
                 meet(team)
+        if t.sharp[0] > 0:
+            if run.touching != 0:
+                for i in range(first + team.thread, last, team.threads):
+                    take_moves(t, n, i, n)
+                meet(team)
+            # few elements in many colours, between which a block waits for itself alone
+            if team.block == 0:
+                touch_sharp(t, topo, run, shapes, team.thread, team.threads)
+            meet(team)
         reset_speed(t, team.thread)
         barrier(team.threads)
         come_to_rest(t, n, run, shapes, held, first, last, team.thread, team.threads)

@@ -14,8 +14,11 @@ from typing import Any
 
 import warp as wp
 
+from nuno.contact.between_vertices import touch_sharp
+from nuno.contact.distances import PLANE
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
+from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.solver.broad import PairFinder
 from nuno.solver.frame import meet_shapes
 from nuno.solver.grips import forget_loads, pull_points, read_loads
@@ -38,7 +41,7 @@ from nuno.solver.state import (
 from nuno.solver.team import team_of
 from nuno.solver.warps import WARP
 
-RESET, MEASURE, SELECT, SORT = range(4)
+RESET, MEASURE, SELECT, SORT, MARK, LIST = range(6)
 
 FEW = 1024
 """Threads a world where each ends in an atomic on one number."""
@@ -52,18 +55,23 @@ CPU_THREADS = 64
 
 @wp.kernel(enable_backward=False)
 def survey(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, phase: int, threads: int):
-    """Choose the shapes that matter for the next frame, in four phases."""
+    """Choose the shapes that matter for the next frame, and what sharp ones may touch, in six phases."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     thread = tid % threads
     if phase == RESET:
         reset_box(t, thread)
+        forget_sharp(t, topo, thread)
     elif phase == MEASURE:
         measure_box(t, topo.particles, thread, threads)
     elif phase == SELECT:
         select_shapes(t, shapes, float(run.frame) * run.dt, thread, threads)
-    else:
+    elif phase == SORT:
         sort_shapes(t, thread)
+    elif phase == MARK:
+        mark_sharp(t, topo, run, shapes, thread, threads)
+    else:
+        list_sharp(t, topo, thread, threads)
 
 
 @wp.kernel(enable_backward=False)
@@ -114,6 +122,14 @@ def settle(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: i
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     take_moves(t, topo.particles, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
+def meet_sharp(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, threads: int):
+    """Edges and triangles against sharp shapes, a block a world."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    touch_sharp(t, topo, run, shapes, tid % threads, threads)
 
 
 @wp.kernel(enable_backward=False)
@@ -187,6 +203,8 @@ class LargePlan:
         self._stages = [(int(first), int(last)) for first, last in pairwise(stages)]
         self._cuda = device.startswith("cuda")
         self._blocks, self._threads = work.step.shape[0] // (4 * work.steps), THREADS if self._cuda else 1
+        # whether there are shapes that may touch edges and triangles
+        self._sharp = bool(shapes.count) and bool((shapes.kind.numpy()[: shapes.count] < PLANE).any())
         self._gate = wp.zeros(1, dtype=int, device=device)
         # whole warps, which look through the boxes together
         many = -(-topology.particles // WARP) * WARP if self._cuda else CPU_THREADS
@@ -246,7 +264,15 @@ class LargePlan:
 
     def _survey(self, run: Any) -> None:
         shapes, particles = self._shapes, self._topology.particles
-        for phase, count in ((RESET, 1), (MEASURE, min(FEW, particles)), (SELECT, shapes.count), (SORT, 1)):
+        counts = {
+            RESET: 1,
+            MEASURE: min(FEW, particles),
+            SELECT: shapes.count,
+            SORT: 1,
+            MARK: particles,
+            LIST: particles,
+        }
+        for phase, count in counts.items():
             self._launch(survey, count, run, shapes, phase)
 
     def _substep(self, run: Any) -> None:
@@ -264,6 +290,13 @@ class LargePlan:
                 if again:
                     self._launch(settle, self._topology.particles, run)
                 self._launch(touch, MANY, run)
+        if run.parts & SHAPES and self._sharp:
+            if run.parts & LAYERS and run.touching:
+                self._launch(settle, self._topology.particles, run)
+            wp.launch(
+                meet_sharp, dim=self._worlds * self._threads, inputs=[*common, run, self._shapes, self._threads],
+                device=self._device, block_dim=THREADS,
+            )  # fmt: skip
         if run.parts & VELOCITIES:
             wp.launch(calm, dim=self._worlds, inputs=common, device=self._device)
         if run.parts & (LAYERS | SHAPES | VELOCITIES):

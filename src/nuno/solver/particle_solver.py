@@ -397,7 +397,8 @@ class ParticleSolver:
         dt = 1.0 / self.frame_rate / self.substeps
         self.open(time, dt, self.substeps)
         self.step_parts(0, MOTION | PULLS | LAYERS)
-        near = s.near.numpy().reshape(self.group_count, -1)
+        lists = {name: getattr(s, name).numpy().reshape(self.group_count, -1).copy() for name in self._shape_lists}
+        near = lists["near"]
         shapes = sorted({int(k) for row in near for k in row[1 : 1 + row[0]]})
         before, held = [wp.clone(a) for a in (s.x, s.y, s.z)], wp.clone(s.w)
         table: Any = wp.clone(self._shapes.table)
@@ -408,9 +409,7 @@ class ParticleSolver:
             for array, first in zip((s.x, s.y, s.z), before, strict=True):
                 wp.copy(array, first)
             wp.copy(s.w, held)
-            only = np.zeros_like(near)
-            only[:, 0], only[:, 1] = 1, shape
-            s.near.assign(only.ravel())
+            self._touch_only(shape, lists)
             start = self.local_positions().astype(float)
             self.step_parts(0, SHAPES)
             return self.local_positions() - start
@@ -429,6 +428,19 @@ class ParticleSolver:
         wp.copy(s.grip_load, loads)
         self._last_dt = last
         return result
+
+    def _touch_only(self, shape: int, lists: dict[str, np.ndarray]) -> None:
+        """Let what comes next touch one shape of ``lists`` alone, until a frame begins."""
+        for name, start in self._shape_lists.items():
+            rows = lists[name].copy()
+            rows[:, 0] = [shape in row[start : start + row[0]] for row in lists[name]]
+            rows[:, start] = shape
+            getattr(self._state, name).assign(rows.ravel())
+
+    @property
+    def _shape_lists(self) -> dict[str, int]:
+        """The state's lists of shapes nearby, as many as their first number says: at which number they begin."""
+        return {"near": 1}
 
     def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
         """(worlds, n), zero for what is held."""
@@ -479,6 +491,7 @@ class ParticleSolver:
         run.gravity = wp.vec3(*(float(g) for g in self.gravity))
         run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
         # candidates within a third of a cell: few enough to look at, and good for several substeps
+        run.cell = self._cell_size
         run.margin = 0.35 * self._cell_size
         run.reach = 0.25 * self._cell_size
         run.frame, run.first, run.parts = frame, 0, ALL_PARTS

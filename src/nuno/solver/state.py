@@ -38,6 +38,10 @@ MOTION, PULLS, LAYERS, SHAPES, VELOCITIES = 1, 2, 4, 8, 16
 ALL_PARTS = 31
 
 
+INTEGERS = ("moved", "near", "sharp", "sharp_mark", "sharp_list", "help", "help_room")
+"""Whole numbers that lanes share."""
+
+
 def _state_fields(number: type, integer: type) -> dict[str, Any]:
     """The fields of a State whose numbers are floats or lanes of floats."""
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz")
@@ -56,7 +60,8 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
     )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
-    fields |= {name: wp.array(dtype=int) for name in ("moved", "near", "help", "help_room")}
+    fields |= {name: wp.array(dtype=int) for name in INTEGERS}
+    fields["sharp_wake"] = wp.array(dtype=float)
     return fields | {"group": int, "worlds": int, "helpers": int}
 
 
@@ -118,6 +123,13 @@ class Topology:
     block_corner: wp.array(dtype=int)
     block_corner_start: wp.array(dtype=int)
     crease: wp.array(dtype=wp.vec4i)
+    # contact with sharp shapes: all edges of the triangles, then the triangles, by colour; where each colour starts,
+    # how many of these are edges', and the longest edge [m]
+    side: wp.array(dtype=wp.vec2i)
+    face: wp.array(dtype=wp.vec3i)
+    sharp_colour: wp.array(dtype=int)
+    side_colours: int
+    longest: float
     region_corner: wp.array(dtype=int)
     region_start: wp.array(dtype=int)
     columns: int
@@ -143,6 +155,8 @@ class Sizes:
     middle: int
     moved: int
     near: int
+    sharp: int
+    sharp_list: int
     near_blocks: int
 
 
@@ -160,6 +174,7 @@ class Settings:
     touching: int
     margin: float
     reach: float
+    cell: float
     frame: int
     first: int
     parts: int
@@ -244,6 +259,10 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.pair_count = window(s.pair_count, group * COUNTS, COUNTS)
     t.moved = window(s.moved, group * size.moved, size.moved)
     t.near = window(s.near, group * size.near, size.near)
+    t.sharp = window(s.sharp, group * size.sharp, size.sharp)
+    t.sharp_mark = window(s.sharp_mark, group * n, n)
+    t.sharp_list = window(s.sharp_list, group * size.sharp_list, size.sharp_list)
+    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 1), size.sharp_list + 1)
     t.help = window(s.help, group * HELP, HELP)
     t.near_blocks = window(s.near_blocks, group * size.near_blocks, size.near_blocks)
     return t

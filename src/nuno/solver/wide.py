@@ -21,7 +21,9 @@ from nuno.solver.frame import (
     bend_lines,
     bend_patches,
     bend_twists,
+    meet_sharp,
     near_shapes,
+    near_sharp,
     shear_cells,
     strain_triangles,
 )
@@ -153,6 +155,7 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(t, n, run, shapes, 0, 1)
+                near_sharp(t, topo, run, shapes, 0, 1)
                 forget_loads(t, run, 0, 1)
             tick(t, run, 0)
             if run.touching != 0:
@@ -167,6 +170,7 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
                 touch_edge_edge(t, n, run, 0, 1)
                 touch_vertex_triangle(t, n, run, 0, 1)
         if run.parts & SHAPES != 0:
+            meet_sharp(t, topo, run, shapes, 0, 1)
             read_loads(t, run, 0, 1)
             p.notes[CLOCK] = fill(p.x[0], t.notes[CLOCK])  # moving shapes are where the clock says
             touch_shapes(p, m, shapes, run.dt, 0, 1)

@@ -1,0 +1,200 @@
+"""Which shapes are sharp or small enough to stand through between a cloth's vertices, and what of the cloth is near.
+
+Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box, the rim of a cylinder
+and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found which of
+those may come that near within the frame (`nuno.contact.between_vertices` looks at them); where a cloth lies on a
+table, far from its rim, that is one question about its bounding box. What does not touch changes no bit, so that it
+does not matter what else is listed.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.distances import BOX, CYLINDER, PLANE
+from nuno.contact.led import led_place, led_turn
+from nuno.contact.shapes import COLUMNS, reach_of_frame
+from nuno.solver.lanes import (  # noqa: F401
+    add,
+    anywhere,
+    barrier,
+    fill,
+    largest,
+    least,
+    most,
+    mul,
+    per_world,
+    root,
+    size_of,
+    sub,
+    times,
+)
+from nuno.solver.state import CLOCK, ORIGIN, Settings, Shapes, Topology
+
+ROUND = wp.constant(3.0)
+"""Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
+twenty-fourth of it into such a ball, its diagonal a twelfth."""
+STRETCHED = wp.constant(1.2)
+"""How much longer than at rest an edge is taken to be at most."""
+QUICK = wp.constant(3.0)
+"""[m/s] What comes nearer faster than this, where the surfaces do not yet touch, may be seen a substep late."""
+
+
+@wp.func
+def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
+    """Place [m] and rotation (row major, shape to world) of a shape after ``clock`` substeps."""
+    row = s * COLUMNS
+    stride = shapes.stride
+    ox = t.scalars[ORIGIN]
+    oy = t.scalars[ORIGIN + 1]
+    oz = t.scalars[ORIGIN + 2]
+    cx = per_world(like, shapes.table, t.group, stride, t.worlds, row) - ox
+    cy = per_world(like, shapes.table, t.group, stride, t.worlds, row + 1) - oy
+    cz = per_world(like, shapes.table, t.group, stride, t.worlds, row + 2) - oz
+    r00 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 3)
+    r01 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 4)
+    r02 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 5)
+    r10 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 6)
+    r11 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 7)
+    r12 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 8)
+    r20 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 9)
+    r21 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 10)
+    r22 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 11)
+    slot = shapes.slot[s]
+    if slot >= 0:
+        cx, cy, cz = led_place(like, shapes, slot, clock, t.group, t.worlds, ox, oy, oz)
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = led_turn(like, shapes, slot, clock, t.group, t.worlds)
+    return cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22
+
+
+@wp.func
+def sharp_features(
+    kind: int, x: Any, y: Any, z: Any, hx: Any, hy: Any, hz: Any, sa: Any, sb: Any, sc: Any, broad: float
+):  # fmt: skip
+    """Whether what is within a box about x, y, z (half sides h, all in the shape's frame) may touch between vertices.
+
+    Returns:
+        Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
+        triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
+    """
+    x = size_of(x)
+    y = size_of(y)
+    z = size_of(z)
+    # how far the box ends beyond the shape's sides: a face has two of three well inside, an edge one, a corner none
+    apart = x
+    along = x
+    point = x
+    if kind == BOX:
+        qx = x + hx - sa
+        qy = y + hy - sb
+        qz = z + hz - sc
+        apart = most(most(x - hx - sa, y - hy - sb), z - hz - sc)
+        along = most(most(least(qx, qy), least(qy, qz)), least(qx, qz))
+        point = least(least(qx, qy), qz)
+    else:
+        slim = fill(x, broad) - sa
+        rho = root(times(x, x) + times(y, y))
+        wide = root(times(hx, hx) + times(hy, hy))
+        if kind == CYLINDER:
+            apart = most(rho - wide - sa, z - hz - sb)
+            rim = least(rho + wide - sa, z + hz - sb)
+            along = most(rim, slim)
+            point = least(rim, slim)
+        else:
+            beyond = most(z - sb, fill(x, 0.0))
+            apart = root(times(rho, rho) + times(beyond, beyond)) - root(times(wide, wide) + times(hz, hz)) - sa
+            along = slim
+            point = slim
+    return least(along, -apart), least(point, -apart)
+
+
+@wp.func
+def forget_sharp(t: Any, topo: Topology, thread: int):
+    """Start the lists anew; one thread does it.
+
+    `State.sharp` has how many shapes are listed, how many elements of each colour, and then the shapes.
+    """
+    if thread == 0:
+        for k in range(topo.sharp_colour.shape[0]):
+            t.sharp[k] = 0
+        t.sharp_wake[0] = 0.0
+
+
+@wp.func
+def mark_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+    """List the sharp shapes near the cloth, and mark the vertices by which they may touch within the frame.
+
+    By 1 where an edge at the vertex may be touched, by 2 where a triangle may.
+    """
+    like = t.x[0]
+    clock = int(largest(t.notes[CLOCK]))
+    grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + fill(like, QUICK * run.dt)
+    # no point of an edge or triangle is farther from the nearest of its vertices than 0.6 of its longest edge
+    around = grow + fill(like, 0.6 * STRETCHED * topo.longest)
+    broad = ROUND * run.cell
+    found = int(0)
+    for near in range(t.near[0]):
+        s = t.near[1 + near]
+        kind = shapes.kind[s]
+        if kind < PLANE:
+            cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose_of(like, t, shapes, s, clock)
+            row = s * COLUMNS
+            sa = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 12)
+            sb = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 13)
+            sc = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 14)
+            # the cloth's box as the shape sees it
+            dx = (t.box[0] + t.box[3]) * 0.5 - cx
+            dy = (t.box[1] + t.box[4]) * 0.5 - cy
+            dz = (t.box[2] + t.box[5]) * 0.5 - cz
+            wx = (t.box[3] - t.box[0]) * 0.5
+            wy = (t.box[4] - t.box[1]) * 0.5
+            wz = (t.box[5] - t.box[2]) * 0.5
+            hx = times(size_of(r00), wx) + times(size_of(r10), wy) + times(size_of(r20), wz) + grow
+            hy = times(size_of(r01), wx) + times(size_of(r11), wy) + times(size_of(r21), wz) + grow
+            hz = times(size_of(r02), wx) + times(size_of(r12), wy) + times(size_of(r22), wz) + grow
+            x = times(r00, dx) + times(r10, dy) + times(r20, dz)
+            y = times(r01, dx) + times(r11, dy) + times(r21, dz)
+            z = times(r02, dx) + times(r12, dy) + times(r22, dz)
+            along, point = sharp_features(kind, x, y, z, hx, hy, hz, sa, sb, sc, broad)
+            if anywhere(along):
+                if found == 0:
+                    for i in range(thread, topo.particles, threads):
+                        t.sharp_mark[i] = 0
+                if thread == 0:
+                    t.sharp[topo.sharp_colour.shape[0] + found] = s
+                found = found + 1
+                for i in range(thread, topo.particles, threads):
+                    dx = t.x[i] - cx
+                    dy = t.y[i] - cy
+                    dz = t.z[i] - cz
+                    x = times(r00, dx) + times(r10, dy) + times(r20, dz)
+                    y = times(r01, dx) + times(r11, dy) + times(r21, dz)
+                    z = times(r02, dx) + times(r12, dy) + times(r22, dz)
+                    along, point = sharp_features(kind, x, y, z, around, around, around, sa, sb, sc, broad)
+                    if anywhere(along):
+                        t.sharp_mark[i] = t.sharp_mark[i] | 1
+                    if anywhere(point):
+                        t.sharp_mark[i] = t.sharp_mark[i] | 2
+    if thread == 0:
+        t.sharp[0] = found
+
+
+@wp.func
+def list_sharp(t: Any, topo: Topology, thread: int, threads: int):
+    """List the edges and triangles with marked vertices, once all are marked."""
+    if t.sharp[0] > 0:
+        edges = topo.side.shape[0]
+        for c in range(topo.sharp_colour.shape[0] - 1):
+            first = topo.sharp_colour[c]
+            for k in range(first + thread, topo.sharp_colour[c + 1], threads):
+                near = int(0)
+                if k < edges:
+                    e = topo.side[k]
+                    near = (t.sharp_mark[e[0]] | t.sharp_mark[e[1]]) & 1
+                else:
+                    f = topo.face[k - edges]
+                    near = (t.sharp_mark[f[0]] | t.sharp_mark[f[1]] | t.sharp_mark[f[2]]) & 2
+                if near != 0:
+                    place = first + wp.atomic_add(t.sharp, 1 + c, 1)
+                    t.sharp_list[place] = k
+                    t.sharp_wake[1 + place] = 0.0
