@@ -89,14 +89,15 @@ class CoupledBodies:
         return same and (not self.rigid or (rigid is not None and rigid.solver.state.capacity == self._capacity))
 
     def run_frame(
-        self, time: float, duration: float, substeps: int, party: dict[Body, np.ndarray], kept: dict[Body, np.ndarray]
-    ) -> None:
+        self, time: float, duration: float, substeps: tuple[int, int], party: dict[Body, np.ndarray],
+        kept: dict[Body, np.ndarray],
+    ) -> None:  # fmt: skip
         """Advance by ``duration`` [s], at most a frame.
 
         Args:
             time: The world's time [s].
             duration: [s].
-            substeps: In how many substeps.
+            substeps: In how many substeps, and how many a whole frame has.
             party: Of each body in each world (worlds,), the first of those that it goes with, in the group's numbers.
             kept: See the attribute.
         """

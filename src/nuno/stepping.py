@@ -130,8 +130,7 @@ class Stepping:
 
         world = self._world
         frame = 1.0 / world.frame_rate
-        if duration < frame - SOON:
-            substeps = substeps_of(duration, frame, substeps)
+        count = substeps_of(duration, frame, substeps) if duration < frame - SOON else substeps
         key = tuple(body.key for body in group)
         ties = tuple(grip for body in group for grip in body._dynamics.grips if grip.is_tie)  # type: ignore[union-attr]
         found = self._couplings.pop((key, ties), None)
@@ -142,7 +141,7 @@ class Stepping:
         while len(self._couplings) >= KEPT:
             self._couplings.pop(next(iter(self._couplings)))
         self._couplings[key, ties] = found
-        found.run_frame(time, duration, substeps, dict(zip(group, party, strict=True)), kept)
+        found.run_frame(time, duration, (count, substeps), dict(zip(group, party, strict=True)), kept)
         self.last.append(found)
 
     # -- what grips bear

@@ -26,6 +26,7 @@ from nuno.solver.lanes import (  # noqa: F401
     fill,
     largest,
     least,
+    minus,
     most,
     mul,
     over,
@@ -99,7 +100,7 @@ def wake_up(t: Any, topo: Topology, gone: float, thread: int, threads: int):
 @wp.func
 def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int, thread: int, threads: int):
     """The listed edges and triangles against one shape."""
-    like = t.x[0]
+    like = fill(t.x[0], 0.0)
     zero = fill(like, 0.0)
     one = fill(like, 1.0)
     kind = shapes.kind[s]
@@ -158,9 +159,9 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
             ends = topo.side[element]
             i = ends[0]
             j = ends[1]
-            dx = t.px[i] - cx
-            dy = t.py[i] - cy
-            dz = t.pz[i] - cz
+            dx = minus(t.px[i], cx)
+            dy = minus(t.py[i], cy)
+            dz = minus(t.pz[i], cz)
             ax = times(r00, dx) + times(r10, dy) + times(r20, dz)
             ay = times(r01, dx) + times(r11, dy) + times(r21, dz)
             az = times(r02, dx) + times(r12, dy) + times(r22, dz)
@@ -276,9 +277,9 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
             i = corners[0]
             j = corners[1]
             k = corners[2]
-            dx = t.px[i] - cx
-            dy = t.py[i] - cy
-            dz = t.pz[i] - cz
+            dx = minus(t.px[i], cx)
+            dy = minus(t.py[i], cy)
+            dz = minus(t.pz[i], cz)
             ax = times(r00, dx) + times(r10, dy) + times(r20, dz)
             ay = times(r01, dx) + times(r11, dy) + times(r21, dz)
             az = times(r02, dx) + times(r12, dy) + times(r22, dz)

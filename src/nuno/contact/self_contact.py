@@ -15,6 +15,7 @@ from nuno.contact.pair_lists import swept
 from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     add,
     anywhere,
+    beside,
     choose,
     fill,
     gather,
@@ -85,6 +86,14 @@ def heed(t: Any, gap: Any):
 
 
 @wp.func
+def span(x: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any):
+    """The sum of k_i x_i, the k adding up to zero."""
+    base = gather(x, a)
+    near = times(ka, beside(base, base)) + times(kb, beside(gather(x, b), base))
+    return near + times(kc, beside(gather(x, c), base)) + times(kd, beside(gather(x, d), base))
+
+
+@wp.func
 def part(
     t: Any,
     n: int,
@@ -105,27 +114,12 @@ def part(
 ):
     """Keep sum k_i x_i at least a thickness along the normal, with friction; ``on`` is positive where it counts."""
     zero = fill(ka, 0.0)
-    pxs = (
-        times(ka, gather(t.px, a))
-        + times(kb, gather(t.px, b))
-        + times(kc, gather(t.px, c))
-        + times(kd, gather(t.px, d))
-    )
-    pys = (
-        times(ka, gather(t.py, a))
-        + times(kb, gather(t.py, b))
-        + times(kc, gather(t.py, c))
-        + times(kd, gather(t.py, d))
-    )
-    pzs = (
-        times(ka, gather(t.pz, a))
-        + times(kb, gather(t.pz, b))
-        + times(kc, gather(t.pz, c))
-        + times(kd, gather(t.pz, d))
-    )
-    gx = times(ka, gather(t.x, a)) + times(kb, gather(t.x, b)) + times(kc, gather(t.x, c)) + times(kd, gather(t.x, d))
-    gy = times(ka, gather(t.y, a)) + times(kb, gather(t.y, b)) + times(kc, gather(t.y, c)) + times(kd, gather(t.y, d))
-    gz = times(ka, gather(t.z, a)) + times(kb, gather(t.z, b)) + times(kc, gather(t.z, c)) + times(kd, gather(t.z, d))
+    pxs = span(t.px, a, b, c, d, ka, kb, kc, kd)
+    pys = span(t.py, a, b, c, d, ka, kb, kc, kd)
+    pzs = span(t.pz, a, b, c, d, ka, kb, kc, kd)
+    gx = span(t.x, a, b, c, d, ka, kb, kc, kd)
+    gy = span(t.y, a, b, c, d, ka, kb, kc, kd)
+    gz = span(t.z, a, b, c, d, ka, kb, kc, kd)
     gap = times(gx, nx) + times(gy, ny) + times(gz, nz) - t.scalars[THICKNESS]
     on = least(on, -gap)
     if anywhere(on):
@@ -162,7 +156,7 @@ def part(
 @wp.func
 def touch_vertex_triangle(t: Any, n: int, run: Settings, thread: int, threads: int):
     """Vertices against triangles, where the vertex stood over the triangle when the substep began."""
-    like = t.x[0]
+    like = fill(t.x[0], 0.0)
     count = wp.min(highest(t.touch_count[0]), t.touch_triangle.shape[0] / 4)
     # what was farther than this when the substep began is not reached in it
     reach = t.scalars[THICKNESS] + swept(t, run)
@@ -215,7 +209,7 @@ def touch_vertex_triangle(t: Any, n: int, run: Settings, thread: int, threads: i
 @wp.func
 def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
     """Edges against edges, along the line between their closest points when the substep began."""
-    like = t.x[0]
+    like = fill(t.x[0], 0.0)
     count = wp.min(highest(t.touch_count[1]), t.touch_edge.shape[0] / 4)
     reach = t.scalars[THICKNESS] + swept(t, run)
     reach2 = times(reach, reach)

@@ -37,6 +37,7 @@ from nuno.solver.lanes import (  # noqa: F401
     fill,
     largest,
     least,
+    minus,
     most,
     mul,
     over,
@@ -85,7 +86,7 @@ def press(t: Any, i: int, gap: Any, nx: Any, ny: Any, nz: Any, ux: Any, uy: Any,
 def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, threads: int):
     """All particles against one shape."""
     row = s * COLUMNS
-    like = t.x[0]
+    like = fill(t.x[0], 0.0)
     stride = shapes.stride
     g = t.group
     w = t.worlds
@@ -148,9 +149,9 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     # what comes nearer than this may have passed through within the substep
     near = radius + fill(like, SWIFT * dt)
     for i in range(thread, n, threads):
-        dx = t.x[i] - cx
-        dy = t.y[i] - cy
-        dz = t.z[i] - cz
+        dx = minus(t.x[i], cx)
+        dy = minus(t.y[i], cy)
+        dz = minus(t.z[i], cz)
         # into the shape's frame
         x = times(r00, dx) + times(r10, dy) + times(r20, dz)
         y = times(r01, dx) + times(r11, dy) + times(r21, dz)

@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno.contact.distances import BOX, PLANE, SOLID_MESH, distance_solid, way_in
 from nuno.contact.shapes import COLUMNS, LEAVE_SPEED, SWIFT, press, touch_shape
-from nuno.solver.lanes import window
+from nuno.solver.lanes import minus, sub, window  # noqa: F401 (sub: Warp takes it for the operator)
 from nuno.solver.state import FRICTION, ORIGIN, THICKNESS, Shapes
 
 
@@ -40,9 +40,9 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     kind = shapes.kind[s]
     near = radius + SWIFT * dt
     for i in range(thread, n, threads):
-        dx = t.x[i] - cx
-        dy = t.y[i] - cy
-        dz = t.z[i] - cz
+        dx = minus(t.x[i], cx)
+        dy = minus(t.y[i], cy)
+        dz = minus(t.z[i], cz)
         x = r00 * dx + r10 * dy + r20 * dz
         y = r01 * dx + r11 * dy + r21 * dz
         z = r02 * dx + r12 * dy + r22 * dz

@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, fill, most, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, beside, fill, most, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.membrane import shift
 from nuno.solver.vector import at, is_set, put, scaled
 
@@ -40,17 +40,20 @@ def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: An
     dx = at(t.x, c)
     dy = at(t.y, c)
     dz = at(t.z, c)
-    cx = ax - bx * 2.0 + dx
-    cy = ay - by * 2.0 + dy
-    cz = az - bz * 2.0 + dz
+    cx = beside(ax, bx) - beside(bx, bx) * 2.0 + beside(dx, bx)
+    cy = beside(ay, by) - beside(by, by) * 2.0 + beside(dy, by)
+    cz = beside(az, bz) - beside(bz, bz) * 2.0 + beside(dz, bz)
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
     weight = wa + wb * 4.0 + wc
     if damped != 0:
-        cx = cx + times(gamma, cx - at(t.px, a) + at(t.px, b) * 2.0 - at(t.px, c))
-        cy = cy + times(gamma, cy - at(t.py, a) + at(t.py, b) * 2.0 - at(t.py, c))
-        cz = cz + times(gamma, cz - at(t.pz, a) + at(t.pz, b) * 2.0 - at(t.pz, c))
+        mx = at(t.px, b)
+        cx = cx + times(gamma, cx - beside(at(t.px, a), mx) + beside(mx, mx) * 2.0 - beside(at(t.px, c), mx))
+        my = at(t.py, b)
+        cy = cy + times(gamma, cy - beside(at(t.py, a), my) + beside(my, my) * 2.0 - beside(at(t.py, c), my))
+        mz = at(t.pz, b)
+        cz = cz + times(gamma, cz - beside(at(t.pz, a), mz) + beside(mz, mz) * 2.0 - beside(at(t.pz, c), mz))
         weight = weight + times(gamma, weight)
     s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
     sa = times(s, wa)
@@ -68,20 +71,27 @@ def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: An
 
 
 @wp.func
+def twist_of(x: Any, a: Any, b: Any, c: Any, d: Any):
+    """The coordinates' x_0 - x_1 - x_2 + x_3."""
+    base = at(x, a)
+    return beside(base, base) - beside(at(x, b), base) - beside(at(x, c), base) + beside(at(x, d), base)
+
+
+@wp.func
 def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, gamma: Any):
     """The corners of a cell: c = x_0 - x_1 - x_2 + x_3; ``gamma`` is the damping over dt."""
-    cx = at(t.x, a) - at(t.x, b) - at(t.x, c) + at(t.x, d)
-    cy = at(t.y, a) - at(t.y, b) - at(t.y, c) + at(t.y, d)
-    cz = at(t.z, a) - at(t.z, b) - at(t.z, c) + at(t.z, d)
+    cx = twist_of(t.x, a, b, c, d)
+    cy = twist_of(t.y, a, b, c, d)
+    cz = twist_of(t.z, a, b, c, d)
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
     wd = at(t.w, d)
     weight = wa + wb + wc + wd
     if damped != 0:
-        cx = cx + times(gamma, cx - (at(t.px, a) - at(t.px, b) - at(t.px, c) + at(t.px, d)))
-        cy = cy + times(gamma, cy - (at(t.py, a) - at(t.py, b) - at(t.py, c) + at(t.py, d)))
-        cz = cz + times(gamma, cz - (at(t.pz, a) - at(t.pz, b) - at(t.pz, c) + at(t.pz, d)))
+        cx = cx + times(gamma, cx - twist_of(t.px, a, b, c, d))
+        cy = cy + times(gamma, cy - twist_of(t.py, a, b, c, d))
+        cz = cz + times(gamma, cz - twist_of(t.pz, a, b, c, d))
         weight = weight + times(gamma, weight)
     s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
     shift(t, a, cx, cy, cz, times(s, wa))
@@ -92,9 +102,15 @@ def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, 
 
 @wp.func
 def total(weights: Any, row: int, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any, x5: Any):
-    """The sum of six numbers, weighed with those from ``row`` on."""
-    near = scaled(x0, weights[row]) + scaled(x1, weights[row + 1]) + scaled(x2, weights[row + 2])
-    return near + scaled(x3, weights[row + 3]) + scaled(x4, weights[row + 4]) + scaled(x5, weights[row + 5])
+    """The sum of six coordinates, weighed with the numbers from ``row`` on, which add up to zero."""
+    r0 = beside(x0, x0)
+    r1 = beside(x1, x0)
+    r2 = beside(x2, x0)
+    r3 = beside(x3, x0)
+    r4 = beside(x4, x0)
+    r5 = beside(x5, x0)
+    near = scaled(r0, weights[row]) + scaled(r1, weights[row + 1]) + scaled(r2, weights[row + 2])
+    return near + scaled(r3, weights[row + 3]) + scaled(r4, weights[row + 4]) + scaled(r5, weights[row + 5])
 
 
 @wp.func

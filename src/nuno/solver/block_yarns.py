@@ -4,16 +4,18 @@ As in `nuno.solver.yarns` all rows are freed of their neighbours at once, step b
 own memory. Yarns that follow one another are solved side by side: where one ends, its row is linked to none.
 """
 
+from typing import Any
+
 import warp as wp
 
 from nuno.contact.renewal import shares_work
+from nuno.solver.fine import fine
 from nuno.solver.frame import stretch_yarns
 from nuno.solver.lanes import barrier
 from nuno.solver.membrane import stretch_yarn
-from nuno.solver.state import Settings, StateFloat, Topology
+from nuno.solver.state import Settings, Topology
 
-
-@wp.func_native("""
+_EDGES = """
 #if defined(__CUDA_ARCH__)
 __shared__ float rows[2][3][512];
 const int k = threadIdx.x, count = last - first;
@@ -22,7 +24,7 @@ const int e = own ? first + k : first;
 const int a = edge.data[e][0], b = edge.data[e][1];
 // an edge goes on from where the one before ended
 const bool linked = own && k > 0 && edge.data[e - 1][1] == a;
-const float px = x.data[b], py = y.data[b], pz = z.data[b];
+const decltype(x.data[0] + 0.f) px = x.data[b], py = y.data[b], pz = z.data[b];  // as coordinates are
 const float wa = w.data[a], wb = w.data[b];
 float ex = x.data[a] - px, ey = y.data[a] - py, ez = z.data[a] - pz;
 const float length = sqrtf(ex * ex + ey * ey + ez * ez + 1.0e-20f);
@@ -69,7 +71,10 @@ if (own) {
 }
 __syncthreads();
 #endif
-""")
+"""
+
+
+@wp.func_native(_EDGES)
 def stretch_edges(
     x: wp.array(dtype=float),
     y: wp.array(dtype=float),
@@ -92,10 +97,26 @@ def stretch_edges(
     ...
 
 
+@wp.func_native(_EDGES)
+def stretch_edges(
+    x: wp.array(dtype=fine),
+    y: wp.array(dtype=fine),
+    z: wp.array(dtype=fine),
+    w: wp.array(dtype=float),
+    soft: wp.array(dtype=float),
+    edge: wp.array(dtype=wp.vec2i),
+    rest: wp.array(dtype=float),
+    scale: wp.array(dtype=float),
+    which: wp.array(dtype=int),
+    first: int,
+    last: int,
+    longest: int,
+    rate: float,
+): ...
+
+
 @wp.func
-def stretch_yarns_of_block(
-    t: StateFloat, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int
-):
+def stretch_yarns_of_block(t: Any, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
     """The yarns first to last: on CUDA by a block, as many at once as it has threads for; else each by a thread."""
     if shares_work(threads):
         rate = 1.0 / (run.dt * run.dt)

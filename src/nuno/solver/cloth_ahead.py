@@ -4,12 +4,14 @@ As `nuno.solver.soft_ahead` does for tetrahedra. What an element has in tables c
 due, after all threads have waited for each other, it would take longer than the arithmetic.
 """
 
+from typing import Any
+
 import warp as wp
 
 from nuno.solver.bending import bend_line, bend_twist
 from nuno.solver.lanes import barrier
 from nuno.solver.membrane import shear_cell
-from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
+from nuno.solver.state import DAMPING, Settings, Topology
 
 
 @wp.struct
@@ -69,7 +71,7 @@ def read_cell(table: Topology, k: int, last: int):
 
 
 @wp.func
-def bend_lines_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, threads: int):
     """All line bends, as `nuno.solver.frame.bend_lines` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     damping = t.scalars[DAMPING] * (1.0 / run.dt)
@@ -98,7 +100,7 @@ def bend_lines_ahead(t: StateFloat, table: Topology, run: Settings, thread: int,
 
 
 @wp.func
-def bend_twists_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threads: int):
     """All cell twists, as `nuno.solver.frame.bend_twists` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     damping = t.scalars[DAMPING] * (1.0 / run.dt)
@@ -127,7 +129,7 @@ def bend_twists_ahead(t: StateFloat, table: Topology, run: Settings, thread: int
 
 
 @wp.func
-def shear_cells_ahead(t: StateFloat, table: Topology, run: Settings, thread: int, threads: int):
+def shear_cells_ahead(t: Any, table: Topology, run: Settings, thread: int, threads: int):
     """All cell shears, as `nuno.solver.frame.shear_cells` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     colours = table.cell_colour.shape[0] - 1

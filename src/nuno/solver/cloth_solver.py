@@ -14,7 +14,8 @@ from nuno.contact.world_room import listing_room
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
-from nuno.solver.frame import run_lanes, run_worlds
+from nuno.solver.fine_places import FinePlaces
+from nuno.solver.frame import run_fine_lanes, run_fine_worlds, run_lanes, run_worlds
 from nuno.solver.grid import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.large import LargePlan
@@ -27,8 +28,10 @@ from nuno.solver.shared import (
     run_blocks_many,
     run_blocks_partly,
     run_blocks_shared,
+    run_fine_blocks,
+    run_fine_blocks_partly,
 )
-from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES
+from nuno.solver.shared_memory import FINE_PARTICLES, SHARED_PARTICLES, WHOLE_PARTICLES
 from nuno.solver.stages import divide, make_work
 from nuno.solver.state import (
     COUNTS,
@@ -40,13 +43,15 @@ from nuno.solver.state import (
     TRAVEL,
     Settings,
     Sizes,
+    StateFine,
+    StateFineLanes,
     StateFloat,
     StateLanes,
     Topology,
 )
 from nuno.solver.substeps import default_substeps
 from nuno.solver.upload import upload
-from nuno.solver.wide import run_wide, widen_topology
+from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
 if TYPE_CHECKING:
     from nuno.materials import Cloth
@@ -138,6 +143,7 @@ class ClothSolver(ParticleSolver):
         topo.side_colours = int(np.searchsorted(shared["sharp_colour"].numpy(), len(side)))
         topo.longest = float(np.linalg.norm(rest[:, 0] - rest[:, 1], axis=1).max())
         self._size, self._state, self._topology = size, state, topo
+        self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine)
 
         soft = compliances(topology, values)
         for kind in ("stretch", "shear", "bend"):
@@ -282,21 +288,18 @@ class ClothSolver(ParticleSolver):
         return longer
 
     def _advance(self, run: Settings, substeps: int) -> None:
+        fine = self._fine.bring(run)
         if self.plan in LARGE:
             if self.plan == "grid":
                 run.margin = GRID_MARGIN * self._cell_size
             if self._large is None:
                 self._large = self._large_plan()
-            self._large.run(run, substeps)
+            self._large.run(run, substeps, fine)
             return
-        common = [self._state, self._topology, self._size, run, self._shapes]
+        states = [self._state] if fine is None else [fine, self._state]
+        common = [*states, self._topology, self._size, run, self._shapes]
         if self._cuda:
-            few = self.world_count <= wp.get_device(self.device).sm_count
-            kernel = run_blocks
-            if self.shared_memory and self.particle_count <= WHOLE_PARTICLES:
-                kernel = run_blocks_shared if few else run_blocks_many
-            elif self.shared_memory and self.particle_count <= SHARED_PARTICLES:
-                kernel = run_blocks_partly
+            kernel = self._block_kernel(fine is not None)
             blocks = self.world_count
             if self._state.helpers and substeps > 1:
                 blocks += self._state.helpers
@@ -309,16 +312,28 @@ class ClothSolver(ParticleSolver):
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)
-            inputs = [self._state, self._topology, self._wide, self._size, run, self._shapes, substeps]
-            wp.launch(run_wide, dim=1, inputs=inputs, device=self.device)
+            inputs = [*states, self._topology, self._wide, self._size, run, self._shapes, substeps]
+            wp.launch(run_wide if fine is None else run_fine_wide, dim=1, inputs=inputs, device=self.device)
         else:
-            kernel = run_lanes if self.lanes > 1 else run_worlds
-            before, after = common[:3], common[4:]
+            kernels = (run_lanes, run_fine_lanes) if self.lanes > 1 else (run_worlds, run_fine_worlds)
+            kernel = kernels[fine is not None]
+            before = [*states, self._topology, self._size]
 
             def launch(group: int, piece: Settings, count: int) -> None:
-                wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count, 1], device=self.device)
+                inputs = [*before, piece, self._shapes, group, count]
+                wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
+
+    def _block_kernel(self, fine: bool) -> Any:
+        """The kernel that has as much of a world in shared memory as fits."""
+        n = self.particle_count if self.shared_memory else BLOCK_PARTICLES
+        if fine:
+            return run_fine_blocks_partly if n <= FINE_PARTICLES else run_fine_blocks
+        if n <= WHOLE_PARTICLES:
+            few = self.world_count <= wp.get_device(self.device).sm_count
+            return run_blocks_shared if few else run_blocks_many
+        return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 
     def _forget_launches(self) -> None:
         self._large = None

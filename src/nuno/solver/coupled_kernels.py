@@ -17,11 +17,15 @@ ENOUGH = wp.constant(1.0e-8)
 
 @wp.struct
 class Layout:
-    """A solver's particles: x, y, z and the rest as plain floats, ``lanes`` worlds beside each other."""
+    """A solver's particles: x, y, z and the rest as plain numbers, ``lanes`` worlds beside each other.
+
+    Where coordinates are ``doubles``, they are in the arrays with capitals (see `nuno.solver.fine_places`).
+    """
 
     particles: int
     lanes: int
     first: int  # of the body's particles among those of the coupled bodies
+    doubles: int
     x: wp.array(dtype=float)
     y: wp.array(dtype=float)
     z: wp.array(dtype=float)
@@ -29,6 +33,12 @@ class Layout:
     py: wp.array(dtype=float)
     pz: wp.array(dtype=float)
     w: wp.array(dtype=float)
+    X: wp.array(dtype=wp.float64)
+    Y: wp.array(dtype=wp.float64)
+    Z: wp.array(dtype=wp.float64)
+    PX: wp.array(dtype=wp.float64)
+    PY: wp.array(dtype=wp.float64)
+    PZ: wp.array(dtype=wp.float64)
     offset: wp.array(dtype=wp.vec3)  # (worlds), from the origin of the body's party to the solver's
 
 
@@ -111,8 +121,16 @@ def collect(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)
     world, i = wp.tid()
     k = place_of(layout, world, i)
     j = world * particles.count + layout.first + i
-    p = wp.vec3(layout.px[k], layout.py[k], layout.pz[k])
-    u = wp.vec3(layout.x[k], layout.y[k], layout.z[k]) - p
+    p = wp.vec3(0.0, 0.0, 0.0)
+    u = wp.vec3(0.0, 0.0, 0.0)
+    if layout.doubles != 0:
+        p = wp.vec3(float(layout.PX[k]), float(layout.PY[k]), float(layout.PZ[k]))
+        u = wp.vec3(
+            float(layout.X[k] - layout.PX[k]), float(layout.Y[k] - layout.PY[k]), float(layout.Z[k] - layout.PZ[k])
+        )
+    else:
+        p = wp.vec3(layout.px[k], layout.py[k], layout.pz[k])
+        u = wp.vec3(layout.x[k], layout.y[k], layout.z[k]) - p
     particles.p[j] = p + layout.offset[world]
     particles.u[j] = u
     start[j] = u
@@ -126,9 +144,14 @@ def scatter(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)
     k = place_of(layout, world, i)
     j = world * particles.count + layout.first + i
     d = particles.u[j] - start[j]
-    layout.x[k] = layout.x[k] + d[0]
-    layout.y[k] = layout.y[k] + d[1]
-    layout.z[k] = layout.z[k] + d[2]
+    if layout.doubles != 0:
+        layout.X[k] = layout.X[k] + wp.float64(d[0])
+        layout.Y[k] = layout.Y[k] + wp.float64(d[1])
+        layout.Z[k] = layout.Z[k] + wp.float64(d[2])
+    else:
+        layout.x[k] = layout.x[k] + d[0]
+        layout.y[k] = layout.y[k] + d[1]
+        layout.z[k] = layout.z[k] + d[2]
 
 
 @wp.kernel(enable_backward=False)

@@ -15,7 +15,7 @@ from nuno.contact.coupled_ties import Holds, Ties
 from nuno.solver.coupled_kernels import Layout, Passing, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_body import RigidState
-from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PULLS, SHAPES, SPEED, VELOCITIES
+from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
 
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which handles one world."""
@@ -111,7 +111,11 @@ class Coupling:
         made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, self._firsts[k]
         for name in PARTICLE_ARRAYS:
             if not name.startswith("v"):
-                setattr(made, name, _floats(getattr(solver._state, name)))
+                setattr(made, name, _plain(getattr(solver._state, name), float))
+        made.doubles = int(solver._fine.count)
+        if made.doubles:
+            for name in PLACES:
+                setattr(made, name.upper(), _plain(solver._fine.array(name), wp.float64))
         offset = (solver.origin - self._origins[:, k]).astype(np.float32)
         made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
         return made
@@ -137,11 +141,12 @@ class Coupling:
 
     # -- running
 
-    def run_frame(self, time: float, duration: float, substeps: int, party: np.ndarray) -> None:
-        """Advance all bodies by ``duration`` [s] in ``substeps`` substeps; see `_set_parties`."""
+    def run_frame(self, time: float, duration: float, counts: tuple[int, int], party: np.ndarray) -> None:
+        """Advance all bodies by ``duration`` [s] in so many substeps, of so many a whole frame; see `_set_parties`."""
+        substeps, frame = counts
         dt = duration / substeps
         for solver in self._solvers:
-            solver.open(time, dt, substeps)
+            solver.open(time, dt, frame)
         self._set_parties(party)
         # a grip or a new state may have replaced what a layout names
         self._layouts = [self._layout(k) for k in range(len(self._solvers))]
@@ -292,7 +297,7 @@ class Coupling:
         return array.numpy().reshape(self.world_count, -1, 3)[:, :count].astype(float) * self._scale
 
 
-def _floats(array: wp.array) -> wp.array:
-    """An array of floats or of vectors of them as plain floats, without a copy."""
-    count = array.capacity // 4
-    return wp.array(ptr=array.ptr, dtype=float, shape=(count,), device=array.device, copy=False)
+def _plain(array: wp.array, number: Any) -> wp.array:
+    """An array of numbers or of vectors of them as plain numbers, without a copy."""
+    count = array.capacity // wp.types.type_size_in_bytes(number)
+    return wp.array(ptr=array.ptr, dtype=number, shape=(count,), device=array.device, copy=False)

@@ -17,8 +17,9 @@ from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
 from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
+from nuno.solver.fine_yarns import PAIR_EDGES, WARP_EDGES, stretch_fine_yarns
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.sheet_strips import bend_in_strips, fits_strips
@@ -32,13 +33,15 @@ from nuno.solver.state import (
     Settings,
     Shapes,
     Sizes,
+    StateFine,
+    StateFineLanes,
     StateFloat,
     StateLanes,
     Topology,
     view,
 )
 from nuno.solver.vector import at, corner, scaled, spread
-from nuno.solver.warps import in_warps
+from nuno.solver.warps import WARP, in_warps
 from nuno.solver.yarns import YARN_EDGES, stretch_yarns_together
 
 STRETCH_KINDS = wp.constant(2)
@@ -138,6 +141,36 @@ def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, las
 
 
 @wp.func
+def stretch_yarns(t: StateFine, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+    rate = 1.0 / (run.dt * run.dt)
+    if in_warps(threads):
+        warps = threads / WARP
+        k = int(first + thread / WARP)
+        while k < last:
+            start = table.yarn[k]
+            stop = table.yarn[k + 1]
+            other = int(0)
+            end = int(0)
+            if k + warps < last:
+                other = table.yarn[k + warps]
+                end = table.yarn[k + warps + 1]
+            if wp.max(stop - start, end - other) > PAIR_EDGES:
+                end = other
+            if stop - start <= WARP_EDGES:
+                stretch_fine_yarns(
+                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, table.edge_rest, table.edge_scale,
+                    table.edge_soft, start, stop, other, end, rate,
+                )  # fmt: skip
+            elif thread % WARP == 0:
+                stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
+            k += wp.where(end > other, 2 * warps, warps)
+    else:
+        for k in range(first + thread, last, threads):
+            start = table.yarn[k]
+            stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+
+
+@wp.func
 def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
@@ -163,7 +196,19 @@ def bend_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: int)
 def bend_sheet(t: StateFloat, topo: Topology, run: Settings, thread: int, threads: int):
     if in_warps(threads) and fits_strips(topo):
         bend_in_strips(t, topo, run, threads)
-    elif shares_work(threads):
+    else:
+        bend_one_sheet(t, topo, run, thread, threads)
+
+
+@wp.func
+def bend_sheet(t: StateFine, topo: Topology, run: Settings, thread: int, threads: int):
+    bend_one_sheet(t, topo, run, thread, threads)
+
+
+@wp.func
+def bend_one_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
+    """`bend_sheet` of one world: by threads that share it, or by one."""
+    if shares_work(threads):
         bend_twists_ahead(t, topo, run, thread, threads)
         bend_lines_ahead(t, topo, run, thread, threads)
         shear_cells_ahead(t, topo, run, thread, threads)
@@ -199,6 +244,17 @@ def meet_shapes(t: Any, n: int, shapes: Shapes, dt: float, thread: int, threads:
 
 @wp.func
 def meet_shapes(t: StateFloat, n: int, shapes: Shapes, dt: float, thread: int, threads: int):
+    meet_shapes_alone(t, n, shapes, dt, thread, threads)
+
+
+@wp.func
+def meet_shapes(t: StateFine, n: int, shapes: Shapes, dt: float, thread: int, threads: int):
+    meet_shapes_alone(t, n, shapes, dt, thread, threads)
+
+
+@wp.func
+def meet_shapes_alone(t: Any, n: int, shapes: Shapes, dt: float, thread: int, threads: int):
+    """`meet_shapes` of one world: by threads that share it, or by one."""
     if shares_work(threads):
         touch_shapes_together(t, n, shapes, dt, thread, threads)
     else:
@@ -239,20 +295,23 @@ def meet_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: in
 
 
 @wp.func
-def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
-    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for."""
+def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
+    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for.
+
+    ``near`` is the same state with coordinates as floats, for lists of what is near; ``t`` itself where they are.
+    """
     n = topo.particles
     for k in range(substeps):
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
-                near_shapes(t, n, run, shapes, thread, threads)
-                near_sharp(t, topo, run, shapes, thread, threads)
+                near_shapes(near, n, run, shapes, thread, threads)
+                near_sharp(near, topo, run, shapes, thread, threads)
                 forget_loads(t, run, thread, threads)
             # before the listing, which asks how far anything went in the substep before
             tick(t, run, thread)
             barrier(threads)
             if run.touching != 0:
-                renew_lists(t, topo, run, thread, threads)
+                renew_lists(near, topo, run, thread, threads)
             predict(t, n, run, thread, threads)
             barrier(threads)
             hold_vertices(t, run, thread, threads)
@@ -278,40 +337,50 @@ def advance(t: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int
             reset_speed(t, thread)
             barrier(threads)
             read_velocities(t, n, run, thread, threads)
+            round_places(near, t, n, thread, threads)
             barrier(threads)
 
 
-@wp.func
-def run_share(
-    s: Any,
+# A module each, so that only the kind that is run is compiled.
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_worlds")
+def run_worlds(s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int):
+    """Every world by itself, by one thread on the CPU."""
+    t = view(s, first + wp.tid(), topo.particles, size)
+    advance(t, t, topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_lanes")
+def run_lanes(s: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int):
+    """Sixteen worlds at once, by one thread on the CPU."""
+    t = view(s, first + wp.tid(), topo.particles, size)
+    advance(t, t, topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_fine_worlds")
+def run_fine_worlds(
+    s: StateFine,
+    near: StateFloat,
     topo: Topology,
     size: Sizes,
     run: Settings,
     shapes: Shapes,
     first: int,
     substeps: int,
-    tid: int,
-    threads: int,
 ):
-    """What thread ``tid`` does: its share of the world, or of the sixteen worlds, that is its block's."""
-    t = view(s, first + tid / threads, topo.particles, size)
-    advance(t, topo, run, shapes, substeps, tid % threads, threads)
+    """Every world by itself, by one thread on the CPU, coordinates as doubles."""
+    group = first + wp.tid()
+    t = view(s, group, topo.particles, size)
+    advance(t, view(near, group, topo.particles, size), topo, run, shapes, substeps, 0, 1)
 
 
-# A module each, so that only the kind that is run is compiled.
-
-
-@wp.kernel(enable_backward=False, launch_bounds=(256, 1), module="nuno.solver.run_worlds")
-def run_worlds(
-    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int
-):
-    """Every world by itself: one thread on the CPU, a block of ``threads`` threads on CUDA."""
-    run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)
-
-
-@wp.kernel(enable_backward=False, module="nuno.solver.run_lanes")
-def run_lanes(
-    s: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int, substeps: int, threads: int
-):
-    """Sixteen worlds at once, by one thread on the CPU."""
-    run_share(s, topo, size, run, shapes, first, substeps, wp.tid(), threads)
+@wp.kernel(enable_backward=False, module="nuno.solver.run_fine_lanes")
+def run_fine_lanes(
+    s: StateFineLanes, near: StateLanes, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, first: int,
+    substeps: int,
+):  # fmt: skip
+    """Sixteen worlds at once, by one thread on the CPU, coordinates as doubles."""
+    group = first + wp.tid()
+    t = view(s, group, topo.particles, size)
+    advance(t, view(near, group, topo.particles, size), topo, run, shapes, substeps, 0, 1)

@@ -25,7 +25,7 @@ from nuno.solver.lanes import barrier
 from nuno.solver.large import THREADS, LargePlan, come_to_rest
 from nuno.solver.shared_memory import MOST_STEPS, figures, program
 from nuno.solver.stages import Work, go_through, grips_on, steps_of
-from nuno.solver.state import ALL_PARTS, SPEED, Settings, Shapes, Sizes, StateFloat, Topology, view
+from nuno.solver.state import ALL_PARTS, SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
 from nuno.solver.team import ARRIVED, COUNT, VERDICT, Team, begin_to_meet, call_roll, counts_of, meet, team_of
 from nuno.solver.warps import in_warps
 
@@ -35,7 +35,8 @@ vertices on an H200, 1 to 132 blocks; 23 for 16,641)."""
 
 log = logging.getLogger(__name__)
 
-wp.get_module("nuno.solver.run_grid").options["fast_math"] = True  # as in the plans for a block
+for _name in ("run_grid", "run_fine_grid"):
+    wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True  # as in the plans for a block
 
 
 @wp.func
@@ -58,7 +59,7 @@ def near_shapes(t: StateFloat, topo: Topology, run: Settings, shapes: Shapes, te
 
 
 @wp.func
-def share_speed(t: StateFloat, speeds: wp.array(dtype=float), own: int, other: int, team: Team):
+def share_speed(t: Any, speeds: wp.array(dtype=float), own: int, other: int, team: Team):
     """Raise a speed of all blocks to the block's, wait, and take it; the one of the substep before has served."""
     barrier(team.threads)
     if team.thread == 0:
@@ -73,10 +74,13 @@ def share_speed(t: StateFloat, speeds: wp.array(dtype=float), own: int, other: i
 
 @wp.func
 def advance_by_team(
-    t: StateFloat, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, shapes: Shapes, lists: Lists,
-    speeds: wp.array(dtype=float), world: int, substeps: int, team: Team,
+    t: Any, near: Any, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, shapes: Shapes,
+    lists: Lists, speeds: wp.array(dtype=float), world: int, substeps: int, team: Team,
 ):  # fmt: skip
-    """The phases of ``substeps`` substeps, the first of which begins a frame."""
+    """The phases of ``substeps`` substeps, the first of which begins a frame.
+
+    ``near`` is as `nuno.solver.frame.advance` has it.
+    """
     n = topo.particles
     first = n * team.block / team.blocks
     last = n * (team.block + 1) / team.blocks
@@ -86,12 +90,12 @@ def advance_by_team(
     forget_loads(t, run, team.turn, team.turns)
     if team.turn == 0:
         speeds[2 * world] = 0.0
-    near_shapes(t, topo, run, shapes, team)
+    near_shapes(near, topo, run, shapes, team)
     for k in range(substeps):
         tick(t, run, team.thread)
         barrier(team.threads)
         if run.touching != 0:
-            renew_by_team(t, topo, run, lists, world, team)
+            renew_by_team(near, topo, run, lists, world, team)
         go_through(t, topo, work, steps, run, led, 0, work.steps, team)
         meet(team)
         if run.pulled != 0:
@@ -118,8 +122,56 @@ def advance_by_team(
             meet(team)
         reset_speed(t, team.thread)
         barrier(team.threads)
-        come_to_rest(t, n, run, shapes, held, first, last, team.thread, team.threads)
+        come_to_rest(t, near, n, run, shapes, held, first, last, team.thread, team.threads)
         share_speed(t, speeds, 2 * world + k % 2, 2 * world + (k + 1) % 2, team)
+
+
+@wp.func
+def near_of(t: StateFloat, floats: StateFloat, world: int, n: int, size: Sizes):
+    """A world's state with coordinates as floats: itself where they are, else of ``floats``, with the same figures."""
+    return t
+
+
+@wp.func
+def near_of(t: StateFine, floats: StateFloat, world: int, n: int, size: Sizes):
+    near = view(floats, world, n, size)
+    near.scalars = t.scalars
+    near.notes = t.notes
+    return near
+
+
+@wp.func
+def run_teams(
+    s: Any, floats: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, work: Work, lists: Lists,
+    speeds: wp.array(dtype=float), first: int, substeps: int, teams: int, team: Team,
+):  # fmt: skip
+    """What a team does of the worlds that it goes through, from ``first`` on."""
+    threads = team.threads
+    steps = steps_of(work, team.block)
+    if in_warps(threads) and work.steps <= MOST_STEPS:
+        steps = program(0)
+        listed = steps_of(work, team.block)
+        for k in range(team.thread, 4 * work.steps, threads):
+            steps[k] = listed[k]
+    for world in range(first, s.worlds, teams):
+        t = view(s, world, topo.particles, size)
+        notes = t.notes
+        if in_warps(threads):
+            scalars = t.scalars
+            t.scalars = figures(0)
+            t.notes = figures(8)
+            if team.thread == 0:
+                for k in range(7):
+                    t.scalars[k] = scalars[k]
+                for k in range(6):
+                    t.notes[k] = notes[k]
+        barrier(threads)
+        near = near_of(t, floats, world, topo.particles, size)
+        advance_by_team(t, near, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
+        if team.turn == 0:
+            for k in range(6):
+                notes[k] = t.notes[k]
+        barrier(threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.run_grid")
@@ -132,30 +184,20 @@ def run_grid(
     first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
     if call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
-        steps = steps_of(work, team.block)
-        if in_warps(threads) and work.steps <= MOST_STEPS:
-            steps = program(0)
-            listed = steps_of(work, team.block)
-            for k in range(team.thread, 4 * work.steps, threads):
-                steps[k] = listed[k]
-        for world in range(first, s.worlds, teams):
-            t = view(s, world, topo.particles, size)
-            notes = t.notes
-            if in_warps(threads):
-                scalars = t.scalars
-                t.scalars = figures(0)
-                t.notes = figures(8)
-                if team.thread == 0:
-                    for k in range(7):
-                        t.scalars[k] = scalars[k]
-                    for k in range(6):
-                        t.notes[k] = notes[k]
-            barrier(threads)
-            advance_by_team(t, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
-            if team.turn == 0:
-                for k in range(6):
-                    notes[k] = t.notes[k]
-            barrier(threads)
+        run_teams(s, s, topo, size, run, shapes, work, lists, speeds, first, substeps, teams, team)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.run_fine_grid")
+def run_fine_grid(
+    s: StateFine, floats: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, work: Work,
+    lists: Lists, speeds: wp.array(dtype=float), gate: wp.array(dtype=int), call: int, substeps: int, teams: int,
+    blocks: int, threads: int,
+):  # fmt: skip
+    """`run_grid` where coordinates are doubles."""
+    first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
+    if call_roll(gate, call, teams, teams * blocks):
+        begin_to_meet(team)
+        run_teams(s, floats, topo, size, run, shapes, work, lists, speeds, first, substeps, teams, team)
 
 
 class GridPlan:
@@ -185,25 +227,27 @@ class GridPlan:
         self._speeds = wp.zeros(2 * state.worlds, dtype=float, device=device)
         self._crowded = False
 
-    def run(self, run: Any, substeps: int) -> None:
-        """Advance by ``substeps`` substeps under the settings ``run``."""
+    def run(self, run: Any, substeps: int, fine: Any = None) -> None:
+        """Advance by ``substeps`` substeps under the settings ``run``, coordinates as doubles if there is ``fine``."""
         if run.parts != ALL_PARTS or self._crowded:
-            self._launches.run(run, substeps)
+            self._launches.run(run, substeps, fine)
             return
         frames = range(0, substeps, run.frame)
         gate = wp.zeros(len(frames) * counts_of(self._teams), dtype=int, device=self._device)
         state, topology, size, shapes, work, lists = self._inputs
         for call, first in enumerate(frames):
-            inputs = [state, topology, size, run, shapes, work, lists, self._speeds, gate, call]
+            inputs = [state] if fine is None else [fine, state]
+            inputs += [topology, size, run, shapes, work, lists, self._speeds, gate, call]
             inputs += [min(run.frame, substeps - first), self._teams, self._blocks, self._threads]
             dim = self._teams * self._blocks * self._threads
-            wp.launch(run_grid, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
+            kernel = run_grid if fine is None else run_fine_grid
+            wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
         verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._teams, COUNT)[:, VERDICT, 0]
         if (verdicts != 1).any():
             self._crowded = True
             log.warning("a CUDA device is too busy for a launch of %d blocks: smaller ones go on", self._blocks)
             run.first = int((verdicts == 1).sum()) * run.frame
-            self._launches.run(run, substeps - run.first)
+            self._launches.run(run, substeps - run.first, fine)
 
 
 def teams_of(worlds: int, cores: int) -> tuple[int, int]:

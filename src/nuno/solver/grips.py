@@ -4,7 +4,22 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, choose, clipped, fill, gather, known, largest, mul, over, place, sub, times  # noqa: F401
+from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+    add,
+    beside,
+    choose,
+    clipped,
+    fill,
+    gather,
+    known,
+    largest,
+    minus,
+    mul,
+    over,
+    place,
+    sub,
+    times,
+)
 from nuno.solver.state import CLOCK, LOADS, Settings
 
 
@@ -18,10 +33,11 @@ def key_position(t: Any, run: Settings, g: int):
         k = k + 1
     last = wp.min(k + 1, run.keys - 1)
     begin = run.grip_time[first + k]
-    span = run.grip_time[first + last] - begin
+    # the operator would take times for coordinates (see `nuno.solver.fine`)
+    span = wp.sub(run.grip_time[first + last], begin)
     s = float(1.0)
     if span > wp.float64(0.0):
-        s = wp.clamp(float((now - begin) / span), 0.0, 1.0)
+        s = wp.clamp(float(wp.sub(now, begin) / span), 0.0, 1.0)
     if run.grip_ease[g] != 0:
         s = s * s * s * (10.0 + s * (6.0 * s - 15.0))
     a = first + k
@@ -53,6 +69,14 @@ def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
 
 
 @wp.func
+def off_path(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, path: Any):
+    """How far the mean of three coordinates with the weights k is from the path."""
+    base = gather(x, a)
+    near = times(ka, beside(base, base)) + times(kb, beside(gather(x, b), base))
+    return near + times(kc, beside(gather(x, c), base)) - beside(path, base)
+
+
+@wp.func
 def pull_points(t: Any, run: Settings, thread: int, threads: int):
     """Grips on surface points, and compliant ones: c = sum b_i x_i - path, one after the other."""
     if thread == 0:
@@ -66,9 +90,9 @@ def pull_points(t: Any, run: Settings, thread: int, threads: int):
                 ka = t.grip_weight[3 * g]
                 kb = t.grip_weight[3 * g + 1]
                 kc = t.grip_weight[3 * g + 2]
-                dx = times(ka, gather(t.x, a)) + times(kb, gather(t.x, b)) + times(kc, gather(t.x, c)) - x
-                dy = times(ka, gather(t.y, a)) + times(kb, gather(t.y, b)) + times(kc, gather(t.y, c)) - y
-                dz = times(ka, gather(t.z, a)) + times(kb, gather(t.z, b)) + times(kc, gather(t.z, c)) - z
+                dx = off_path(t.x, a, b, c, ka, kb, kc, x)
+                dy = off_path(t.y, a, b, c, ka, kb, kc, y)
+                dz = off_path(t.z, a, b, c, ka, kb, kc, z)
                 wa = times(ka, gather(t.w, a))
                 wb = times(kb, gather(t.w, b))
                 wc = times(kc, gather(t.w, c))
@@ -90,7 +114,7 @@ def read_loads(t: Any, run: Settings, thread: int, threads: int):
             on = known(x, t.grip_corner[3 * g])
             ghost = t.grip_ghost[g]
             share = over(on, ghost + fill(x, 1.0e-30))
-            add_load(t, g, gather(t.x, i) - x, gather(t.y, i) - y, gather(t.z, i) - z, share)
+            add_load(t, g, minus(gather(t.x, i), x), minus(gather(t.y, i), y), minus(gather(t.z, i), z), share)
             place(t.x, i, choose(on, x, gather(t.x, i)))
             place(t.y, i, choose(on, y, gather(t.y, i)))
             place(t.z, i, choose(on, z, gather(t.z, i)))

@@ -4,8 +4,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, choose, fill, most, mul, over, root, sub, times  # noqa: F401
-from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings
+from nuno.solver.lanes import add, choose, fill, most, mul, over, root, rough, sub, times  # noqa: F401
+from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings, StateFloat, StateLanes
 from nuno.solver.warps import leads_warp, most_of_warp
 
 
@@ -81,6 +81,25 @@ def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
         t.vz[i] = vz
         top = most(top, times(vx, vx) + times(vy, vy) + times(vz, vz))
     raise_speed(t.notes, top, thread, threads)
+
+
+@wp.func
+def round_places(near: Any, t: Any, n: int, thread: int, threads: int):
+    """Bring the floats ``near`` beside coordinates that are doubles."""
+    for i in range(thread, n, threads):
+        near.x[i] = rough(t.x[i])
+        near.y[i] = rough(t.y[i])
+        near.z[i] = rough(t.z[i])
+
+
+@wp.func
+def round_places(near: StateFloat, t: StateFloat, n: int, thread: int, threads: int):
+    """Floats stand beside themselves."""
+
+
+@wp.func
+def round_places(near: StateLanes, t: StateLanes, n: int, thread: int, threads: int):
+    """Floats stand beside themselves."""
 
 
 @wp.func

@@ -51,6 +51,39 @@ def mul(a: lane, b: float) -> lane: ...
 def mul(a: float, b: lane) -> lane: ...
 
 
+# The next three tell coordinates from other numbers, for those may be doubles: see `nuno.solver.fine`.
+@wp.func
+def rough(a: float):
+    """A coordinate as a float."""
+    return a
+
+
+@wp.func
+def rough(a: lane):
+    return a
+
+
+@wp.func
+def minus(a: float, b: float):
+    """How much a coordinate exceeds a number."""
+    return a - b
+
+
+@wp.func_native(_simd("A - B", "a", "b"))
+def minus(a: lane, b: lane) -> lane: ...
+
+
+@wp.func
+def beside(a: float, base: float):
+    """A coordinate in a sum whose weights add up to zero; where it is a double, what it exceeds ``base`` by."""
+    return a
+
+
+@wp.func
+def beside(a: lane, base: lane):
+    return a
+
+
 @wp.func
 def times(a: float, b: float):
     """The elementwise product."""

@@ -22,7 +22,7 @@ from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.solver.broad import PairFinder
 from nuno.solver.frame import meet_shapes
 from nuno.solver.grips import forget_loads, pull_points, read_loads
-from nuno.solver.integrate import read_velocities, reset_speed, tick
+from nuno.solver.integrate import read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import barrier
 from nuno.solver.stages import Work, go_through, steps_of
 from nuno.solver.state import (
@@ -34,6 +34,7 @@ from nuno.solver.state import (
     Settings,
     Shapes,
     Sizes,
+    StateFine,
     StateFloat,
     Topology,
     view,
@@ -141,11 +142,12 @@ def calm(s: StateFloat, topo: Topology, size: Sizes):
 
 @wp.func
 def come_to_rest(
-    t: StateFloat, n: int, run: Settings, shapes: Shapes, grips: int, first: int, last: int, thread: int, threads: int
-):
+    t: Any, near: Any, n: int, run: Settings, shapes: Shapes, grips: int, first: int, last: int, thread: int,
+    threads: int,
+):  # fmt: skip
     """What ends a substep of the particles first to last: sums of contact, stiff grips, shapes, velocities.
 
-    ``grips`` is none where no stiff grip is on one of these.
+    ``grips`` is none where no stiff grip is on one of these; ``near`` is as `nuno.solver.frame.advance` has it.
     """
     if run.parts & LAYERS != 0 and run.touching != 0:
         for i in range(first + thread, last, threads):
@@ -161,6 +163,7 @@ def come_to_rest(
         meet_shapes(t, last, shapes, run.dt, first + thread, threads)
     if run.parts & VELOCITIES != 0:
         read_velocities(t, last, run, first + thread, threads)
+        round_places(near, t, last, first + thread, threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
@@ -174,7 +177,68 @@ def finish(
     t = view(s, world, n, size)
     first = n * team.block / blocks
     last = n * (team.block + 1) / blocks
-    come_to_rest(t, n, run, shapes, run.grips, first, last, team.thread, threads)
+    come_to_rest(t, t, n, run, shapes, run.grips, first, last, team.thread, threads)
+
+
+# The same where coordinates are doubles; what asks for none of them, or is content with floats, is as above.
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.fine_large")
+def project_fine(
+    s: StateFine, topo: Topology, size: Sizes, run: Settings, work: Work, gate: wp.array(dtype=int), begin: int,
+    end: int, blocks: int, threads: int,
+):  # fmt: skip
+    """`project`."""
+    world, team = team_of(wp.tid(), gate, 0, s.worlds, blocks, threads)
+    t = view(s, world, topo.particles, size)
+    go_through(t, topo, work, steps_of(work, team.block), run, run.grips, begin, end, team)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.fine_large")
+def pull_fine(s: StateFine, topo: Topology, size: Sizes, run: Settings):
+    """`pull`."""
+    t = view(s, wp.tid(), topo.particles, size)
+    pull_points(t, run, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.fine_large")
+def touch_fine(s: StateFine, topo: Topology, size: Sizes, run: Settings, threads: int):
+    """`touch`."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    touch_edge_edge(t, topo.particles, run, tid % threads, threads)
+    touch_vertex_triangle(t, topo.particles, run, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.fine_large")
+def settle_fine(s: StateFine, topo: Topology, size: Sizes, run: Settings, threads: int):
+    """`settle`."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    take_moves(t, topo.particles, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.fine_large")
+def meet_sharp_fine(s: StateFine, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, threads: int):
+    """`meet_sharp`."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    touch_sharp(t, topo, run, shapes, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.solver.fine_large")
+def finish_fine(
+    s: StateFine, topo: Topology, size: Sizes, floats: StateFloat, run: Settings, shapes: Shapes,
+    gate: wp.array(dtype=int), blocks: int, threads: int,
+):  # fmt: skip
+    """`finish`."""
+    n = topo.particles
+    world, team = team_of(wp.tid(), gate, 0, s.worlds, blocks, threads)
+    t = view(s, world, n, size)
+    near = view(floats, world, n, size)
+    first = n * team.block / blocks
+    last = n * (team.block + 1) / blocks
+    come_to_rest(t, near, n, run, shapes, run.grips, first, last, team.thread, threads)
 
 
 class LargePlan:
@@ -197,7 +261,8 @@ class LargePlan:
         lists: Any,
     ) -> None:  # fmt: skip
         # all listed pairs are solved, which a whole device looks at in no time
-        self._state = picking_nothing(state)
+        self._state = picking_nothing(state, StateFloat())
+        self._fine: Any = None
         self._topology, self._size, self._shapes = topology, size, shapes
         self._device, self._worlds, self._work = device, worlds, work
         self._stages = [(int(first), int(last)) for first, last in pairwise(stages)]
@@ -211,8 +276,9 @@ class LargePlan:
         self._finder = PairFinder(topology, lists, worlds, device, many)
         self._graphs: dict[tuple[Any, ...], Any] = {}
 
-    def run(self, run: Any, substeps: int) -> None:
-        """Advance by ``substeps`` substeps under the settings ``run``."""
+    def run(self, run: Any, substeps: int, fine: Any = None) -> None:
+        """Advance by ``substeps`` substeps under the settings ``run``, coordinates as doubles if there is ``fine``."""
+        self._fine = None if fine is None else picking_nothing(fine, StateFine())
         graph = self._captured(run) if self._cuda else None
         for k in range(substeps):
             if run.parts & MOTION and (run.first + k) % run.frame == 0:
@@ -236,12 +302,14 @@ class LargePlan:
             run.keys,
             run.grip_ease.ptr,
             run.grip_fixed.ptr,
+            self._fine is not None,
         )
         found = self._graphs.get(key)
         if found is None:
             run.grip_start, run.grip_soft = wp.clone(run.grip_start), wp.clone(run.grip_soft)
-            wp.load_module(survey.module, device=self._device)
-            wp.load_module(survey.module, device=self._device, block_dim=THREADS)
+            for module in (survey.module, *([] if self._fine is None else [project_fine.module])):
+                wp.load_module(module, device=self._device)
+                wp.load_module(module, device=self._device, block_dim=THREADS)
             self._finder.load()
             with wp.ScopedCapture(device=self._device, force_module_load=False) as capture:
                 self._substep(run)
@@ -252,13 +320,13 @@ class LargePlan:
         wp.copy(kept.grip_soft, run.grip_soft)
         return found[0]
 
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
+    def _launch(self, kernel: Any, count: int, *inputs: Any, state: Any = None) -> None:
         threads = max(1, min(count, MANY if self._cuda else CPU_THREADS))
-        common = [self._state, self._topology, self._size]
+        common = [state or self._state, self._topology, self._size]
         wp.launch(kernel, dim=self._worlds * threads, inputs=[*common, *inputs, threads], device=self._device)
 
     def _launch_blocks(self, kernel: Any, *inputs: Any) -> None:
-        inputs = (self._state, self._topology, self._size, *inputs, self._blocks, self._threads)
+        inputs = (self._fine or self._state, self._topology, self._size, *inputs, self._blocks, self._threads)
         dim = self._worlds * self._blocks * self._threads
         wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=THREADS)
 
@@ -277,35 +345,39 @@ class LargePlan:
 
     def _substep(self, run: Any) -> None:
         common = [self._state, self._topology, self._size]
+        coarse, floats = self._fine is None, [] if self._fine is None else [self._state]
+        state = self._fine or self._state
         if run.parts & MOTION:
             wp.launch(start, dim=self._worlds, inputs=[*common, run], device=self._device)
             if run.touching:
                 self._finder.launch(self._state, self._size, run)
             for first, last in self._stages:
-                self._launch_blocks(project, run, self._work, self._gate, first, last)
+                self._launch_blocks(project if coarse else project_fine, run, self._work, self._gate, first, last)
         if run.parts & PULLS and run.pulled:
-            wp.launch(pull, dim=self._worlds, inputs=[*common, run], device=self._device)
+            inputs = [state, self._topology, self._size, run]
+            wp.launch(pull if coarse else pull_fine, dim=self._worlds, inputs=inputs, device=self._device)
         if run.parts & LAYERS and run.touching:
             for again in range(PASSES):
                 if again:
-                    self._launch(settle, self._topology.particles, run)
-                self._launch(touch, MANY, run)
+                    kernel = settle if coarse else settle_fine
+                    self._launch(kernel, self._topology.particles, run, state=state)
+                self._launch(touch if coarse else touch_fine, MANY, run, state=state)
         if run.parts & SHAPES and self._sharp:
             if run.parts & LAYERS and run.touching:
-                self._launch(settle, self._topology.particles, run)
+                self._launch(settle if coarse else settle_fine, self._topology.particles, run, state=state)
+            inputs = [state, self._topology, self._size, run, self._shapes, self._threads]
             wp.launch(
-                meet_sharp, dim=self._worlds * self._threads, inputs=[*common, run, self._shapes, self._threads],
+                meet_sharp if coarse else meet_sharp_fine, dim=self._worlds * self._threads, inputs=inputs,
                 device=self._device, block_dim=THREADS,
             )  # fmt: skip
         if run.parts & VELOCITIES:
             wp.launch(calm, dim=self._worlds, inputs=common, device=self._device)
         if run.parts & (LAYERS | SHAPES | VELOCITIES):
-            self._launch_blocks(finish, run, self._shapes, self._gate)
+            self._launch_blocks(finish if coarse else finish_fine, *floats, run, self._shapes, self._gate)
 
 
-def picking_nothing(state: Any) -> Any:
-    """The same state, in which the listed pairs are those that may touch."""
-    made = StateFloat()
+def picking_nothing(state: Any, made: Any) -> Any:
+    """``made`` as the same state, in which the listed pairs are those that may touch."""
     for name in state._cls.vars:
         setattr(made, name, getattr(state, name))
     made.touch_triangle, made.touch_edge = state.vertex_triangle, state.edge_edge

@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, fill, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, beside, fill, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.vector import at, corner, put, scaled, spread
 
 
@@ -166,11 +166,19 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
 
 
 @wp.func
+def slope(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
+    """The sum of k_i x_i, the k adding up to zero."""
+    base = at(x, a)
+    near = scaled(beside(base, base), ka) + scaled(beside(at(x, b), base), kb)
+    return near + scaled(beside(at(x, c), base), kc)
+
+
+@wp.func
 def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any):
     """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i."""
-    fx = scaled(at(t.x, a), ka) + scaled(at(t.x, b), kb) + scaled(at(t.x, c), kc)
-    fy = scaled(at(t.y, a), ka) + scaled(at(t.y, b), kb) + scaled(at(t.y, c), kc)
-    fz = scaled(at(t.z, a), ka) + scaled(at(t.z, b), kb) + scaled(at(t.z, c), kc)
+    fx = slope(t.x, a, b, c, ka, kb, kc)
+    fy = slope(t.y, a, b, c, ka, kb, kc)
+    fz = slope(t.z, a, b, c, ka, kb, kc)
     length = root(times(fx, fx) + times(fy, fy) + times(fz, fz) + fill(fx, 1.0e-20))
     wa = scaled(at(t.w, a), ka)
     wb = scaled(at(t.w, b), kb)
@@ -197,12 +205,12 @@ def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: An
     va = corner(table.triangle_v, k, 0, 3)
     vb = corner(table.triangle_v, k, 1, 3)
     vc = corner(table.triangle_v, k, 2, 3)
-    ux = scaled(at(t.x, a), ua) + scaled(at(t.x, b), ub) + scaled(at(t.x, c), uc)
-    uy = scaled(at(t.y, a), ua) + scaled(at(t.y, b), ub) + scaled(at(t.y, c), uc)
-    uz = scaled(at(t.z, a), ua) + scaled(at(t.z, b), ub) + scaled(at(t.z, c), uc)
-    vx = scaled(at(t.x, a), va) + scaled(at(t.x, b), vb) + scaled(at(t.x, c), vc)
-    vy = scaled(at(t.y, a), va) + scaled(at(t.y, b), vb) + scaled(at(t.y, c), vc)
-    vz = scaled(at(t.z, a), va) + scaled(at(t.z, b), vb) + scaled(at(t.z, c), vc)
+    ux = slope(t.x, a, b, c, ua, ub, uc)
+    uy = slope(t.y, a, b, c, ua, ub, uc)
+    uz = slope(t.z, a, b, c, ua, ub, uc)
+    vx = slope(t.x, a, b, c, va, vb, vc)
+    vy = slope(t.y, a, b, c, va, vb, vc)
+    vz = slope(t.z, a, b, c, va, vb, vc)
     uu = times(ux, ux) + times(uy, uy) + times(uz, uz)
     vv = times(vx, vx) + times(vy, vy) + times(vz, vz)
     uv = times(ux, vx) + times(uy, vy) + times(uz, vz)

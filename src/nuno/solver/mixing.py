@@ -22,6 +22,8 @@ Copied = dict[str, np.ndarray]  # (worlds, ...) each
 def copy_particles(solver: ParticleSolver) -> Copied:
     """Return all that a run changes of a cloth or soft body and that outlasts it."""
     copied = {name: solver._get(getattr(solver._state, name), count).copy() for name, count in _columns(solver).items()}
+    if solver._fine.count:
+        copied |= {f"fine_{name}": array.copy() for name, array in _doubles(solver).items()}
     return copied | {"last_dt": np.full(solver.world_count, solver._last_dt)}
 
 
@@ -35,10 +37,30 @@ def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]])
         if name == "notes":
             values[:, TRAVEL] = 1.0e9
         wp.copy(array, solver._put(values))
+    _mix_doubles(solver, made)
     last = np.full(solver.world_count, solver._last_dt)
     for copied, worlds in made:
         last[worlds] = copied["last_dt"][worlds]
     solver._last_dt = last
+
+
+def _mix_doubles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
+    """The same for coordinates that are doubles in some copies; in the others they are the floats'."""
+    if not solver._fine.count and not any("fine_x" in copied for copied, _ in made):
+        return
+    mixed = []
+    for name, values in _doubles(solver).items():
+        for copied, worlds in made:
+            values[worlds] = copied.get(f"fine_{name}", copied[name])[worlds]
+        mixed.append(values)
+    solver._fine.put(np.stack(mixed, axis=-1))
+
+
+def _doubles(solver: ParticleSolver) -> Copied:
+    """The coordinates that count, as doubles."""
+    count = solver.particle_count
+    arrays = zip(("x", "y", "z"), solver._fine.arrays, strict=True)
+    return {name: solver._get(array, count).astype(np.float64) for name, array in arrays}
 
 
 def _columns(solver: ParticleSolver) -> dict[str, int]:

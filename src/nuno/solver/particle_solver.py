@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.shapes import COLUMNS
+from nuno.solver.fine_places import FinePlaces
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.state import (
     ALL_PARTS,
@@ -74,6 +75,7 @@ class ParticleSolver:
     _inverse_mass: np.ndarray
     _damped: bool
     _cell_size: float
+    _fine: FinePlaces
 
     def _prepare(
         self, positions: np.ndarray, device: str, gravity: Sequence[float], frame_rate: float, lanes: bool = True
@@ -110,16 +112,20 @@ class ParticleSolver:
 
     def _put(self, values: np.ndarray, integer: bool = False) -> wp.array:
         """A device array of (worlds, k) numbers, k elements per world or per group of lanes."""
-        kind = np.int32 if integer else np.float32
-        values = np.ascontiguousarray(np.asarray(values, dtype=kind).reshape(self.world_count, -1))
+        values = np.asarray(values, dtype=np.int32 if integer else np.float32)
         dtype = self._integer if integer else self._number
-        if self.lanes > 1:
-            pad = self.group_count * self.lanes - self.world_count
-            # lanes beyond the last world repeat it: they cost nothing more and stay finite
-            values = np.concatenate([values, np.repeat(values[-1:], pad, axis=0)])
-            values = values.reshape(self.group_count, self.lanes, -1).transpose(0, 2, 1)
-            return wp.array(np.ascontiguousarray(values).reshape(-1, self.lanes), dtype=dtype, device=self.device)
-        return wp.array(values.ravel(), dtype=dtype, device=self.device)
+        return wp.array(self._arranged(values), dtype=dtype, device=self.device)
+
+    def _arranged(self, values: np.ndarray) -> np.ndarray:
+        """(worlds, k) numbers in a device array's order."""
+        values = np.ascontiguousarray(values.reshape(self.world_count, -1))
+        if self.lanes == 1:
+            return values.ravel()
+        pad = self.group_count * self.lanes - self.world_count
+        # lanes beyond the last world repeat it: they cost nothing more and stay finite
+        values = np.concatenate([values, np.repeat(values[-1:], pad, axis=0)])
+        values = values.reshape(self.group_count, self.lanes, -1).transpose(0, 2, 1)
+        return np.ascontiguousarray(values).reshape(-1, self.lanes)
 
     def _get(self, array: wp.array, count: int) -> np.ndarray:
         """The (worlds, count) numbers of a device array."""
@@ -154,9 +160,8 @@ class ParticleSolver:
         return self.local_positions() + self.origin[:, None]
 
     def local_positions(self) -> np.ndarray:
-        """(worlds, n, 3) float32, relative to each world's ``origin`` [m]: the solver's own digits."""
-        s, n = self._state, self.particle_count
-        return np.stack([self._get(a, n) for a in (s.x, s.y, s.z)], axis=-1)
+        """(worlds, n, 3) relative to each world's ``origin`` [m]: the solver's own digits, float32 or float64."""
+        return np.stack([self._get(a, self.particle_count) for a in self._fine.arrays], axis=-1)
 
     @property
     def origin(self) -> np.ndarray:
@@ -207,20 +212,28 @@ class ParticleSolver:
             wp.copy(getattr(s, a), self._put(local[..., k]))
             wp.copy(getattr(s, b), self._put(local[..., k]))
             wp.copy(getattr(s, c), self._put(velocities[..., k]))
+        self._fine.count = False
+        if local.dtype == np.float64:
+            self._fine.put(local)
         wp.copy(s.notes, self._put(np.broadcast_to(state["notes"], (worlds, NOTES))))
         self._scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
         s.scalars = self._put(self._scalars)
         if hasattr(self, "_grips"):
             self.set_grips(self._grips)
 
-    def keep(self) -> tuple[np.ndarray, list[wp.array]]:
+    def keep(self) -> tuple[np.ndarray, list[wp.array], list[wp.array]]:
         """What `put_back` takes: the present state, copied on the device, which nobody waits for."""
-        return self._scalars[:, ORIGIN : ORIGIN + 3].copy(), [wp.clone(getattr(self._state, name)) for name in KEPT]
+        own = [wp.clone(getattr(self._state, name)) for name in KEPT]
+        fine = [wp.clone(array) for array in self._fine.arrays] if self._fine.count else []
+        return self._scalars[:, ORIGIN : ORIGIN + 3].copy(), own, fine
 
-    def put_back(self, kept: tuple[np.ndarray, list[wp.array]]) -> None:
+    def put_back(self, kept: tuple[np.ndarray, list[wp.array], list[wp.array]]) -> None:
         """Set the state that `keep` kept, as `load_state` does what `save_state` gave then."""
         for name, array in zip(KEPT, kept[1], strict=True):
             wp.copy(getattr(self._state, name), array)
+        self._fine.count = bool(kept[2])
+        for target, array in zip(self._fine.arrays, kept[2], strict=False):
+            wp.copy(target, array)
         self.load_state({**self.save_state(), "origin": kept[0]})
 
     def finite(self) -> np.ndarray:
@@ -400,13 +413,13 @@ class ParticleSolver:
         lists = {name: getattr(s, name).numpy().reshape(self.group_count, -1).copy() for name in self._shape_lists}
         near = lists["near"]
         shapes = sorted({int(k) for row in near for k in row[1 : 1 + row[0]]})
-        before, held = [wp.clone(a) for a in (s.x, s.y, s.z)], wp.clone(s.w)
+        before, held = [wp.clone(a) for a in self._fine.arrays], wp.clone(s.w)
         table: Any = wp.clone(self._shapes.table)
         slick = table.numpy().reshape(-1, COLUMNS).copy()
         slick[:, MU : MU + 2] = 0.0
 
         def moved(shape: int) -> np.ndarray:
-            for array, first in zip((s.x, s.y, s.z), before, strict=True):
+            for array, first in zip(self._fine.arrays, before, strict=True):
                 wp.copy(array, first)
             wp.copy(s.w, held)
             self._touch_only(shape, lists)
@@ -475,6 +488,7 @@ class ParticleSolver:
     def open(self, time: float, dt: float, frame: int) -> None:
         """Begin to advance by parts of a substep of ``dt`` [s], ``frame`` of them a frame; see `step_parts`."""
         self._opened = self.settings(time, dt, frame)
+        self._fine.bring(self._opened)
         self._reset_clock()
 
     def step_parts(self, index: int, parts: int) -> None:

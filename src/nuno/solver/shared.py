@@ -6,13 +6,24 @@ memory answers many times later, and threads wait for the answer.
 
 from __future__ import annotations
 
+from typing import Any
+
 import warp as wp
 
 from nuno.contact.helping import help_out, send_home
 from nuno.solver.frame import advance
 from nuno.solver.lanes import barrier
-from nuno.solver.shared_memory import SHARED_PARTICLES, WHOLE_PARTICLES, column, counts, figures, whole
-from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFloat, Topology, view
+from nuno.solver.shared_memory import (
+    FINE_PARTICLES,
+    SHARED_PARTICLES,
+    WHOLE_PARTICLES,
+    column,
+    counts,
+    figures,
+    fine_column,
+    whole,
+)
+from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
@@ -26,7 +37,7 @@ then share one, so that other worlds run while one waits. Both do the same, and 
 
 @wp.func
 def advance_block(
-    t: StateFloat, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
+    t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
 ):
     """`advance` with the counts of the pair lists and the figures in shared memory for as long as the launch takes."""
     listed = t.pair_count
@@ -37,6 +48,10 @@ def advance_block(
     t.touch_count = counts(COUNTS)
     t.scalars = figures(0)
     t.notes = figures(8)
+    near.pair_count = counts(0)
+    near.touch_count = counts(COUNTS)
+    near.scalars = figures(0)
+    near.notes = figures(8)
     if thread == 0:
         for k in range(COUNTS):
             t.pair_count[k] = listed[k]
@@ -47,7 +62,7 @@ def advance_block(
         for k in range(6):
             t.notes[k] = notes[k]
     barrier(threads)
-    advance(t, topo, run, shapes, substeps, thread, threads)
+    advance(t, near, topo, run, shapes, substeps, thread, threads)
     barrier(threads)
     if thread == 0:
         for k in range(COUNTS):
@@ -62,7 +77,10 @@ def advance_block(
 
 # A module each, so that only the kind that is run is compiled. Quotients and roots as the processor has them, which
 # may be off by two in the last place: a tenth of the time, and the same bits for the same input all the same.
-for _name in ("run_blocks", "run_blocks_partly", "run_blocks_shared", "run_blocks_many"):
+for _name in (
+    "run_blocks", "run_blocks_partly", "run_blocks_shared", "run_blocks_many", "run_fine_blocks",
+    "run_fine_blocks_partly",
+):  # fmt: skip
     wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True
 
 
@@ -73,7 +91,7 @@ def advance_blocks(
 ):  # fmt: skip
     """Every world by a block of ``threads`` threads."""
     t = view(s, block, topo.particles, size)
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, t, topo, run, shapes, substeps, thread, threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks")
@@ -104,7 +122,7 @@ def advance_blocks_partly(
         t.y[i] = outside.y[i]
         t.z[i] = outside.z[i]
         t.w[i] = outside.w[i]
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
@@ -150,7 +168,7 @@ def advance_blocks_shared(
         t.pz[i] = outside.pz[i]
     for i in range(thread, 4 * n, threads):
         t.moved[i] = 0
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
@@ -179,3 +197,49 @@ def run_blocks_many(
     """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor."""
     tid = wp.tid()
     advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_fine_blocks")
+def run_fine_blocks(
+    s: StateFine, floats: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int,
+    threads: int,
+):  # fmt: skip
+    """Every world by a block of ``threads`` threads, coordinates as doubles."""
+    tid = wp.tid()
+    if tid / threads < s.worlds:
+        block = tid / threads
+        t = view(s, block, topo.particles, size)
+        near = view(floats, block, topo.particles, size)
+        advance_block(t, near, topo, run, shapes, substeps, tid % threads, threads)
+    else:
+        help_out(floats, topo, size, run, tid / threads - s.worlds, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_fine_blocks_partly")
+def run_fine_blocks_partly(
+    s: StateFine, floats: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int,
+    threads: int,
+):  # fmt: skip
+    """The same with x, y and z in shared memory for as long as the launch takes."""
+    tid = wp.tid()
+    if tid / threads < s.worlds:
+        block = tid / threads
+        thread = tid % threads
+        n = topo.particles
+        t = view(s, block, n, size)
+        outside = view(s, block, n, size)
+        near = view(floats, block, n, size)
+        t.x = fine_column(0)
+        t.y = fine_column(FINE_PARTICLES)
+        t.z = fine_column(2 * FINE_PARTICLES)
+        for i in range(thread, n, threads):
+            t.x[i] = outside.x[i]
+            t.y[i] = outside.y[i]
+            t.z[i] = outside.z[i]
+        advance_block(t, near, topo, run, shapes, substeps, thread, threads)
+        for i in range(thread, n, threads):
+            outside.x[i] = t.x[i]
+            outside.y[i] = t.y[i]
+            outside.z[i] = t.z[i]
+    else:
+        help_out(floats, topo, size, run, tid / threads - s.worlds, tid % threads, threads)

@@ -11,6 +11,8 @@ MOST_STEPS = wp.constant(128)
 """Steps that there is room for in `program`."""
 ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(SHARED_FLOATS // 11)
 """Particles of which three more numbers fit, and those for whose contacts there is room besides."""
+FINE_PARTICLES = wp.constant(SHARED_FLOATS // 6)
+"""Particles whose coordinates fit as doubles."""
 
 
 @wp.func_native("""
@@ -39,6 +41,19 @@ return {};
 """)
 def whole(numbers: wp.array(dtype=float)) -> wp.array(dtype=int):  # type: ignore[valid-type]
     """A `column` of whole numbers."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__shared__ double buffer[5750];
+return wp::array_t<wp::float64>(buffer + first, 0);
+#else
+return {};
+#endif
+""")
+def fine_column(first: int) -> wp.array(dtype=wp.float64):  # type: ignore[valid-type]
+    """The same memory as doubles, in kernels that have it as such alone."""
     ...
 
 

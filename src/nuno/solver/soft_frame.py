@@ -12,16 +12,34 @@ from nuno.contact.renewal import shares_work
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.frame import near_shapes
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
 from nuno.solver.shared import BLOCKS_AT_ONCE
-from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES, column, figures
+from nuno.solver.shared_memory import (
+    FINE_PARTICLES,
+    ROOMY_PARTICLES,
+    SHARED_PARTICLES,
+    column,
+    figures,
+    fine_column,
+)
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
 from nuno.solver.soft_stars import damp_star, shape_of, solve_star, stiffness
-from nuno.solver.soft_state import CRUMPLED, SEEN, SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra, view
-from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SCALARS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
+from nuno.solver.soft_state import (
+    CRUMPLED,
+    SEEN,
+    SoftFine,
+    SoftFineLanes,
+    SoftFloat,
+    SoftLanes,
+    SoftSizes,
+    Tetrahedra,
+    WideTetrahedra,
+    view,
+)
+from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
 from nuno.solver.vector import corner
-from nuno.solver.wide import as_lanes
+from nuno.solver.wide import by_sixteen
 
 
 @wp.func
@@ -79,6 +97,17 @@ def viscous(t: Any, table: Any, run: Settings, thread: int, threads: int):
 
 @wp.func
 def viscous(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    viscous_alone(t, table, run, thread, threads)
+
+
+@wp.func
+def viscous(t: SoftFine, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    viscous_alone(t, table, run, thread, threads)
+
+
+@wp.func
+def viscous_alone(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    """`viscous` of one world: by threads that share it, or by one."""
     if shares_work(threads):
         viscous_ahead(t, table, run, thread, threads)
     else:
@@ -96,6 +125,17 @@ def elastic(t: Any, table: Any, run: Settings, thread: int, threads: int):
 
 @wp.func
 def elastic(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    elastic_alone(t, table, run, thread, threads)
+
+
+@wp.func
+def elastic(t: SoftFine, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    elastic_alone(t, table, run, thread, threads)
+
+
+@wp.func
+def elastic_alone(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
+    """`elastic` of one world: by threads that share it, or by one."""
     if shares_work(threads):
         elastic_ahead(t, table, run, thread, threads)
     else:
@@ -104,13 +144,15 @@ def elastic(t: SoftFloat, table: Tetrahedra, run: Settings, thread: int, threads
 
 
 @wp.func
-def advance(t: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int):
-    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for."""
+def advance(
+    t: Any, near: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
+):
+    """The phases of ``substeps`` substeps; ``near`` is as `nuno.solver.frame.advance` has it."""
     n = topo.particles
     for k in range(substeps):
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
-                near_shapes(t, n, run, shapes, thread, threads)
+                near_shapes(near, n, run, shapes, thread, threads)
                 forget_loads(t, run, thread, threads)
             tick(t, run, thread)
             turn_notes(t, thread)
@@ -133,34 +175,8 @@ def advance(t: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: i
             reset_speed(t, thread)
             barrier(threads)
             read_velocities(t, n, run, thread, threads)
+            round_places(near, t, n, thread, threads)
             barrier(threads)
-
-
-@wp.func
-def by_sixteen(t: SoftFloat, wide: WideTetrahedra, m: int):
-    """The particles of one world as m vectors of sixteen, for the loops over particles."""
-    p = SoftLanes()
-    p.group = t.group
-    p.worlds = t.worlds
-    p.x = as_lanes(t.x, m)
-    p.y = as_lanes(t.y, m)
-    p.z = as_lanes(t.z, m)
-    p.px = as_lanes(t.px, m)
-    p.py = as_lanes(t.py, m)
-    p.pz = as_lanes(t.pz, m)
-    p.vx = as_lanes(t.vx, m)
-    p.vy = as_lanes(t.vy, m)
-    p.vz = as_lanes(t.vz, m)
-    p.w = as_lanes(t.w, m)
-    p.fx = as_lanes(t.fx, m)
-    p.fy = as_lanes(t.fy, m)
-    p.fz = as_lanes(t.fz, m)
-    p.scalars = wide.scalars
-    p.notes = wide.notes
-    p.near = t.near
-    for k in range(SCALARS):
-        p.scalars[k] = fill(p.x[0], t.scalars[k])
-    return p
 
 
 # A module each, so that only the kind that is run is compiled.
@@ -172,7 +188,7 @@ def run_soft_worlds(
 ):
     """Every world by itself, by one thread on the CPU."""
     t = view(s, first + wp.tid(), topo.particles, size)
-    advance(t, topo, run, shapes, substeps, 0, 1)
+    advance(t, t, topo, run, shapes, substeps, 0, 1)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.run_soft_lanes")
@@ -181,28 +197,20 @@ def run_soft_lanes(
 ):
     """Sixteen worlds at once, by one thread on the CPU."""
     t = view(s, first + wp.tid(), topo.particles, size)
-    advance(t, topo, run, shapes, substeps, 0, 1)
+    advance(t, t, topo, run, shapes, substeps, 0, 1)
 
 
-@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_wide")
-def run_soft_wide(
-    s: SoftFloat,
-    topo: Tetrahedra,
-    wide: WideTetrahedra,
-    size: SoftSizes,
-    run: Settings,
-    shapes: Shapes,
+@wp.func
+def advance_wide(
+    t: Any, p: Any, near: SoftFloat, nearby: SoftLanes, n: int, wide: WideTetrahedra, run: Settings, shapes: Shapes,
     substeps: int,
-):
-    """One world by one thread, sixteen tetrahedra or particles at a time: `advance` with its loops by sixteen."""
-    n = topo.particles
+):  # fmt: skip
+    """`advance` with its loops by sixteen; ``p`` is ``t`` by sixteen particles, ``nearby`` is ``near``."""
     m = (n + LANES - 1) / LANES
-    t = view(s, wp.tid(), n, size)
-    p = by_sixteen(t, wide, m)
     for k in range(substeps):
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
-                near_shapes(t, n, run, shapes, 0, 1)
+                near_shapes(near, n, run, shapes, 0, 1)
                 forget_loads(t, run, 0, 1)
             tick(t, run, 0)
             turn_notes(t, 0)
@@ -220,7 +228,55 @@ def run_soft_wide(
         if run.parts & VELOCITIES != 0:
             reset_speed(p, 0)
             read_velocities(p, m, run, 0, 1)
+            round_places(nearby, p, m, 0, 1)
             t.notes[SPEED] = largest(p.notes[SPEED])
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_wide")
+def run_soft_wide(
+    s: SoftFloat, topo: Tetrahedra, wide: WideTetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int
+):
+    """One world by one thread, sixteen tetrahedra or particles at a time."""
+    n = topo.particles
+    t = view(s, wp.tid(), n, size)
+    p = by_sixteen(SoftLanes(), t, wide, (n + LANES - 1) / LANES)
+    advance_wide(t, p, t, p, n, wide, run, shapes, substeps)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_fine_worlds")
+def run_soft_fine_worlds(
+    s: SoftFine, near: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, first: int,
+    substeps: int,
+):  # fmt: skip
+    """Every world by itself, by one thread on the CPU, coordinates as doubles."""
+    n, group = topo.particles, first + wp.tid()
+    t = view(s, group, n, size)
+    advance(t, view(near, group, n, size), topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_fine_lanes")
+def run_soft_fine_lanes(
+    s: SoftFineLanes, near: SoftLanes, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, first: int,
+    substeps: int,
+):  # fmt: skip
+    """Sixteen worlds at once, by one thread on the CPU, coordinates as doubles."""
+    n, group = topo.particles, first + wp.tid()
+    t = view(s, group, n, size)
+    advance(t, view(near, group, n, size), topo, run, shapes, substeps, 0, 1)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_soft_fine_wide")
+def run_soft_fine_wide(
+    s: SoftFine, near: SoftFloat, topo: Tetrahedra, wide: WideTetrahedra, size: SoftSizes, run: Settings,
+    shapes: Shapes, substeps: int,
+):  # fmt: skip
+    """One world by one thread, sixteen tetrahedra or particles at a time, coordinates as doubles."""
+    n = topo.particles
+    m = (n + LANES - 1) / LANES
+    t = view(s, wp.tid(), n, size)
+    floats = view(near, wp.tid(), n, size)
+    p = by_sixteen(SoftFineLanes(), t, wide, m)
+    advance_wide(t, p, floats, by_sixteen(SoftLanes(), floats, wide, m), n, wide, run, shapes, substeps)
 
 
 FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
@@ -229,7 +285,9 @@ their memory, in which four worlds fit at once. A colour of such a body has abou
 wait for them. The bits are the same."""
 
 # quotients and roots as the processor has them: see `nuno.solver.shared`
-for _name in ("blocks", "blocks_partly", "few_partly", "blocks_shared", "few_shared"):
+for _name in (
+    "blocks", "blocks_partly", "few_partly", "blocks_shared", "few_shared", "fine_blocks", "fine_blocks_partly",
+):  # fmt: skip
     wp.get_module(f"nuno.solver.run_soft_{_name}").options["fast_math"] = True
 
 
@@ -242,25 +300,27 @@ def run_soft_blocks(
     """Every world by a block of ``threads`` threads."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
-    advance(t, topo, run, shapes, substeps, tid % threads, threads)
+    advance(t, t, topo, run, shapes, substeps, tid % threads, threads)
 
 
 @wp.func
 def advance_block(
-    t: SoftFloat, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
+    t: Any, near: Any, topo: Tetrahedra, run: Settings, shapes: Shapes, substeps: int, thread: int, threads: int
 ):
     """`advance` with the world's scalars and notes in shared memory for as long as the launch takes."""
     scalars = t.scalars
     notes = t.notes
     t.scalars = figures(0)
     t.notes = figures(8)
+    near.scalars = figures(0)
+    near.notes = figures(8)
     if thread == 0:
         for k in range(7):
             t.scalars[k] = scalars[k]
         for k in range(6):
             t.notes[k] = notes[k]
     barrier(threads)
-    advance(t, topo, run, shapes, substeps, thread, threads)
+    advance(t, near, topo, run, shapes, substeps, thread, threads)
     barrier(threads)
     if thread == 0:
         for k in range(6):
@@ -286,7 +346,7 @@ def run_partly(
         t.y[i] = outside.y[i]
         t.z[i] = outside.z[i]
         t.w[i] = outside.w[i]
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
@@ -318,7 +378,7 @@ def run_shared(
         t.vx[i] = outside.vx[i]
         t.vy[i] = outside.vy[i]
         t.vz[i] = outside.vz[i]
-    advance_block(t, topo, run, shapes, substeps, thread, threads)
+    advance_block(t, t, topo, run, shapes, substeps, thread, threads)
     for i in range(thread, n, threads):
         outside.x[i] = t.x[i]
         outside.y[i] = t.y[i]
@@ -362,3 +422,40 @@ def run_soft_few_shared(
 ):
     """Worlds that have a multiprocessor each, and so all of its registers."""
     run_shared(s, topo, size, run, shapes, substeps, wp.tid(), threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_soft_fine_blocks")
+def run_soft_fine_blocks(
+    s: SoftFine, floats: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+    threads: int,
+):  # fmt: skip
+    """Every world by a block, coordinates as doubles."""
+    tid = wp.tid()
+    n = topo.particles
+    t = view(s, tid / threads, n, size)
+    advance_block(t, view(floats, tid / threads, n, size), topo, run, shapes, substeps, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_soft_fine_blocks_partly")
+def run_soft_fine_blocks_partly(
+    s: SoftFine, floats: SoftFloat, topo: Tetrahedra, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+    threads: int,
+):  # fmt: skip
+    """The same with x, y and z in shared memory for as long as the launch takes."""
+    tid = wp.tid()
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    t.x = fine_column(0)
+    t.y = fine_column(FINE_PARTICLES)
+    t.z = fine_column(2 * FINE_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+    advance_block(t, view(floats, tid / threads, n, size), topo, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]

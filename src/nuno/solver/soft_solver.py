@@ -11,10 +11,11 @@ import warp as wp
 
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
+from nuno.solver.fine_places import FinePlaces
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.shared_memory import ROOMY_PARTICLES, SHARED_PARTICLES
+from nuno.solver.shared_memory import FINE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.solver.soft_frame import (
     FEW_THREADS,
     MANY_THREADS,
@@ -23,11 +24,24 @@ from nuno.solver.soft_frame import (
     run_soft_blocks_shared,
     run_soft_few_partly,
     run_soft_few_shared,
+    run_soft_fine_blocks,
+    run_soft_fine_blocks_partly,
+    run_soft_fine_lanes,
+    run_soft_fine_wide,
+    run_soft_fine_worlds,
     run_soft_lanes,
     run_soft_wide,
     run_soft_worlds,
 )
-from nuno.solver.soft_state import SoftFloat, SoftLanes, SoftSizes, Tetrahedra, WideTetrahedra
+from nuno.solver.soft_state import (
+    SoftFine,
+    SoftFineLanes,
+    SoftFloat,
+    SoftLanes,
+    SoftSizes,
+    Tetrahedra,
+    WideTetrahedra,
+)
 from nuno.solver.soft_substeps import soft_substeps, wave_speed
 from nuno.solver.state import NOTES, SCALARS, Settings
 from nuno.solver.tetrahedron import COLUMNS
@@ -119,6 +133,7 @@ class SoftSolver(ParticleSolver):
         state = SoftLanes() if self.lanes > 1 else SoftFloat()
         size = SoftSizes()
         self._state, self._size = state, size
+        self._fine = FinePlaces(self, SoftFineLanes if self.lanes > 1 else SoftFine)
         mu, bulk = moduli(values)
         size.soft = mu.shape[1]
         state.mu, state.bulk = (self._put(np.broadcast_to(m, (worlds, size.soft))) for m in (mu, bulk))
@@ -184,9 +199,11 @@ class SoftSolver(ParticleSolver):
         return wide
 
     def _advance(self, run: Settings, substeps: int) -> None:
-        common = [self._state, self._topology, self._size, run, self._shapes]
+        fine = self._fine.bring(run)
+        states = [self._state] if fine is None else [fine, self._state]
+        common = [*states, self._topology, self._size, run, self._shapes]
         if self._cuda:
-            kernel, threads = self._block_kernel()
+            kernel, threads = self._block_kernel(fine is not None)
             wp.launch(
                 kernel, dim=self.group_count * threads, inputs=[*common, substeps, threads], device=self.device,
                 block_dim=threads,
@@ -194,19 +211,25 @@ class SoftSolver(ParticleSolver):
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = self._widen()
-            inputs = [self._state, self._topology, self._wide, self._size, run, self._shapes, substeps]
-            wp.launch(run_soft_wide, dim=1, inputs=inputs, device=self.device)
+            inputs = [*states, self._topology, self._wide, self._size, run, self._shapes, substeps]
+            kernel = run_soft_wide if fine is None else run_soft_fine_wide
+            wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
         else:
-            kernel = run_soft_lanes if self.lanes > 1 else run_soft_worlds
-            before, after = common[:3], common[4:]
+            lanes, worlds = (run_soft_lanes, run_soft_fine_lanes), (run_soft_worlds, run_soft_fine_worlds)
+            kernel = (lanes if self.lanes > 1 else worlds)[fine is not None]
+            before = [*states, self._topology, self._size]
 
             def launch(group: int, piece: Settings, count: int) -> None:
-                wp.launch(kernel, dim=1, inputs=[*before, piece, *after, group, count], device=self.device)
+                inputs = [*before, piece, self._shapes, group, count]
+                wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
-    def _block_kernel(self) -> tuple[Any, int]:
+    def _block_kernel(self, fine: bool) -> tuple[Any, int]:
         """The kernel that has as much of a world in shared memory and registers as fits, and its threads."""
+        if fine:
+            fits = self.shared_memory and self.particle_count <= FINE_PARTICLES
+            return (run_soft_fine_blocks_partly if fits else run_soft_fine_blocks), FEW_THREADS
         if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
             return run_soft_blocks, FEW_THREADS
         few = self.group_count <= wp.get_device(self.device).sm_count

@@ -4,28 +4,33 @@ from typing import Any
 
 import warp as wp
 
+from nuno.solver.fine import fine, fine_lane
 from nuno.solver.lanes import lane, lane_int, window
-from nuno.solver.state import LISTINGS, LOADS, PARTICLE_ARRAYS, PICK_REACH
+from nuno.solver.state import LISTINGS, LOADS, PARTICLE_ARRAYS, PICK_REACH, PLACES
 
 CRUMPLED, SEEN = LISTINGS, PICK_REACH
 """Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
 whether one is in this."""
 
 
-def _make(name: str, number: type, integer: type) -> Any:
+def _make(name: str, number: type, integer: type, place: type) -> Any:
     """A struct under the names that `nuno.solver.state` has for the arrays that all particles have."""
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
+    fields |= {name: wp.array(dtype=place) for name in PLACES}
     fields |= {"grip_corner": wp.array(dtype=integer), "near": wp.array(dtype=int), "group": int, "worlds": int}
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 
-SoftFloat = _make("SoftFloat", float, int)
+SoftFloat = _make("SoftFloat", float, int, float)
 """One world after the other: CUDA, and one world alone on the CPU."""
 
-SoftLanes = _make("SoftLanes", lane, lane_int)
+SoftLanes = _make("SoftLanes", lane, lane_int, lane)
 """Sixteen worlds in the lanes of each element: batches on the CPU."""
+
+SoftFine, SoftFineLanes = _make("SoftFine", float, int, fine), _make("SoftFineLanes", lane, lane_int, fine_lane)
+"""The same with coordinates as doubles, as `nuno.solver.state` has them."""
 
 
 STAR = wp.constant(5)

@@ -21,7 +21,7 @@ from nuno.solver.grips import hold_vertices
 from nuno.solver.integrate import predict
 from nuno.solver.lanes import barrier, window
 from nuno.solver.membrane import shear_cell
-from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
+from nuno.solver.state import DAMPING, Settings, Topology
 from nuno.solver.team import Team, meet
 
 PARTICLES, PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS = range(7)
@@ -132,7 +132,7 @@ def read(work: Work, world: int, kind: int, k: int, last: int):
 
 
 @wp.func
-def solve(t: StateFloat, run: Settings, kind: int, e: Element, rate: float, damping: float):
+def solve(t: Any, run: Settings, kind: int, e: Element, rate: float, damping: float):
     """One bend or shear, as in `nuno.solver.frame`."""
     if kind == TWISTS:
         bend_twist(t, e.a, e.b, e.c, e.d, e.soft * (e.scale * rate), run.damped, damping)
@@ -143,7 +143,7 @@ def solve(t: StateFloat, run: Settings, kind: int, e: Element, rate: float, damp
 
 
 @wp.func
-def grips_on(t: StateFloat, run: Settings, first: int, last: int):
+def grips_on(t: Any, run: Settings, first: int, last: int):
     """The number of grips, or none where no vertex from first to last is held by one."""
     held = int(0)
     for g in range(run.grips):
@@ -154,7 +154,7 @@ def grips_on(t: StateFloat, run: Settings, first: int, last: int):
 
 
 @wp.func
-def set_out(t: StateFloat, run: Settings, grips: int, first: int, last: int, thread: int, threads: int):
+def set_out(t: Any, run: Settings, grips: int, first: int, last: int, thread: int, threads: int):
     """The predicted positions of the particles first to last, and those of ``grips`` stiff grips that are on them."""
     predict(t, last, run, first + thread, threads)
     if grips > 0:
@@ -173,7 +173,7 @@ def steps_of(work: Work, block: int):
 
 @wp.func
 def go_through(
-    t: StateFloat, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, grips: int, begin: int,
+    t: Any, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, grips: int, begin: int,
     end: int, team: Team,
 ):  # fmt: skip
     """Of a block's ``steps`` those from ``begin`` to ``end``; after the last nobody waits.

@@ -4,6 +4,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.solver.fine import fine, fine_lane
 from nuno.solver.lanes import lane, lane_int, window
 
 # Per-world scalars in `State.scalars`.
@@ -32,6 +33,9 @@ LOADS = 4
 PARTICLE_ARRAYS = ("x", "y", "z", "px", "py", "pz", "vx", "vy", "vz", "w")
 """Positions, those at the substep's start, velocities and inverse masses."""
 
+PLACES = ("x", "y", "z", "px", "py", "pz")
+"""Those that may be doubles: see `nuno.solver.fine`."""
+
 # The parts of a substep, which a run does all of, and others from outside step between.
 MOTION, PULLS, LAYERS, SHAPES, VELOCITIES = 1, 2, 4, 8, 16
 """Prediction, stiff grips and elasticity; other grips; self-contact; static shapes; velocities."""
@@ -42,8 +46,8 @@ INTEGERS = ("moved", "near", "sharp", "sharp_mark", "sharp_list", "help", "help_
 """Whole numbers that lanes share."""
 
 
-def _state_fields(number: type, integer: type) -> dict[str, Any]:
-    """The fields of a State whose numbers are floats or lanes of floats."""
+def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
+    """The fields of a State whose numbers are floats or lanes of floats, and ``place`` its coordinates."""
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz")
     numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
     numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
@@ -62,18 +66,24 @@ def _state_fields(number: type, integer: type) -> dict[str, Any]:
     fields |= {name: wp.array(dtype=integer) for name in integers}
     fields |= {name: wp.array(dtype=int) for name in INTEGERS}
     fields["sharp_wake"] = wp.array(dtype=float)
+    fields |= {name: wp.array(dtype=place) for name in PLACES}
     return fields | {"group": int, "worlds": int, "helpers": int}
 
 
-def _make(name: str, number: type, integer: type) -> Any:
-    return wp.struct(type(name, (), {"__annotations__": _state_fields(number, integer), "__module__": __name__}))
+def _make(name: str, number: type, integer: type, place: type) -> Any:
+    fields = _state_fields(number, integer, place)
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 
-StateFloat = _make("StateFloat", float, int)
+StateFloat = _make("StateFloat", float, int, float)
 """One world after the other: CUDA, and one world alone on the CPU."""
 
-StateLanes = _make("StateLanes", lane, lane_int)
+StateLanes = _make("StateLanes", lane, lane_int, lane)
 """Sixteen worlds in the lanes of each element: batches on the CPU."""
+
+StateFine, StateFineLanes = _make("StateFine", float, int, fine), _make("StateFineLanes", lane, lane_int, fine_lane)
+"""The same with coordinates as doubles. Beside such a state stands the other, with their floats where a substep began:
+what looks for what is near is content with these."""
 
 
 @wp.struct

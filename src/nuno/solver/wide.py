@@ -17,6 +17,7 @@ import warp as wp
 from nuno.contact.renewal import renew_lists
 from nuno.contact.self_contact import PASSES, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import touch_shapes
+from nuno.solver.fine import fine, fine_lane
 from nuno.solver.frame import (
     bend_lines,
     bend_patches,
@@ -28,7 +29,7 @@ from nuno.solver.frame import (
     strain_triangles,
 )
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.solver.integrate import predict, read_velocities, reset_speed, tick
+from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import LANES, fill, lane, lane_int, largest
 from nuno.solver.membrane import stretch_yarn
 from nuno.solver.state import (
@@ -44,6 +45,8 @@ from nuno.solver.state import (
     Settings,
     Shapes,
     Sizes,
+    StateFine,
+    StateFineLanes,
     StateFloat,
     StateLanes,
     Topology,
@@ -99,9 +102,13 @@ def as_lanes(a: wp.array(dtype=float), count: int):
 
 
 @wp.func
-def by_sixteen(t: StateFloat, wide: Wide, m: int):
-    """The particles of one world as m vectors of sixteen, for the loops over particles."""
-    p = StateLanes()
+def as_lanes(a: wp.array(dtype=fine), count: int):
+    return wp.array(ptr=a.ptr, shape=(count,), dtype=fine_lane)
+
+
+@wp.func
+def by_sixteen(p: Any, t: Any, wide: Any, m: int):
+    """The particles of one world as m vectors of sixteen, for the loops over particles; ``p`` is empty."""
     p.group = t.group
     p.worlds = t.worlds
     p.x = as_lanes(t.x, m)
@@ -126,7 +133,7 @@ def by_sixteen(t: StateFloat, wide: Wide, m: int):
 
 
 @wp.func
-def elastic_wide(t: StateFloat, wide: Wide, run: Settings):
+def elastic_wide(t: Any, wide: Wide, run: Settings):
     """One pass over the elastic constraints: `nuno.solver.frame.elastic` by sixteen."""
     for c in range(wide.patch_colour.shape[0] - 1):
         bend_patches(t, wide, run, wide.patch_colour[c], wide.patch_colour[c + 1], 0, 1)
@@ -144,22 +151,23 @@ def elastic_wide(t: StateFloat, wide: Wide, run: Settings):
         stretch_yarn(t, wide, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, wide.yarn[k + 1], rate)
 
 
-@wp.kernel(enable_backward=False)
-def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settings, shapes: Shapes, substeps: int):
-    """One world by one thread: `nuno.solver.frame.advance` with its loops by sixteen."""
+@wp.func
+def advance_wide(
+    t: Any, p: Any, near: StateFloat, nearby: StateLanes, topo: Topology, wide: Wide, run: Settings, shapes: Shapes,
+    substeps: int,
+):  # fmt: skip
+    """`nuno.solver.frame.advance` with its loops by sixteen; ``p`` is ``t`` by sixteen, ``nearby`` is ``near``."""
     n = topo.particles
     m = (n + LANES - 1) / LANES
-    t = view(s, wp.tid(), n, size)
-    p = by_sixteen(t, wide, m)
     for k in range(substeps):
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
-                near_shapes(t, n, run, shapes, 0, 1)
-                near_sharp(t, topo, run, shapes, 0, 1)
+                near_shapes(near, n, run, shapes, 0, 1)
+                near_sharp(near, topo, run, shapes, 0, 1)
                 forget_loads(t, run, 0, 1)
             tick(t, run, 0)
             if run.touching != 0:
-                renew_lists(t, topo, run, 0, 1)
+                renew_lists(near, topo, run, 0, 1)
             predict(p, m, run, 0, 1)
             hold_vertices(t, run, 0, 1)
             elastic_wide(t, wide, run)
@@ -177,7 +185,31 @@ def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settin
         if run.parts & VELOCITIES != 0:
             reset_speed(p, 0)
             read_velocities(p, m, run, 0, 1)
+            round_places(nearby, p, m, 0, 1)
             t.notes[SPEED] = largest(p.notes[SPEED])
+
+
+@wp.kernel(enable_backward=False)
+def run_wide(s: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settings, shapes: Shapes, substeps: int):
+    """One world by one thread."""
+    n = topo.particles
+    t = view(s, wp.tid(), n, size)
+    p = by_sixteen(StateLanes(), t, wide, (n + LANES - 1) / LANES)
+    advance_wide(t, p, t, p, topo, wide, run, shapes, substeps)
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.run_fine_wide")
+def run_fine_wide(
+    s: StateFine, near: StateFloat, topo: Topology, wide: Wide, size: Sizes, run: Settings, shapes: Shapes,
+    substeps: int,
+):  # fmt: skip
+    """One world by one thread, coordinates as doubles."""
+    n = topo.particles
+    m = (n + LANES - 1) / LANES
+    t = view(s, wp.tid(), n, size)
+    floats = view(near, wp.tid(), n, size)
+    p = by_sixteen(StateFineLanes(), t, wide, m)
+    advance_wide(t, p, floats, by_sixteen(StateLanes(), floats, wide, m), topo, wide, run, shapes, substeps)
 
 
 def widen_topology(topology: Any, arrays: Any) -> Any:

@@ -1,0 +1,88 @@
+"""A body's coordinates as doubles beside those as floats, and which of the two count."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from nuno.solver.fine import fine, fine_lane
+from nuno.solver.state import PLACES, Settings
+
+FINE_RATE = 1500.0
+"""[1/s] From so many substeps a second on, 25 a frame of 1/60 s, coordinates are doubles (see `nuno.solver.fine`).
+Gravity then moves a vertex by 4 um in one, and a float at half a metre has steps of 0.03 to 0.06 um."""
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.widen")
+def widen(x: wp.array(dtype=float), out: wp.array(dtype=fine)):  # type: ignore[valid-type]
+    """Floats as doubles."""
+    i = wp.tid()
+    out[i] = fine(x[i])
+
+
+class FinePlaces:
+    """The doubles of a solver, made when they are first needed.
+
+    Floats are always there: at the end of a substep they are what the doubles round to. What sets them sets the doubles
+    aside, and so does a run with few substeps a second.
+
+    Args:
+        solver: A `nuno.solver.particle_solver.ParticleSolver`.
+        kind: The class of its state with coordinates as doubles.
+    """
+
+    def __init__(self, solver: Any, kind: Any) -> None:
+        self._solver, self._kind = solver, kind
+        self._state: Any = None
+        self.count = False  # whether the doubles are what counts
+
+    @property
+    def arrays(self) -> list[wp.array]:
+        """x, y and z, those that count."""
+        state = self._state if self.count else self._solver._state
+        return [state.x, state.y, state.z]
+
+    def array(self, name: str) -> wp.array:
+        """One of the doubles' arrays."""
+        return getattr(self._made(), name)
+
+    def bring(self, run: Settings) -> Any:
+        """The state with doubles that count from now on, or None where a run has so few substeps that floats do."""
+        if self._solver.frame_rate * run.frame < FINE_RATE:
+            self.count = False
+            return None
+        state, floats = self._made(), self._solver._state
+        for name in state._cls.vars:
+            if name not in PLACES and getattr(state, name) is not getattr(floats, name):
+                setattr(state, name, getattr(floats, name))
+        if not self.count:
+            for name in PLACES:
+                self._widen(getattr(floats, name), getattr(state, name))
+            self.count = True
+        return state
+
+    def put(self, local: np.ndarray) -> None:
+        """Set positions (worlds, n, 3) float64 [m], relative to the origins; the floats are set already."""
+        for k, name in enumerate(("x", "y", "z")):
+            values = self._solver._arranged(local[..., k].astype(np.float64))
+            self.array(name).assign(values)
+            self.array("p" + name).assign(values)
+        self.count = True
+
+    def _made(self) -> Any:
+        if self._state is None:
+            solver, state = self._solver, self._kind()
+            number = fine_lane if solver.lanes > 1 else fine
+            for name in PLACES:
+                room = solver._empty(solver._whole, number)
+                setattr(state, name, room[: solver.group_count * solver.particle_count])
+            self._state = state
+        return self._state
+
+    def _widen(self, floats: wp.array, out: wp.array) -> None:
+        if str(out.device).startswith("cuda"):
+            wp.launch(widen, dim=len(out), inputs=[floats, out], device=out.device)
+        else:
+            out.numpy()[...] = floats.numpy()
