@@ -18,6 +18,7 @@ from nuno.solver.rigid_body import (
     inverse_mass_at,
     point_before,
     point_of,
+    shift_body,
     turned,
 )
 
@@ -234,5 +235,5 @@ def take_sums(particles: Particles, rigid: RigidState, first: int, start: int, t
     for k in range(thread, rigid.capacity, threads):
         i = start + k
         if particles.body_sharers[i] > 0:
-            rigid.position[i] = rigid.position[i] + summed(particles.body_moved, 2 * i, UNIT)
+            shift_body(rigid, i, summed(particles.body_moved, 2 * i, UNIT))
             rigid.rotation[i] = turned(rigid.rotation[i], summed(particles.body_moved, 2 * i + 1, TURN_UNIT))

@@ -7,7 +7,15 @@ other within a substep. Their multipliers over dt^2 are the forces and torques t
 import warp as wp
 
 from nuno.contact.coupled_rows import Particles, blend
-from nuno.solver.rigid_body import RigidState, apply_rigid_correction, inverse_mass_at, point_of, turn_between, turned
+from nuno.solver.rigid_body import (
+    RigidState,
+    apply_rigid_correction,
+    inverse_mass_at,
+    point_of,
+    shift_body,
+    turn_between,
+    turned,
+)
 
 
 @wp.struct
@@ -108,7 +116,7 @@ def project_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float,
             weight += inverse_mass_at(rigid, j, arm, n)
         pull = n * (-length / weight)
         holds.pull[r] = holds.pull[r] + pull
-        rigid.position[i] = rigid.position[i] + pull * rigid.weight[i]
+        shift_body(rigid, i, pull * rigid.weight[i])
         if leader >= 0:
             apply_rigid_correction(rigid, j, arm, -pull)
     off = turn_between(turn, rigid.rotation[i]) + holds.twist[r] * alpha

@@ -23,6 +23,7 @@ class RigidState:
     rotation_before: wp.array(dtype=wp.quat)
     position_free: wp.array(dtype=wp.vec3)  # where the substep would end without contacts
     rotation_free: wp.array(dtype=wp.quat)
+    lost: wp.array(dtype=wp.vec3)  # what rounding took of the substep's corrections by coupled bodies [m]
     velocity: wp.array(dtype=wp.vec3)  # of the centre of mass [m/s]
     spin: wp.array(dtype=wp.vec3)  # angular velocity, world frame [rad/s]
     force: wp.array(dtype=wp.vec3)  # [N]
@@ -88,13 +89,22 @@ def inverse_mass_at(s: RigidState, i: int, arm: wp.vec3, direction: wp.vec3):
 
 
 @wp.func
+def shift_body(s: RigidState, i: int, d: wp.vec3):
+    """Move a body by d; what is lost where the coordinate is rounded still counts in its velocity."""
+    x = s.position[i]
+    y = x + d
+    s.lost[i] = s.lost[i] + (d - (y - x))
+    s.position[i] = y
+
+
+@wp.func
 def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.vec3):
     """Move a body by a positional impulse [kg m] at ``arm`` from its centre of mass (equations 6 to 9).
 
     With a multiplier of dlambda along n, which moves a particle of inverse mass w by w dlambda n, the correction of
     the body on the other side is -dlambda n.
     """
-    s.position[i] = s.position[i] + s.weight[i] * correction
+    shift_body(s, i, s.weight[i] * correction)
     turn = s.give[i] * wp.cross(arm, correction)
     s.rotation[i] = turned(s.rotation[i], turn)
 
@@ -160,6 +170,7 @@ def move_body(s: RigidState, i: int, role: int, dt: float):
     s.rotation[i] = q
     s.position_free[i] = x
     s.rotation_free[i] = q
+    s.lost[i] = wp.vec3(0.0)
 
 
 @wp.func
@@ -169,7 +180,7 @@ def read_velocity(s: RigidState, i: int, role: int, dt: float):
     A body that nothing touched so keeps its velocity to the bit, and rounding of coordinates stays out of it.
     """
     if role == 1 and s.inverse_mass[i] > 0.0:
-        s.velocity[i] = s.velocity[i] + (s.position[i] - s.position_free[i]) / dt
+        s.velocity[i] = s.velocity[i] + (s.position[i] - s.position_free[i] + s.lost[i]) / dt
         start = s.rotation_before[i]
         free = turn_angle(turn_between(start, s.rotation_free[i]))
         now = turn_angle(turn_between(start, s.rotation[i]))
