@@ -304,7 +304,7 @@ class ClothSolver(ParticleSolver):
             if self._state.helpers and substeps > 1:
                 blocks += self._state.helpers
                 self._state.help.zero_()
-            threads = FEW_THREADS if few else MANY_THREADS
+            threads = FEW_THREADS if self.world_count <= wp.get_device(self.device).sm_count else MANY_THREADS
             wp.launch(
                 kernel, dim=blocks * threads, inputs=[*common, substeps, threads],
                 device=self.device, block_dim=threads,

@@ -1,8 +1,8 @@
 """A yarn's stretch by the 32 threads of a warp on CUDA, where coordinates are doubles.
 
-As in `nuno.solver.yarns` all rows are freed of their neighbours step by step, here by cyclic reduction alone (Hockney and
-Jesshope, "Parallel Computers", 1981): a row is linked to those twice as far in each step. That takes fewer registers,
-of which doubles need more.
+`nuno.solver.yarns` reads coordinates again to save registers, in ways that are for floats. Here all rows are freed of
+their neighbours at once by cyclic reduction (Hockney and Jesshope, "Parallel Computers", 1981), a row a thread and
+step: each is linked to those twice as far as before.
 """
 
 import warp as wp
