@@ -5,10 +5,11 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from matching import inner_faces_match
 
 import nuno
 from nuno import InvalidInputError, MeshError, MissingPackageError
-from nuno.mesh.tetrahedra import boundary_faces, inner_faces_match, volumes
+from nuno.mesh.tetrahedra import boundary_faces, volumes
 
 CUBE = trimesh.creation.box((0.2, 0.2, 0.2))
 ROUND = {
