@@ -5,9 +5,9 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from matching import inner_faces_match
 
 import nuno
+from matching import inner_faces_match
 from nuno import InvalidInputError, MeshError, MissingPackageError
 from nuno.mesh.tetrahedra import boundary_faces, volumes
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
-from matching import inner_faces_match
 
+from matching import inner_faces_match
 from nuno import MeshError
 from nuno.mesh import primitives
 from nuno.mesh.fill import filled_fraction

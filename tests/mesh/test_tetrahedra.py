@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from matching import inner_faces_match
 
+from matching import inner_faces_match
 from nuno.mesh.tetrahedra import FACES, FIVE, boundary_faces, box_tetrahedra, volumes
 
 CELLS = [(1, 1, 1), (2, 1, 1), (1, 3, 2), (3, 4, 5)]
