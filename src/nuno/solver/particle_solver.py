@@ -14,6 +14,7 @@ import warp as wp
 
 from nuno.contact.shapes import COLUMNS
 from nuno.solver.fine_places import FinePlaces
+from nuno.solver.grip_rows import grip_rows
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.state import (
     ALL_PARTS,
@@ -39,9 +40,6 @@ MU = 15
 """Where a row of the table of static shapes has its friction, and that of the pair."""
 KEPT = ("x", "y", "z", "vx", "vy", "vz", "notes")
 """What a run changes that the next one depends on."""
-GHOST = 2.0e-3
-"""Share of its inverse mass that a stiffly held vertex has while constraints pull at it: enough that rounding is 0.1 %
-of a load in the mean of a frame, and too little to give way."""
 
 
 class ParticleSolver:
@@ -320,59 +318,25 @@ class ParticleSolver:
     def set_grips(self, grips: Sequence[GripSpec]) -> None:
         """What is held, and where it goes; vertices that are no longer held get their mass back."""
         self._grips = tuple(grips)
-        worlds = self.world_count
-        entries: list[dict[str, Any]] = []
-        for grip in grips:
-            if grip.vertices is not None:
-                corners = np.repeat(np.asarray(grip.vertices)[..., None], 3, axis=-1)
-                barycentric = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
-            else:
-                corners, barycentric = np.asarray(grip.corners), np.asarray(grip.barycentric)
-            for k in range(corners.shape[1]):
-                single = barycentric[:, k]
-                vertex = bool((np.abs(single[:, 0] - 1.0) < 1e-6).all())
-                entries.append(
-                    dict(
-                        corners=corners[:, k], weights=single, times=np.asarray(grip.times, float),
-                        positions=np.asarray(grip.positions)[:, k] - self.origin[:, None],
-                        ease=grip.interpolation == "minimum_jerk",
-                        compliance=float(grip.compliance), fixed=vertex and grip.compliance == 0.0,
-                    )
-                )  # fmt: skip
-        keys = max([len(e["times"]) for e in entries], default=1)
-        count = max(1, len(entries))
-        corner = np.full((worlds, count, 3), -1, dtype=np.int32)
-        weight = np.zeros((worlds, count, 3), dtype=np.float32)
-        place = np.zeros((worlds, count, keys, 3), dtype=np.float32)
-        self._grip_times = np.zeros((count, keys))
-        mass, ghost = self._inverse_mass.copy(), np.ones((worlds, count), dtype=np.float32)
-        for g, e in enumerate(entries):
-            corner[:, g], weight[:, g] = e["corners"], e["weights"]
-            m = len(e["times"])
-            self._grip_times[g] = np.concatenate([e["times"], np.full(keys - m, e["times"][-1])])
-            place[:, g, :m] = e["positions"]
-            place[:, g, m:] = e["positions"][:, -1:]
-            if e["fixed"]:
-                held = np.nonzero(e["corners"][:, 0] >= 0)[0]
-                mass[held, e["corners"][held, 0]] = 0.0
-                ghost[held, g] = GHOST * self._inverse_mass[held, e["corners"][held, 0]]
+        rows = grip_rows(grips, self.origin, self._inverse_mass)
+        _, count, keys, _ = rows.place.shape
+        self._grip_times = rows.times
         s, size = self._state, self._size
         size.keys, size.grips = count * keys, count
         for k, name in enumerate(("grip_x", "grip_y", "grip_z")):
-            setattr(s, name, self._put(place[..., k]))
-        s.grip_weight, s.grip_corner = self._put(weight), self._put(corner, integer=True)
-        s.grip_ghost, s.grip_load = self._put(ghost), self._put(np.zeros((worlds, LOADS * count)))
-        wp.copy(s.w, self._put(mass))
-        self._grip_count, self._grip_keys = len(entries), keys
-        self._grip_pulls = int(any(not e["fixed"] for e in entries))
+            setattr(s, name, self._put(rows.place[..., k]))
+        s.grip_weight, s.grip_corner = self._put(rows.weight), self._put(rows.corner, integer=True)
+        s.grip_ghost, s.grip_load = self._put(rows.ghost), self._put(np.zeros((self.world_count, LOADS * count)))
+        wp.copy(s.w, self._put(rows.mass))
+        self._grip_count, self._grip_keys = rows.count, keys
+        self._grip_pulls = int((rows.fixed == 0).any())
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
             return wp.array(values, dtype=dtype, device=self.device)
 
-        self._grip_time = put(self._grip_times.ravel(), wp.float64)
-        self._grip_ease = put(np.array([int(e["ease"]) for e in entries] or [0], np.int32), int)
-        self._grip_fixed = put(np.array([int(e["fixed"]) for e in entries] or [1], np.int32), int)
-        self._grip_compliance = np.array([e["compliance"] for e in entries] or [0.0])
+        self._grip_time = put(rows.times.ravel(), wp.float64)
+        self._grip_ease, self._grip_fixed = put(rows.ease, int), put(rows.fixed, int)
+        self._grip_compliance = rows.compliance
         self._grip_soft: dict[float, wp.array] = {}
         self._forget_launches()
 
