@@ -51,7 +51,7 @@ def test_hand_that_is_nearly_closed_pinches(scene):
 
 
 def test_closing_again_keeps_hold(scene):
-    """A hand that is told to close while it holds goes on holding the same vertices, to the digits of a float (7e-9 m)."""
+    """A hand that is told to close while it holds goes on holding the same vertices (a float tells 7e-9 m)."""
     driver, towel, place = scene
     driver.start_grasp("larm")
     before, held = held_width(driver, towel, place), driver.hands["left_hand"].grips[0]._spec.vertices
