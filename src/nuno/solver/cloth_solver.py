@@ -211,13 +211,12 @@ class ClothSolver(ParticleSolver):
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
         state.edge_edge = self._list(4 * size.edge_edge)
         state.pair_count = empty(COUNTS, self._integer)
-        if self.plan == "large":  # solves all listed pairs, which a whole device looks at in no time
+        state.touch_count = empty(2, self._integer)
+        if self.plan == "large":  # solves all listed pairs and picks none
             state.touch_triangle, state.touch_edge = state.vertex_triangle, state.edge_edge
-            state.touch_count = state.pair_count
         else:
             state.touch_triangle = self._list(4 * size.vertex_triangle)
             state.touch_edge = self._list(4 * size.edge_edge)
-            state.touch_count = empty(2, self._integer)
         state.near_blocks = empty(size.near_blocks, self._integer)
         self._counts = state.pair_count
         self._allocate_help()

@@ -108,13 +108,22 @@ def pull(s: StateFloat, topo: Topology, size: Sizes, run: Settings):
     pull_points(t, run, 0, 1)
 
 
+@wp.func
+def touch_listed(t: Any, n: int, run: Settings, thread: int, threads: int):
+    """What each listed pair moves, summed: all that are listed are solved, which a whole device looks at in no time."""
+    t.touch_triangle = t.vertex_triangle
+    t.touch_edge = t.edge_edge
+    t.touch_count = t.pair_count
+    touch_edge_edge(t, n, run, thread, threads)
+    touch_vertex_triangle(t, n, run, thread, threads)
+
+
 @wp.kernel(enable_backward=False)
 def touch(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
     """Self-contact: what each pair moves, summed."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
-    touch_edge_edge(t, topo.particles, run, tid % threads, threads)
-    touch_vertex_triangle(t, topo.particles, run, tid % threads, threads)
+    touch_listed(t, topo.particles, run, tid % threads, threads)
 
 
 @wp.kernel(enable_backward=False)
@@ -206,8 +215,7 @@ def touch_fine(s: StateFine, topo: Topology, size: Sizes, run: Settings, threads
     """`touch`."""
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
-    touch_edge_edge(t, topo.particles, run, tid % threads, threads)
-    touch_vertex_triangle(t, topo.particles, run, tid % threads, threads)
+    touch_listed(t, topo.particles, run, tid % threads, threads)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.fine_large")
@@ -260,8 +268,7 @@ class LargePlan:
         self, state: Any, topology: Any, size: Any, shapes: Any, device: str, worlds: int, work: Any, stages: Any,
         lists: Any,
     ) -> None:  # fmt: skip
-        # all listed pairs are solved, which a whole device looks at in no time
-        self._state = picking_nothing(state, StateFloat())
+        self._state = state
         self._fine: Any = None
         self._topology, self._size, self._shapes = topology, size, shapes
         self._device, self._worlds, self._work = device, worlds, work
@@ -278,7 +285,7 @@ class LargePlan:
 
     def run(self, run: Any, substeps: int, fine: Any = None) -> None:
         """Advance by ``substeps`` substeps under the settings ``run``, coordinates as doubles if there is ``fine``."""
-        self._fine = None if fine is None else picking_nothing(fine, StateFine())
+        self._fine = fine
         graph = self._captured(run) if self._cuda else None
         for k in range(substeps):
             if run.parts & MOTION and (run.first + k) % run.frame == 0:
@@ -374,12 +381,3 @@ class LargePlan:
             wp.launch(calm, dim=self._worlds, inputs=common, device=self._device)
         if run.parts & (LAYERS | SHAPES | VELOCITIES):
             self._launch_blocks(finish if coarse else finish_fine, *floats, run, self._shapes, self._gate)
-
-
-def picking_nothing(state: Any, made: Any) -> Any:
-    """``made`` as the same state, in which the listed pairs are those that may touch."""
-    for name in state._cls.vars:
-        setattr(made, name, getattr(state, name))
-    made.touch_triangle, made.touch_edge = state.vertex_triangle, state.edge_edge
-    made.touch_count = state.pair_count
-    return made
