@@ -149,3 +149,6 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
     rows.friction[r] = elements.friction[(world * elements.bodies + bodies[0]) * elements.bodies + bodies[1]]
     rows.push[r] = 0.0
     rows.drag[r] = wp.vec3(0.0, 0.0, 0.0)
+    rows.sharing[r] = 0
+    rows.push_change[r] = 0.0
+    rows.drag_change[r] = wp.vec3(0.0, 0.0, 0.0)

@@ -4,14 +4,15 @@ A row says that a weighted sum of particles, less a point of a rigid body where 
 a normal. Its multipliers add up over the passes of a substep, so that the friction of all passes together stays in
 Coulomb's cone of the push of all passes together: what sticks does not creep, however many passes the push takes.
 
-Where many threads work, each row sees its particles' and bodies' masses split evenly among the rows they are in
-(Tonge, Benevolenski and Voroshilov, "Mass splitting for jitter-free parallel rigid body simulation", 2012), and
-the moves are summed in fixed point: the sums, and so the bits, are the same in any order.
+Where all are solved at once, by many threads, each row sees its particles' and bodies' masses split evenly among the
+rows that press on them (Tonge, Benevolenski and Voroshilov, "Mass splitting for jitter-free parallel rigid body
+simulation", 2012), and the moves are summed in fixed point: the sums, and so the bits, are the same in any order. From
+pass to pass a multiplier goes on as it went (Polyak 1964), until it turns round (O'Donoghue and Candès, "Adaptive
+restart for accelerated gradient schemes", 2015): without that, 2,000 passes are as good as 96 with it.
 """
 
 import warp as wp
 
-from nuno.contact.self_contact import UNIT
 from nuno.solver.rigid_body import (
     RigidState,
     apply_rigid_correction,
@@ -24,8 +25,13 @@ from nuno.solver.rigid_body import (
 
 LEAVE_SPEED = wp.constant(0.5)
 """[m/s] What is found too close parts no faster than this."""
-TURN_UNIT = wp.constant(1.0e-9)
-"""[rad] Step of the fixed-point sums of turns."""
+MOMENTUM = wp.constant(0.8)
+"""What part of a multiplier's last change comes on top of the next, where that has the same direction. With 0.5 a cube
+that bounced on a towel is three times as far from where endless passes bring it, with 0 four times, with 0.9 as far."""
+UNIT = wp.constant(1.0e-14)
+"""[m], [rad] Step of the fixed-point sums, whose numbers have 64 bits. A push that moves a vertex by 1 um moves a body
+a thousand times as heavy by 1 nm: with steps of 10 nm that was lost, and pushes grew by up to four fifths until what
+was left of them bore the body."""
 
 
 @wp.struct
@@ -40,11 +46,14 @@ class Particles:
     p: wp.array(dtype=wp.vec3)
     u: wp.array(dtype=wp.vec3)
     w: wp.array(dtype=float)
-    # what many threads sum: rows that a particle or a rigid body is in, and moves in fixed point
+    # where all rows are solved at once: how many press on a particle or a rigid body, how many more will from the next
+    # pass on, and moves in fixed point
     sharers: wp.array(dtype=int)
-    moved: wp.array(dtype=int)
+    joining: wp.array(dtype=int)
+    moved: wp.array(dtype=wp.int64)
     body_sharers: wp.array(dtype=int)
-    body_moved: wp.array(dtype=int)
+    body_joining: wp.array(dtype=int)
+    body_moved: wp.array(dtype=wp.int64)
 
 
 @wp.struct
@@ -67,6 +76,10 @@ class Rows:
     squeeze: wp.array(dtype=float)  # and how far that goes at most [m]
     push: wp.array(dtype=float)
     drag: wp.array(dtype=wp.vec3)
+    # where all are solved at once: whether it has a share of the masses, and what its multipliers last changed by
+    sharing: wp.array(dtype=int)
+    push_change: wp.array(dtype=float)
+    drag_change: wp.array(dtype=wp.vec3)
     # those that may touch in this substep
     active: wp.array(dtype=int)
     active_count: wp.array(dtype=int)
@@ -83,17 +96,6 @@ def blend(x: wp.array(dtype=wp.vec3), first: int, corners: wp.vec4i, weights: wp
         if corners[k] >= 0:
             total += x[first + corners[k]] * weights[k]
     return total
-
-
-@wp.func
-def share(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, sign: int):
-    """Count a row among those that its particles and its body are in."""
-    corners = rows.corners[r]
-    for k in range(4):
-        if corners[k] >= 0:
-            wp.atomic_add(particles.sharers, first + corners[k], sign)
-    if rows.slot[r] >= 0:
-        wp.atomic_add(particles.body_sharers, start + rows.slot[r], sign)
 
 
 @wp.func
@@ -118,7 +120,7 @@ def row_slip(particles: Particles, rigid: RigidState, first: int, start: int, ro
 
 @wp.func
 def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
-               threads: int):  # fmt: skip
+               at_once: int):  # fmt: skip
     """How far a row gives way along n for a unit of its multiplier."""
     corners = rows.corners[r]
     weights = rows.weights[r]
@@ -127,29 +129,28 @@ def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, 
         if corners[k] >= 0:
             i = first + corners[k]
             w = particles.w[i]
-            if threads > 1:
+            if at_once != 0:
                 w = w * float(particles.sharers[i])
             total += weights[k] * weights[k] * w
     if rows.slot[r] >= 0:
         i = start + rows.slot[r]
         w = inverse_mass_at(rigid, i, wp.quat_rotate(rigid.rotation[i], rows.point[r]), n)
-        if threads > 1:
+        if at_once != 0:
             w = w * float(particles.body_sharers[i])
         total += w
     return total
 
 
 @wp.func
-def fix(moved: wp.array(dtype=int), k: int, d: wp.vec3, unit: float):
+def fix(moved: wp.array(dtype=wp.int64), k: int, d: wp.vec3):
     """Add a vector to a fixed-point sum."""
-    wp.atomic_add(moved, 3 * k, int(wp.rint(d[0] / unit)))
-    wp.atomic_add(moved, 3 * k + 1, int(wp.rint(d[1] / unit)))
-    wp.atomic_add(moved, 3 * k + 2, int(wp.rint(d[2] / unit)))
+    for c in range(3):
+        wp.atomic_add(moved, 3 * k + c, wp.int64(wp.rint(d[c] / UNIT)))
 
 
 @wp.func
 def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, impulse: wp.vec3,
-              threads: int):  # fmt: skip
+              at_once: int):  # fmt: skip
     """Move what is in a row by the multiplier ``impulse`` [kg m]; the rigid body by as much the other way."""
     corners = rows.corners[r]
     weights = rows.weights[r]
@@ -157,22 +158,37 @@ def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, r
         if corners[k] >= 0:
             i = first + corners[k]
             d = impulse * (weights[k] * particles.w[i])
-            if threads > 1:
-                fix(particles.moved, i, d, UNIT)
+            if at_once != 0:
+                fix(particles.moved, i, d)
             else:
                 particles.u[i] = particles.u[i] + d
     if rows.slot[r] >= 0:
         i = start + rows.slot[r]
         arm = wp.quat_rotate(rigid.rotation[i], rows.point[r])
-        if threads > 1:
-            fix(particles.body_moved, 2 * i, -impulse * rigid.weight[i], UNIT)
-            fix(particles.body_moved, 2 * i + 1, rigid.give[i] * wp.cross(arm, -impulse), TURN_UNIT)
+        if at_once != 0:
+            fix(particles.body_moved, 2 * i, -impulse * rigid.weight[i])
+            fix(particles.body_moved, 2 * i + 1, rigid.give[i] * wp.cross(arm, -impulse))
         else:
             apply_rigid_correction(rigid, i, arm, -impulse)
 
 
 @wp.func
-def push_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, threads: int):
+def join_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int):
+    """Give a row that is pressed its share of the masses, from the next pass on; returns how far it is pressed [m]."""
+    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), rows.normal[r]) - rows.distance[r]
+    if gap < 0.0:
+        rows.sharing[r] = 1
+        corners = rows.corners[r]
+        for k in range(4):
+            if corners[k] >= 0:
+                wp.atomic_add(particles.joining, first + corners[k], 1)
+        if rows.slot[r] >= 0:
+            wp.atomic_add(particles.body_joining, start + rows.slot[r], 1)
+    return wp.max(-gap, 0.0)
+
+
+@wp.func
+def push_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, at_once: int):
     """One projection of a row along its normal; returns how far it was from where it asks to be [m]."""
     n = rows.normal[r]
     push = rows.push[r]
@@ -184,16 +200,20 @@ def push_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
     gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r] + pressed
     wrong = wp.max(-gap, 0.0)
     if gap < 0.0 or push > 0.0:
-        more = wp.max(push - gap / (row_weight(particles, rigid, first, start, rows, r, n, threads) + soft), 0.0)
+        step = -gap / (row_weight(particles, rigid, first, start, rows, r, n, at_once) + soft)
+        if at_once != 0 and step * rows.push_change[r] > 0.0:
+            step = step + MOMENTUM * rows.push_change[r]
+        more = wp.max(push + step, 0.0)
         rows.push[r] = more
-        apply_row(particles, rigid, first, start, rows, r, n * (more - push), threads)
+        rows.push_change[r] = more - push
+        apply_row(particles, rigid, first, start, rows, r, n * (more - push), at_once)
         if push > 0.0:
             wrong = wp.abs(gap)
     return wrong
 
 
 @wp.func
-def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, threads: int):
+def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, at_once: int):
     """Take back a row's slip, with up to mu times what its push has come to; returns what was left to take [m]."""
     most = rows.friction[r] * rows.push[r]
     old = rows.drag[r]
@@ -205,35 +225,55 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
         return float(0.0)
     drag = old
     if length > 1.0e-12:
-        drag = old - slip / row_weight(particles, rigid, first, start, rows, r, slip / length, threads)
+        step = -slip / row_weight(particles, rigid, first, start, rows, r, slip / length, at_once)
+        if at_once != 0 and wp.dot(step, rows.drag_change[r]) > 0.0:
+            step = step + MOMENTUM * rows.drag_change[r]
+        drag = old + step
     size = wp.length(drag)
     left = length
     if size > most:
         drag = drag * (most / size)
         left = 0.0
     rows.drag[r] = drag
-    apply_row(particles, rigid, first, start, rows, r, drag - old, threads)
+    rows.drag_change[r] = drag - old
+    apply_row(particles, rigid, first, start, rows, r, drag - old, at_once)
     return left
 
 
 @wp.func
-def summed(moved: wp.array(dtype=int), k: int, unit: float):
+def summed(moved: wp.array(dtype=wp.int64), k: int):
     """A fixed-point sum as a vector; it starts anew."""
-    total = wp.vec3(float(moved[3 * k]), float(moved[3 * k + 1]), float(moved[3 * k + 2])) * unit
+    total = wp.vec3(float(moved[3 * k]), float(moved[3 * k + 1]), float(moved[3 * k + 2])) * UNIT
     for c in range(3):
-        moved[3 * k + c] = 0
+        moved[3 * k + c] = wp.int64(0)
     return total
 
 
 @wp.func
 def take_sums(particles: Particles, rigid: RigidState, first: int, start: int, thread: int, threads: int):
-    """Apply the summed moves of many threads."""
+    """Apply the summed moves of all rows, and count those that joined."""
     for k in range(thread, particles.count, threads):
         i = first + k
         if particles.sharers[i] > 0:
-            particles.u[i] = particles.u[i] + summed(particles.moved, i, UNIT)
+            particles.u[i] = particles.u[i] + summed(particles.moved, i)
+        particles.sharers[i] = particles.sharers[i] + particles.joining[i]
+        particles.joining[i] = 0
     for k in range(thread, rigid.capacity, threads):
         i = start + k
         if particles.body_sharers[i] > 0:
-            shift_body(rigid, i, summed(particles.body_moved, 2 * i, UNIT))
-            rigid.rotation[i] = turned(rigid.rotation[i], summed(particles.body_moved, 2 * i + 1, TURN_UNIT))
+            shift_body(rigid, i, summed(particles.body_moved, 2 * i))
+            turn = summed(particles.body_moved, 2 * i + 1)
+            # passes over others' contacts must not round it
+            if wp.length_sq(turn) > 0.0:
+                rigid.rotation[i] = turned(rigid.rotation[i], turn)
+        particles.body_sharers[i] = particles.body_sharers[i] + particles.body_joining[i]
+        particles.body_joining[i] = 0
+
+
+@wp.func
+def forget_sharers(particles: Particles, rigid: RigidState, first: int, start: int, thread: int, threads: int):
+    """No row has a share of anything."""
+    for k in range(thread, particles.count, threads):
+        particles.sharers[first + k] = 0
+    for k in range(thread, rigid.capacity, threads):
+        particles.body_sharers[start + k] = 0

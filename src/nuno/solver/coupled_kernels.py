@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.contact.coupled_rows import Particles, Rows, drag_row, push_row, share, take_sums
+from nuno.contact.coupled_rows import Particles, Rows, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
@@ -157,9 +157,9 @@ def scatter(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)
 @wp.kernel(enable_backward=False)
 def solve(
     particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, passing: Passing, dt: float,
-    fraction: float, passes: int, threads: int,
+    fraction: float, passes: int, at_once: int, threads: int,
 ):  # fmt: skip
-    """All contacts and ties of a world, up to ``passes`` times: one after the other, or by many threads at once."""
+    """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
     world = tid / threads
     thread = tid % threads
@@ -167,10 +167,6 @@ def solve(
     start = world * rigid.capacity
     base = world * rows.room
     count = rows.active_count[world]
-    if threads > 1:
-        for k in range(thread, count, threads):
-            share(particles, rigid, first, start, rows, rows.active[base + k], 1)
-        barrier(threads)
     if thread == 0:
         for k in range(ties.count):
             ties.pull[world * ties.count + k] = wp.vec3(0.0, 0.0, 0.0)
@@ -187,13 +183,18 @@ def solve(
                 party = party_of(passing, world, rows.bodies[r][0])
                 if goes_on(passing, party):
                     off = float(0.0)
+                    joins = at_once != 0 and rows.sharing[r] == 0
                     if k_pass < passes:
-                        off = push_row(particles, rigid, first, start, rows, r, threads)
-                    off = wp.max(off, drag_row(particles, rigid, first, start, rows, r, threads))
+                        if joins:
+                            off = join_row(particles, rigid, first, start, rows, r)
+                        else:
+                            off = push_row(particles, rigid, first, start, rows, r, at_once)
+                    if not joins:
+                        off = wp.max(off, drag_row(particles, rigid, first, start, rows, r, at_once))
                     note_wrong(passing, party, off, threads)
                     wrong = wp.max(wrong, off)
             barrier(threads)
-            if threads > 1:
+            if at_once != 0:
                 take_sums(particles, rigid, first, start, thread, threads)
                 barrier(threads)
             if thread == 0:
@@ -225,6 +226,5 @@ def solve(
             r = world * holds.count + k
             holds.total[r] = holds.total[r] + holds.pull[r]
             holds.total_twist[r] = holds.total_twist[r] + holds.twist[r]
-    if threads > 1:
-        for k in range(thread, count, threads):
-            share(particles, rigid, first, start, rows, rows.active[base + k], -1)
+    if at_once != 0:
+        forget_sharers(particles, rigid, first, start, thread, threads)
