@@ -36,11 +36,14 @@ from nuno.solver.lanes import (  # noqa: F401
     sub,
     times,
 )
-from nuno.solver.state import CLOCK, FRICTION, SPEED, THICKNESS, Settings, Shapes, Topology
+from nuno.solver.state import CLOCK, FRICTION, SPEED, THICKNESS, Settings, Shapes
 
 STEPS = wp.constant(6)
 """Tangents looked at between two ends: the distance of a 40 mm edge from a ball of 4 mm, or from the edge of a box, is
 then found within 0.006 mm, of twenty thousand that were tried."""
+
+ROUGH = wp.constant(1.0e-5)
+"""[m] What is nearer to an edge than this does not say by where it is which way is out: rounding moves it."""
 
 
 @wp.func
@@ -68,6 +71,65 @@ def past_box_edge(ax: Any, ay: Any, az: Any, lx: Any, ly: Any, lz: Any, part: An
 
 
 @wp.func
+def across_edge(
+    kind: int, x: Any, y: Any, z: Any, lx: Any, ly: Any, lz: Any, gap: Any, nx: Any, ny: Any, nz: Any, a: Any, b: Any,
+    c: Any, deepest: float,
+):  # fmt: skip
+    """How deep an edge along l is at a point in a box or a cylinder, by the way out across the shape's nearest edge.
+
+    The nearest face's normal would be another one on either side of the shape's edge.
+
+    Returns:
+        The distance and its normal; those given where the point is outside or deeper than ``deepest`` [m], or the two
+        do not cross.
+    """
+    zero = fill(x, 0.0)
+    one = fill(x, 1.0)
+    # outward normals f and g of the two faces that meet in the shape's edge, and the distances p and q from them
+    rho = root(times(x, x) + times(y, y) + fill(x, 1.0e-20))
+    fx = over(x, rho)
+    fy = over(y, rho)
+    p = rho - a
+    gy = zero
+    gz = choose(z, one, -one)
+    q = size_of(z) - b
+    if kind == BOX:
+        qx = size_of(x) - a
+        qy = size_of(y) - b
+        qz = size_of(z) - c
+        # along the edge the point is the deepest
+        kx = choose(least(qy, qz) - qx, zero, one)
+        kz = choose(times(kx, qy - qz), zero, one)
+        gy = choose(y, one, -one)
+        fx = times(choose(x, one, -one), kx)
+        fy = times(gy, one - kx)
+        gy = times(gy, one - kz)
+        gz = times(gz, kz)
+        p = choose(kx, qx, qy)
+        q = choose(kz, qz, qy)
+    # across the edge along l, where the shape's edge is a point
+    lf = times(fx, lx) + times(fy, ly)
+    lg = times(gy, ly) + times(gz, lz)
+    mf = size_of(lg)
+    mg = size_of(lf)
+    lean = choose(mf - mg, one, -one)
+    alike = times(lf, lg)
+    mf = times(mf, choose(alike, lean, one))
+    mg = times(mg, choose(alike, -lean, one))
+    size = root(times(lf, lf) + times(lg, lg) + fill(x, 1.0e-20))
+    mf = over(mf, size)
+    mg = over(mg, size)
+    deep = times(mf, p) + times(mg, q)
+    slant = fill(x, SLANT)
+    on = least(least(fill(x, ROUGH) - gap, deep + fill(x, deepest)), least(mf, mg) + slant)
+    on = least(on, size - times(slant, root(square_of(lx, ly, lz))))
+    nx = choose(on, times(mf, fx), nx)
+    ny = choose(on, times(mf, fy) + times(mg, gy), ny)
+    nz = choose(on, times(mg, gz), nz)
+    return choose(on, deep, gap), nx, ny, nz
+
+
+@wp.func
 def travel(t: Any, run: Settings, shapes: Shapes):
     """How far any vertex, and any shape, may have gone from where it was at the frame's start to the substep's [m]."""
     return t.sharp_wake[0] + (largest(root(t.notes[SPEED])) + shapes.haste[0]) * run.dt
@@ -80,7 +142,7 @@ def sleep(t: Any, entry: int, gone: float, near: Any):
 
 
 @wp.func
-def wake_up(t: Any, topo: Topology, gone: float, thread: int, threads: int):
+def wake_up(t: Any, topo: Any, gone: float, thread: int, threads: int):
     """Wake what may be near again of the listed elements, the others get a number below zero.
 
     Whoever wakes an element also looks at it.
@@ -98,7 +160,7 @@ def wake_up(t: Any, topo: Topology, gone: float, thread: int, threads: int):
 
 
 @wp.func
-def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int, thread: int, threads: int):
+def touch_between(t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, thread: int, threads: int):
     """The listed edges and triangles against one shape."""
     like = fill(t.x[0], 0.0)
     zero = fill(like, 0.0)
@@ -147,6 +209,8 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
     # all have gone as far
     reach = radius + fill(like, QUICK * run.dt)
     broad = ROUND * run.cell
+    rough = fill(like, ROUGH)
+    quick = fill(like, QUICK * run.dt)
     third = float(1.0 / 3.0)
     gone = travel(t, run, shapes)
     edges = topo.side.shape[0]
@@ -187,8 +251,8 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
                 da = times(nx, lx) + times(ny, ly) + times(nz, lz)
                 fb, nx, ny, nz = distance_solid(kind, ax + lx, ay + ly, az + lz, sa, sb, sc)
                 db = times(nx, lx) + times(ny, ly) + times(nz, lz)
-                # over a face both ends see the same slope
-                on = least(-da, db)
+                # over a face both ends see the same slope, which one may lose within the substep
+                on = least(-da, db) + quick
             if anywhere(on):
                 tiny = -fill(like, 1.0e-12)
                 part = over(fb - db - fa, least(da - db, tiny))
@@ -233,6 +297,11 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
                             db = choose(slope, slope, db)
                             part = over(fb - times(db, high) - fa + times(da, low), least(da - db, tiny))
                         part = other
+                        if (kind == BOX or kind == CYLINDER) and anywhere(rough - gap):
+                            gap, nx, ny, nz = across_edge(
+                                kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), lx, ly, lz, gap, nx, ny,
+                                nz, sa, sb, sc, 0.5 * run.cell,
+                            )  # fmt: skip
                         # what the point moves, less what the surface moves there
                         rest = one - at
                         ux = times(rest, t.x[i] - t.px[i]) + times(at, t.x[j] - t.px[j])
@@ -260,7 +329,7 @@ def touch_between(t: Any, topo: Topology, run: Settings, shapes: Shapes, s: int,
                         wz = times(r20, nx) + times(r21, ny) + times(r22, nz)
                         gap = over(gap - radius, most(size, fill(like, SLANT)))
                         gap = gap - least(gap, zero) * PATIENCE + times(ux, wx) + times(uy, wy) + times(uz, wz)
-                        touching = least(on, least(-gap, size - fill(like, SLANT)))
+                        touching = least(least(on, least(at, rest)), least(-gap, size - fill(like, SLANT)))
                         if turn > 0:
                             touching = least(touching, apart)
                         if anywhere(touching):
@@ -381,7 +450,7 @@ def outermost(kind: int, nx: Any, ny: Any, nz: Any, a: Any, b: Any, c: Any):
 
 
 @wp.func
-def touch_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+def touch_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
     """All listed edges and triangles against the sharp shapes nearby."""
     gone = travel(t, run, shapes)
     wake_up(t, topo, gone, thread, threads)

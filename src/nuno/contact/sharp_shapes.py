@@ -29,13 +29,11 @@ from nuno.solver.lanes import (  # noqa: F401
     sub,
     times,
 )
-from nuno.solver.state import CLOCK, ORIGIN, Settings, Shapes, Topology
+from nuno.solver.state import CLOCK, ORIGIN, Settings, Shapes
 
 ROUND = wp.constant(3.0)
 """Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
 twenty-fourth of it into such a ball, its diagonal a twelfth."""
-STRETCHED = wp.constant(1.2)
-"""How much longer than at rest an edge is taken to be at most."""
 QUICK = wp.constant(3.0)
 """[m/s] What comes nearer faster than this, where the surfaces do not yet touch, may be seen a substep late."""
 
@@ -109,7 +107,7 @@ def sharp_features(
 
 
 @wp.func
-def forget_sharp(t: Any, topo: Topology, thread: int):
+def forget_sharp(t: Any, topo: Any, thread: int):
     """Start the lists anew; one thread does it.
 
     `State.sharp` has how many shapes are listed, how many elements of each colour, and then the shapes.
@@ -121,7 +119,7 @@ def forget_sharp(t: Any, topo: Topology, thread: int):
 
 
 @wp.func
-def mark_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
     """List the sharp shapes near the cloth, and mark the vertices by which they may touch within the frame.
 
     By 1 where an edge at the vertex may be touched, by 2 where a triangle may.
@@ -130,7 +128,7 @@ def mark_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: in
     clock = int(largest(t.notes[CLOCK]))
     grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + fill(like, QUICK * run.dt)
     # no point of an edge or triangle is farther from the nearest of its vertices than 0.6 of its longest edge
-    around = grow + fill(like, 0.6 * STRETCHED * topo.longest)
+    around = grow + fill(like, 0.6 * topo.longest)
     broad = ROUND * run.cell
     found = int(0)
     for near in range(t.near[0]):
@@ -180,7 +178,7 @@ def mark_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: in
 
 
 @wp.func
-def list_sharp(t: Any, topo: Topology, thread: int, threads: int):
+def list_sharp(t: Any, topo: Any, thread: int, threads: int):
     """List the edges and triangles with marked vertices, once all are marked."""
     if t.sharp[0] > 0:
         edges = topo.side.shape[0]

@@ -50,12 +50,14 @@ class Colliders:
         shapes: The Warp struct.
         count: Number of shapes.
         led: Bodies with a slot, in the slots' order.
+        least_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
     """
 
     def __init__(
-        self, shapes: Shapes, count: int, meshes: list[Any], led: Sequence[Body], centres: Sequence[np.ndarray]
-    ) -> None:
-        self.shapes, self.count, self.led = shapes, count, tuple(led)
+        self, shapes: Shapes, count: int, meshes: list[Any], led: Sequence[Body], centres: Sequence[np.ndarray],
+        least_radius: float,
+    ) -> None:  # fmt: skip
+        self.shapes, self.count, self.led, self.least_radius = shapes, count, tuple(led), least_radius
         self._meshes = meshes
         # (worlds, led, 3) [m], where the led bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
@@ -138,7 +140,8 @@ class Colliders:
         shapes.pose = wp.zeros(worlds * size if led else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
         shapes.haste = wp.zeros(1, dtype=float, device=device)
-        return cls(shapes, len(bodies), meshes, led, centres)
+        curved = np.where((kinds == BOX) | (kinds == CYLINDER), 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
+        return cls(shapes, len(bodies), meshes, led, centres, float(curved.min()))
 
     def follow(self, schedule: Schedule) -> None:
         """Take where the led bodies are during the next run; arrays keep their places on the device."""

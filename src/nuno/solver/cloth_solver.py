@@ -32,6 +32,7 @@ from nuno.solver.shared import (
     run_fine_blocks_partly,
 )
 from nuno.solver.shared_memory import FINE_PARTICLES, SHARED_PARTICLES, WHOLE_PARTICLES
+from nuno.solver.sides import put_sides
 from nuno.solver.stages import divide, make_work
 from nuno.solver.state import (
     COUNTS,
@@ -55,7 +56,6 @@ from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
 if TYPE_CHECKING:
     from nuno.materials import Cloth
-    from nuno.scene.colliders import Colliders
 
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
@@ -66,6 +66,8 @@ LARGE = ("grid", "large")
 GRID_MARGIN = 0.45
 """Margin of the lists of the plan "grid" over the size of a cell: lists are few. With the largest thickness, half a
 cell, it is less than a cell, so that flat cloth still has no candidates."""
+STRETCHED = 1.2
+"""How many times as long as at rest an edge is taken to be at most, where it is asked what may touch it."""
 CPU_SHARES = 5
 """Blocks of such a plan on the CPU, one after the other: enough to test how work is shared."""
 
@@ -138,11 +140,8 @@ class ClothSolver(ParticleSolver):
         for name, value in shared.items():
             setattr(topo, name, value)
         topo.particles, topo.blocks, topo.columns = n, topology.blocks.count, topology.blocks.columns
-        side = shared["side"].numpy()
-        rest = topology.rest[side]
-        topo.side_colours = int(np.searchsorted(shared["sharp_colour"].numpy(), len(side)))
-        topo.longest = float(np.linalg.norm(rest[:, 0] - rest[:, 1], axis=1).max())
-        self._size, self._state, self._topology = size, state, topo
+        put_sides(topo, topology, self.device, STRETCHED)
+        self._size, self._state, self._topology, self._surface = size, state, topo, topo
         self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine)
 
         soft = compliances(topology, values)
@@ -200,9 +199,6 @@ class ClothSolver(ParticleSolver):
         state.listed = empty(size.listed, self._number)
         state.middle = empty(size.middle, self._number)
         state.moved = empty(size.moved, int)
-        size.sharp_list = len(self._topology.side) + len(self._topology.face)
-        state.sharp_mark, state.sharp_list = empty(n, int), empty(size.sharp_list, int)
-        state.sharp_wake = empty(size.sharp_list + 1, float)
         self._allocate_lists()
 
     def _allocate_lists(self) -> None:
@@ -220,20 +216,6 @@ class ClothSolver(ParticleSolver):
         state.near_blocks = empty(size.near_blocks, self._integer)
         self._counts = state.pair_count
         self._allocate_help()
-
-    def set_colliders(self, colliders: Colliders | None) -> None:
-        """The static shapes that the cloth meets; None for none."""
-        super().set_colliders(colliders)
-        self._size.sharp = len(self._topology.sharp_colour) + self._size.near
-        self._state.sharp = wp.zeros(self.group_count * self._size.sharp, dtype=int, device=self.device)
-
-    def _touch_only(self, shape: int, lists: dict[str, np.ndarray]) -> None:
-        super()._touch_only(shape, lists)
-        self._state.sharp_wake.zero_()  # what sleeps was far from another shape
-
-    @property
-    def _shape_lists(self) -> dict[str, int]:
-        return {**super()._shape_lists, "sharp": len(self._topology.sharp_colour)}
 
     def _list(self, count: int) -> wp.array:
         """Zeros, whole numbers, ``count`` a world or group of lanes; on the CPU they take memory once written to."""

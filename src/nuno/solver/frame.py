@@ -276,7 +276,7 @@ def near_shapes(t: Any, n: int, run: Settings, shapes: Shapes, thread: int, thre
 
 
 @wp.func
-def near_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+def near_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
     """Choose the edges and triangles that sharp shapes may touch in the next frame; after `near_shapes`."""
     forget_sharp(t, topo, thread)
     barrier(threads)
@@ -287,7 +287,7 @@ def near_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: in
 
 
 @wp.func
-def meet_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
+def meet_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
     """Edges and triangles against sharp shapes, where there are any nearby."""
     if t.sharp[0] > 0:
         touch_sharp(t, topo, run, shapes, thread, threads)

@@ -69,6 +69,7 @@ class ParticleSolver:
     _state: Any
     _size: Any
     _topology: Any
+    _surface: Any
     _scalars: np.ndarray
     _inverse_mass: np.ndarray
     _damped: bool
@@ -149,6 +150,9 @@ class ParticleSolver:
             setattr(state, name, self._empty(self._whole, self._number)[: self.group_count * n])
         state.notes = self._empty(NOTES, self._number)
         state.box = self._empty(6, self._number)
+        self._size.sharp_list = len(self._surface.side) + len(self._surface.face)
+        state.sharp_mark, state.sharp_list = self._empty(n, int), self._empty(self._size.sharp_list, int)
+        state.sharp_wake = self._empty(self._size.sharp_list + 1, float)
         state.worlds = self.world_count
 
     # -- state
@@ -270,7 +274,7 @@ class ParticleSolver:
     def memory_bytes(self) -> int:
         """Bytes of device memory that this body holds, elements shared by all worlds included."""
         total = 0
-        holders: tuple[Any, ...] = (self._state, self._topology)
+        holders: tuple[Any, ...] = (self._state, *{self._topology, self._surface})
         for holder in holders:
             for name in holder._cls.vars:
                 value = getattr(holder, name)
@@ -295,7 +299,8 @@ class ParticleSolver:
             shapes = colliders.shapes
         self._colliders, self._shapes = colliders, shapes
         self._size.near = max(1, int(shapes.count)) + 1
-        self._state.near = wp.zeros(self.group_count * self._size.near, dtype=int, device=self.device)
+        self._size.sharp = len(self._surface.sharp_colour) + self._size.near
+        self._state.near, self._state.sharp = self._empty(self._size.near, int), self._empty(self._size.sharp, int)
         self._forget_launches()
 
     def set_forces(self, forces: np.ndarray | None) -> None:
@@ -413,11 +418,12 @@ class ParticleSolver:
             rows[:, 0] = [shape in row[start : start + row[0]] for row in lists[name]]
             rows[:, start] = shape
             getattr(self._state, name).assign(rows.ravel())
+        self._state.sharp_wake.zero_()  # what sleeps was far from another shape
 
     @property
     def _shape_lists(self) -> dict[str, int]:
         """The state's lists of shapes nearby, as many as their first number says: at which number they begin."""
-        return {"near": 1}
+        return {"near": 1, "sharp": len(self._surface.sharp_colour)}
 
     def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
         """(worlds, n), zero for what is held."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.sharp_shapes import ROUND
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
 from nuno.solver.fine_places import FinePlaces
@@ -16,16 +17,9 @@ from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared_memory import FINE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
+from nuno.solver.sides import put_sides
+from nuno.solver.soft_blocks import FEW_THREADS, MANY_THREADS, PLAIN, SHARP
 from nuno.solver.soft_frame import (
-    FEW_THREADS,
-    MANY_THREADS,
-    run_soft_blocks,
-    run_soft_blocks_partly,
-    run_soft_blocks_shared,
-    run_soft_few_partly,
-    run_soft_few_shared,
-    run_soft_fine_blocks,
-    run_soft_fine_blocks_partly,
     run_soft_fine_lanes,
     run_soft_fine_wide,
     run_soft_fine_worlds,
@@ -34,6 +28,8 @@ from nuno.solver.soft_frame import (
     run_soft_worlds,
 )
 from nuno.solver.soft_state import (
+    NoSides,
+    Sides,
     SoftFine,
     SoftFineLanes,
     SoftFloat,
@@ -48,12 +44,15 @@ from nuno.solver.tetrahedron import COLUMNS
 
 if TYPE_CHECKING:
     from nuno.materials import Soft
+    from nuno.scene.colliders import Colliders
 
 COLLAPSED = 1e-3
 """Width of a body, in cells, below which it is a line or a point, from where no force of its own leads back."""
 MOST_REPLY, MOST_BETWEEN = 0.7, 4
 """Viscosity works on every so many substeps (at most 4) that an element's reply to its own viscosity stays below 0.7 on
 average; smooth motions are then damped at 0.85 to 0.95 of the stated rate, and at 0.95 to 0.99 at half the reply."""
+STRETCHED = 2.0
+"""How many times as long as at rest an edge is taken to be at most, where it is asked what may touch it."""
 DIGITS = 22
 """Binary digits in which rest shapes that count as one agree: float32 has 24."""
 LOOSENING = 0.1
@@ -116,6 +115,7 @@ class SoftSolver(ParticleSolver):
     def settings(self, time: float, dt: float, frame: int) -> Settings:
         """The run's settings; ``damped`` is every how many substeps viscosity works, 0 for never."""
         run = super().settings(time, dt, frame)
+        run.cell = self._side
         if self._damped:
             often = max(1, min(MOST_BETWEEN, int(MOST_REPLY / (self._reply * dt))))
             run.damped = max(k for k in range(1, often + 1) if frame % k == 0)
@@ -128,6 +128,11 @@ class SoftSolver(ParticleSolver):
         """
         super().set_state(loosened(np.asarray(positions, dtype=np.float64), self._cell_size), velocities)
 
+    def set_colliders(self, colliders: Colliders | None) -> None:
+        """The static shapes that the body meets; None for none."""
+        super().set_colliders(colliders)
+        self._sharp = colliders is not None and colliders.least_radius < ROUND * self._side
+
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds = self.topology, self.world_count
         state = SoftLanes() if self.lanes > 1 else SoftFloat()
@@ -138,6 +143,10 @@ class SoftSolver(ParticleSolver):
         size.soft = mu.shape[1]
         state.mu, state.bulk = (self._put(np.broadcast_to(m, (worlds, size.soft))) for m in (mu, bulk))
         self._topology = self._upload(shared=size.soft == 1)
+        self._surface, self._no_surface = Sides(), NoSides()
+        put_sides(self._surface, topology, self.device, STRETCHED)
+        # of a cube whose face's diagonal is the longest edge
+        self._side = self._surface.longest / (STRETCHED * np.sqrt(2.0))
         self.mass = np.repeat(topology.masses(values["density"]), worlds // len(values["density"]), axis=0)
         self._inverse_mass = (1.0 / self.mass).astype(np.float32)
         own = values["friction"] if friction is None else np.asarray(friction, float).reshape(-1, 1)
@@ -201,23 +210,21 @@ class SoftSolver(ParticleSolver):
     def _advance(self, run: Settings, substeps: int) -> None:
         fine = self._fine.bring(run)
         states = [self._state] if fine is None else [fine, self._state]
-        common = [*states, self._topology, self._size, run, self._shapes]
         if self._cuda:
             kernel, threads = self._block_kernel(fine is not None)
-            wp.launch(
-                kernel, dim=self.group_count * threads, inputs=[*common, substeps, threads], device=self.device,
-                block_dim=threads,
-            )  # fmt: skip
+            surface = self._surface if self._sharp else self._no_surface
+            inputs = [*states, self._topology, surface, self._size, run, self._shapes, substeps, threads]
+            wp.launch(kernel, dim=self.group_count * threads, inputs=inputs, device=self.device, block_dim=threads)
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = self._widen()
-            inputs = [*states, self._topology, self._wide, self._size, run, self._shapes, substeps]
+            inputs = [*states, self._topology, self._wide, self._surface, self._size, run, self._shapes, substeps]
             kernel = run_soft_wide if fine is None else run_soft_fine_wide
             wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
         else:
             lanes, worlds = (run_soft_lanes, run_soft_fine_lanes), (run_soft_worlds, run_soft_fine_worlds)
             kernel = (lanes if self.lanes > 1 else worlds)[fine is not None]
-            before = [*states, self._topology, self._size]
+            before = [*states, self._topology, self._surface, self._size]
 
             def launch(group: int, piece: Settings, count: int) -> None:
                 inputs = [*before, piece, self._shapes, group, count]
@@ -227,15 +234,16 @@ class SoftSolver(ParticleSolver):
 
     def _block_kernel(self, fine: bool) -> tuple[Any, int]:
         """The kernel that has as much of a world in shared memory and registers as fits, and its threads."""
+        kernels = SHARP if self._sharp else PLAIN
         if fine:
             fits = self.shared_memory and self.particle_count <= FINE_PARTICLES
-            return (run_soft_fine_blocks_partly if fits else run_soft_fine_blocks), FEW_THREADS
+            return kernels["fine_blocks_partly" if fits else "fine_blocks"], FEW_THREADS
         if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
-            return run_soft_blocks, FEW_THREADS
+            return kernels["blocks"], FEW_THREADS
         few = self.group_count <= wp.get_device(self.device).sm_count
         if self.particle_count > ROOMY_PARTICLES:
-            return (run_soft_few_partly if few else run_soft_blocks_partly), FEW_THREADS
-        return (run_soft_few_shared, FEW_THREADS) if few else (run_soft_blocks_shared, MANY_THREADS)
+            return kernels["few_partly" if few else "blocks_partly"], FEW_THREADS
+        return kernels["few_shared" if few else "blocks_shared"], FEW_THREADS if few else MANY_THREADS
 
 
 def rest_shapes(topology: SoftTopology) -> tuple[np.ndarray, np.ndarray]:

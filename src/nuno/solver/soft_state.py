@@ -19,7 +19,9 @@ def _make(name: str, number: type, integer: type, place: type) -> Any:
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=place) for name in PLACES}
-    fields |= {"grip_corner": wp.array(dtype=integer), "near": wp.array(dtype=int), "group": int, "worlds": int}
+    fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
+    fields |= {name: wp.array(dtype=int) for name in ("near", "sharp", "sharp_mark", "sharp_list")}
+    fields["sharp_wake"] = wp.array(dtype=float)
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 
@@ -78,6 +80,25 @@ class WideTetrahedra:
 
 
 @wp.struct
+class Sides:
+    """A soft body's surface, under the names that `nuno.solver.state.Topology` has for a cloth's."""
+
+    particles: int
+    side: wp.array(dtype=wp.vec2i)
+    face: wp.array(dtype=wp.vec3i)
+    sharp_colour: wp.array(dtype=int)
+    side_colours: int
+    longest: float
+
+
+@wp.struct
+class NoSides:
+    """In the place of `Sides` in kernels that have nothing to do with sharp shapes."""
+
+    none: int
+
+
+@wp.struct
 class SoftSizes:
     """How many elements of each per-world array belong to one world."""
 
@@ -86,6 +107,8 @@ class SoftSizes:
     keys: int
     grips: int
     near: int
+    sharp: int
+    sharp_list: int
 
 
 @wp.func
@@ -119,4 +142,8 @@ def view(s: Any, group: int, n: int, size: SoftSizes):
     t.grip_load = window(s.grip_load, group * LOADS * size.grips, LOADS * size.grips)
     t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
     t.near = window(s.near, group * size.near, size.near)
+    t.sharp = window(s.sharp, group * size.sharp, size.sharp)
+    t.sharp_mark = window(s.sharp_mark, group * n, n)
+    t.sharp_list = window(s.sharp_list, group * size.sharp_list, size.sharp_list)
+    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 1), size.sharp_list + 1)
     return t

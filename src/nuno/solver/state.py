@@ -134,7 +134,7 @@ class Topology:
     block_corner_start: wp.array(dtype=int)
     crease: wp.array(dtype=wp.vec4i)
     # contact with sharp shapes: all edges of the triangles, then the triangles, by colour; where each colour starts,
-    # how many of these are edges', and the longest edge [m]
+    # how many of these are edges', and how long an edge may become [m]
     side: wp.array(dtype=wp.vec2i)
     face: wp.array(dtype=wp.vec3i)
     sharp_colour: wp.array(dtype=int)

@@ -6,21 +6,7 @@ import numpy as np
 import warp as wp
 
 from nuno.scene.cloth import ClothTopology
-from nuno.scene.colouring import by_colour, colour
 from nuno.scene.yarns import string_yarns
-
-
-def coloured_sides(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return the edges of triangles (m, 3), each once, and the triangles, both by colour.
-
-    Besides, where each colour starts among the edges and the triangles behind them, and how many colours edges have.
-    """
-    sides = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    order, starts = by_colour(colour(sides, count))
-    face_order, face_starts = by_colour(colour(faces, count))
-    return (
-        sides[order], faces[face_order], np.concatenate([starts, len(sides) + face_starts[1:]]), len(starts) - 1
-    )  # fmt: skip
 
 
 def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
@@ -34,7 +20,6 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)
 
     t, b = topology, topology.blocks
-    side, face, sharp_colour, _colours = coloured_sides(t.faces, t.vertex_count)
     order, starts, kinds = string_yarns(t.edges)
     made = dict(
         edge=put(t.edges.vertices[order], wp.vec2i), edge_rest=put(t.edges.extra["rest"][order], float),
@@ -59,8 +44,7 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         block_corner=put(b.corner, int), block_corner_start=put(b.corner_start, int),
         crease=put(b.crease, wp.vec4i),
         region_corner=put(b.region_corner, int), region_start=put(b.region_start, int), block_span=put(b.span, int),
-        crease_window=put(b.crease_window, int), side=put(side, wp.vec2i), face=put(face, wp.vec3i),
-        sharp_colour=put(sharp_colour, int),
+        crease_window=put(b.crease_window, int),
     )  # fmt: skip
     topology.device_arrays[device] = made
     return made

@@ -1,0 +1,220 @@
+"""The kernels that walk through a soft body's substeps on CUDA: a world a block, as much of it at hand as fits.
+
+Each is there twice, with and without what meets sharp shapes: beside that the elastic stars, which take all registers
+that a thread may have, would lose some of theirs whether anything sharp is near or not.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.solver.lanes import barrier
+from nuno.solver.shared import BLOCKS_AT_ONCE
+from nuno.solver.shared_memory import (
+    FINE_PARTICLES,
+    ROOMY_PARTICLES,
+    SHARED_PARTICLES,
+    column,
+    figures,
+    fine_column,
+)
+from nuno.solver.soft_frame import advance
+from nuno.solver.soft_state import NoSides, Sides, SoftFine, SoftFloat, SoftSizes, Tetrahedra, view
+from nuno.solver.state import Settings, Shapes
+
+FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
+"""Threads of a block, and of one where worlds queue up for multiprocessors and have all but the substep's start in
+their memory, in which four worlds fit at once. A colour of such a body has about 128 stars: more threads would only
+wait for them. The bits are the same."""
+
+
+@wp.func
+def advance_block(
+    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """`advance` with the world's scalars and notes in shared memory for as long as the launch takes."""
+    scalars = t.scalars
+    notes = t.notes
+    t.scalars = figures(0)
+    t.notes = figures(8)
+    near.scalars = figures(0)
+    near.notes = figures(8)
+    if thread == 0:
+        for k in range(7):
+            t.scalars[k] = scalars[k]
+        for k in range(6):
+            t.notes[k] = notes[k]
+    barrier(threads)
+    advance(t, near, topo, sides, run, shapes, substeps, thread, threads)
+    barrier(threads)
+    if thread == 0:
+        for k in range(6):
+            notes[k] = t.notes[k]
+
+
+@wp.func
+def run_partly(
+    s: SoftFloat, topo: Tetrahedra, sides: Any, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, tid: int,
+    threads: int,
+):  # fmt: skip
+    """A world by a block with x, y, z and w in shared memory for as long as the launch takes."""
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    t.x = column(0)
+    t.y = column(SHARED_PARTICLES)
+    t.z = column(2 * SHARED_PARTICLES)
+    t.w = column(3 * SHARED_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+    advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+
+
+@wp.func
+def run_shared(
+    s: SoftFloat, topo: Tetrahedra, sides: Any, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int, tid: int,
+    threads: int,
+):  # fmt: skip
+    """A world by a block with x, y, z, w and v in shared memory."""
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    t.x = column(0)
+    t.y = column(ROOMY_PARTICLES)
+    t.z = column(2 * ROOMY_PARTICLES)
+    t.w = column(3 * ROOMY_PARTICLES)
+    t.vx = column(4 * ROOMY_PARTICLES)
+    t.vy = column(5 * ROOMY_PARTICLES)
+    t.vz = column(6 * ROOMY_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+        t.vx[i] = outside.vx[i]
+        t.vy[i] = outside.vy[i]
+        t.vz[i] = outside.vz[i]
+    advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+        outside.vx[i] = t.vx[i]
+        outside.vy[i] = t.vy[i]
+        outside.vz[i] = t.vz[i]
+
+
+@wp.func
+def run_fine_partly(
+    s: SoftFine, floats: SoftFloat, topo: Tetrahedra, sides: Any, size: SoftSizes, run: Settings, shapes: Shapes,
+    substeps: int, tid: int, threads: int,
+):  # fmt: skip
+    """A world by a block, coordinates as doubles, x, y and z in shared memory for as long as the launch takes."""
+    n = topo.particles
+    thread = tid % threads
+    t = view(s, tid / threads, n, size)
+    outside = view(s, tid / threads, n, size)
+    t.x = fine_column(0)
+    t.y = fine_column(FINE_PARTICLES)
+    t.z = fine_column(2 * FINE_PARTICLES)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+    advance_block(t, view(floats, tid / threads, n, size), topo, sides, run, shapes, substeps, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+
+
+def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:
+    """Return the kernels with ``kind`` for what they know of the surface, by name; a module each, with the suffix."""
+
+    def module(name: str) -> str:
+        """A module's name; quotients and roots are as the processor has them in it: see `nuno.solver.shared`."""
+        whole = f"nuno.solver.run_soft_{name}{suffix}"
+        wp.get_module(whole).options["fast_math"] = True
+        return whole
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, BLOCKS_AT_ONCE), module=module("blocks"))
+    def run_soft_blocks(
+        s: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+        threads: int,
+    ):  # fmt: skip
+        """Every world by a block of ``threads`` threads."""
+        tid = wp.tid()
+        t = view(s, tid / threads, topo.particles, size)
+        advance(t, t, topo, sides, run, shapes, substeps, tid % threads, threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, BLOCKS_AT_ONCE), module=module("blocks_partly"))
+    def run_soft_blocks_partly(
+        s: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+        threads: int,
+    ):  # fmt: skip
+        """Worlds that queue up for multiprocessors, and of which not all fits."""
+        run_partly(s, topo, sides, size, run, shapes, substeps, wp.tid(), threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("few_partly"))
+    def run_soft_few_partly(
+        s: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+        threads: int,
+    ):  # fmt: skip
+        """Worlds that have a multiprocessor each, and so all of its registers, and of which not all fits."""
+        run_partly(s, topo, sides, size, run, shapes, substeps, wp.tid(), threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(MANY_THREADS, MANY_AT_ONCE), module=module("blocks_shared"))
+    def run_soft_blocks_shared(
+        s: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+        threads: int,
+    ):  # fmt: skip
+        """Worlds that queue up for multiprocessors."""
+        run_shared(s, topo, sides, size, run, shapes, substeps, wp.tid(), threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("few_shared"))
+    def run_soft_few_shared(
+        s: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes, substeps: int,
+        threads: int,
+    ):  # fmt: skip
+        """Worlds that have a multiprocessor each, and so all of its registers."""
+        run_shared(s, topo, sides, size, run, shapes, substeps, wp.tid(), threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("fine_blocks"))
+    def run_soft_fine_blocks(
+        s: SoftFine, floats: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes,
+        substeps: int, threads: int,
+    ):  # fmt: skip
+        """Every world by a block, coordinates as doubles."""
+        tid = wp.tid()
+        n = topo.particles
+        t = view(s, tid / threads, n, size)
+        near = view(floats, tid / threads, n, size)
+        advance_block(t, near, topo, sides, run, shapes, substeps, tid % threads, threads)
+
+    @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("fine_blocks_partly"))
+    def run_soft_fine_blocks_partly(
+        s: SoftFine, floats: SoftFloat, topo: Tetrahedra, sides: kind, size: SoftSizes, run: Settings, shapes: Shapes,
+        substeps: int, threads: int,
+    ):  # fmt: skip
+        """The same with x, y and z in shared memory for as long as the launch takes."""
+        run_fine_partly(s, floats, topo, sides, size, run, shapes, substeps, wp.tid(), threads)
+
+    kernels = (
+        run_soft_blocks, run_soft_blocks_partly, run_soft_few_partly, run_soft_blocks_shared, run_soft_few_shared,
+        run_soft_fine_blocks, run_soft_fine_blocks_partly,
+    )  # fmt: skip
+    return {kernel.key.rpartition("run_soft_")[2]: kernel for kernel in kernels}
+
+
+PLAIN, SHARP = block_kernels(NoSides, ""), block_kernels(Sides, "_sharp")
+"""The kernels where no shape is sharp, and where some is."""
