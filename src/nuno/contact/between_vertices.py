@@ -299,8 +299,8 @@ def touch_between(t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, thre
                         part = other
                         if (kind == BOX or kind == CYLINDER) and anywhere(rough - gap):
                             gap, nx, ny, nz = across_edge(
-                                kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), lx, ly, lz, gap, nx, ny,
-                                nz, sa, sb, sc, 0.5 * run.cell,
+                                kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), lx, ly, lz, gap, nx,
+                                ny, nz, sa, sb, sc, 0.5 * run.cell,
                             )  # fmt: skip
                         # what the point moves, less what the surface moves there
                         rest = one - at
