@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import nuno
 from nuno import quaternion as quat
 from nuno.mesh.tetrahedra import box_tetrahedra
 from nuno.scene.colliders import Colliders
 from nuno.scene.soft import SoftTopology
+from nuno.solver.soft_blocks import FAR, SHARP
 from nuno.solver.soft_solver import SoftSolver
 
 SIDE = 0.1
@@ -195,6 +197,30 @@ def test_all_plans_meet_edges_alike(substeps):
     np.testing.assert_array_equal(ends[1], ends[0])
 
 
+def test_the_kernels_of_cuda_take_turns():
+    """One source: those without sharp shapes stop at the frame in which some are near, and the others do the rest."""
+    substeps = 20  # at which coordinates are floats: the kernels for doubles ask for shared memory, CUDA's alone
+    topology = SoftTopology.of(*box_tetrahedra((0.1, 0.1, 0.1), (4, 4, 4)))
+    start = topology.rest[None] + np.array([0.0, 0.0, 0.15])
+    solver, other = (
+        SoftSolver(topology, soft(), start, 0 * start, substeps=substeps, plan="fused") for _ in range(2)
+    )  # fmt: skip
+    colliders = Colliders.from_bodies(rails())
+    for made in (solver, other):
+        made.set_colliders(colliders)
+    other.run(0.0, 0.4)
+    run = solver.settings(0.0, 1.0 / 60.0 / substeps, substeps)
+    solver._reset_clock()
+    gone = []
+    for kernels, surface in ((FAR, solver._far_surface), (SHARP, solver._surface)):
+        inputs = [solver._state, solver._topology, surface, solver._size, run, solver._shapes, 24 * substeps, 1]
+        wp.launch(kernels["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
+        gone.append(int(solver._state.gone_to.numpy()[0]))
+    assert 0 < gone[0] < gone[1] == 24 * substeps
+    assert gone[0] % substeps == 0
+    np.testing.assert_array_equal(solver.positions(), other.positions())
+
+
 def test_a_soft_body_far_from_the_rim_of_its_table_asks_for_nothing():
     """Promise: where no edge is in reach nothing is listed, and the bits are those of a table without end."""
 
@@ -211,7 +237,7 @@ def test_a_soft_body_far_from_the_rim_of_its_table_asks_for_nothing():
 
 
 def test_small_shapes_alone_are_sharp():
-    """Rule: boxes and cylinders have edges, balls are sharp under three cells; the rest needs no second kernel."""
+    """Rule: boxes and cylinders have edges, balls are sharp under three cells; the rest needs no second launch."""
     _, cube = cube_over([nuno.plane()], 4, (0, 0, 0.1), soft())
     solver = cube._dynamics.solver
     cell = SIDE / 4

@@ -1,7 +1,9 @@
 """The kernels that walk through a soft body's substeps on CUDA: a world a block, as much of it at hand as fits.
 
 Each is there twice, with and without what meets sharp shapes: beside that the elastic stars, which take all registers
-that a thread may have, would lose some of theirs whether anything sharp is near or not.
+that a thread may have, would lose some of theirs whether anything sharp is near or not. Those without go on until
+something sharp is near at the start of a frame; those with it, launched behind them, do the rest. Which one does a
+substep hangs on the world alone.
 """
 
 from typing import Any
@@ -19,7 +21,7 @@ from nuno.solver.shared_memory import (
     fine_column,
 )
 from nuno.solver.soft_frame import advance
-from nuno.solver.soft_state import NoSides, Sides, SoftFine, SoftFloat, SoftSizes, Tetrahedra, view
+from nuno.solver.soft_state import FarSides, Sides, SoftFine, SoftFloat, SoftSizes, Tetrahedra, view
 from nuno.solver.state import Settings, Shapes
 
 FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
@@ -29,11 +31,34 @@ wait for them. The bits are the same."""
 
 
 @wp.func
+def first_of(t: Any, sides: FarSides, substeps: int):
+    """The substep with which a kernel begins, ``substeps`` where there is nothing left for it."""
+    return 0
+
+
+@wp.func
+def first_of(t: Any, sides: Sides, substeps: int):
+    return t.gone_to[0]
+
+
+@wp.func
+def go(
+    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """`advance`, with a note of how far it went."""
+    done = advance(t, near, topo, sides, run, shapes, first_of(t, sides, substeps), substeps, thread, threads)
+    barrier(threads)
+    if thread == 0:
+        t.gone_to[0] = done
+
+
+@wp.func
 def advance_block(
     t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, thread: int,
     threads: int,
 ):  # fmt: skip
-    """`advance` with the world's scalars and notes in shared memory for as long as the launch takes."""
+    """`go` with the world's scalars and notes in shared memory for as long as the launch takes."""
     scalars = t.scalars
     notes = t.notes
     t.scalars = figures(0)
@@ -46,7 +71,7 @@ def advance_block(
         for k in range(6):
             t.notes[k] = notes[k]
     barrier(threads)
-    advance(t, near, topo, sides, run, shapes, substeps, thread, threads)
+    go(t, near, topo, sides, run, shapes, substeps, thread, threads)
     barrier(threads)
     if thread == 0:
         for k in range(6):
@@ -63,6 +88,8 @@ def run_partly(
     thread = tid % threads
     t = view(s, tid / threads, n, size)
     outside = view(s, tid / threads, n, size)
+    if first_of(t, sides, substeps) >= substeps:
+        return
     t.x = column(0)
     t.y = column(SHARED_PARTICLES)
     t.z = column(2 * SHARED_PARTICLES)
@@ -89,6 +116,8 @@ def run_shared(
     thread = tid % threads
     t = view(s, tid / threads, n, size)
     outside = view(s, tid / threads, n, size)
+    if first_of(t, sides, substeps) >= substeps:
+        return
     t.x = column(0)
     t.y = column(ROOMY_PARTICLES)
     t.z = column(2 * ROOMY_PARTICLES)
@@ -124,6 +153,8 @@ def run_fine_partly(
     thread = tid % threads
     t = view(s, tid / threads, n, size)
     outside = view(s, tid / threads, n, size)
+    if first_of(t, sides, substeps) >= substeps:
+        return
     t.x = fine_column(0)
     t.y = fine_column(FINE_PARTICLES)
     t.z = fine_column(2 * FINE_PARTICLES)
@@ -155,7 +186,7 @@ def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:
         """Every world by a block of ``threads`` threads."""
         tid = wp.tid()
         t = view(s, tid / threads, topo.particles, size)
-        advance(t, t, topo, sides, run, shapes, substeps, tid % threads, threads)
+        go(t, t, topo, sides, run, shapes, substeps, tid % threads, threads)
 
     @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, BLOCKS_AT_ONCE), module=module("blocks_partly"))
     def run_soft_blocks_partly(
@@ -216,5 +247,5 @@ def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:
     return {kernel.key.rpartition("run_soft_")[2]: kernel for kernel in kernels}
 
 
-PLAIN, SHARP = block_kernels(NoSides, ""), block_kernels(Sides, "_sharp")
-"""The kernels where no shape is sharp, and where some is."""
+FAR, SHARP = block_kernels(FarSides, ""), block_kernels(Sides, "_sharp")
+"""The kernels for as long as nothing sharp is near, and those for what is left then."""

@@ -19,7 +19,7 @@ from nuno.solver.soft_stars import damp_star, shape_of, solve_star, stiffness
 from nuno.solver.soft_state import (
     CRUMPLED,
     SEEN,
-    NoSides,
+    FarSides,
     Sides,
     SoftFine,
     SoftFineLanes,
@@ -137,39 +137,48 @@ def elastic_alone(t: Any, table: Tetrahedra, run: Settings, thread: int, threads
 
 
 @wp.func
-def find_sharp(t: Any, sides: Sides, run: Settings, shapes: Shapes, thread: int, threads: int):
-    """Choose the edges and triangles that sharp shapes may touch in the next frame."""
-    near_sharp(t, sides, run, shapes, thread, threads)
-
-
-@wp.func
-def find_sharp(t: Any, sides: NoSides, run: Settings, shapes: Shapes, thread: int, threads: int):
-    return
-
-
-@wp.func
 def touch_sides(t: Any, sides: Sides, run: Settings, shapes: Shapes, thread: int, threads: int):
-    """The chosen edges and triangles against sharp shapes."""
+    """Edges and triangles against the sharp shapes nearby."""
     meet_sharp(t, sides, run, shapes, thread, threads)
 
 
 @wp.func
-def touch_sides(t: Any, sides: NoSides, run: Settings, shapes: Shapes, thread: int, threads: int):
+def touch_sides(t: Any, sides: FarSides, run: Settings, shapes: Shapes, thread: int, threads: int):
     return
 
 
 @wp.func
+def goes_on(t: Any, sides: Sides):
+    """Whether the kernel does the substep that comes next."""
+    return True
+
+
+@wp.func
+def goes_on(t: Any, sides: FarSides):
+    return t.sharp[0] == 0
+
+
+@wp.func
 def advance(
-    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, thread: int,
-    threads: int,
+    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, begin: int, substeps: int,
+    thread: int, threads: int,
 ):  # fmt: skip
-    """The phases of ``substeps`` substeps; ``near`` is as `nuno.solver.frame.advance` has it."""
+    """The phases of substeps ``begin`` to ``substeps``; ``near`` is as `nuno.solver.frame.advance` has it.
+
+    Returns:
+        The substep before which it stopped: ``substeps``, or with `FarSides` the first that something sharp is near in.
+    """
     n = topo.particles
-    for k in range(substeps):
+    done = int(begin)
+    while done < substeps:
+        k = int(done)
+        if run.parts & MOTION != 0 and (run.first + k) % run.frame == 0:
+            near_shapes(near, n, run, shapes, thread, threads)
+            near_sharp(near, sides, run, shapes, thread, threads)
+        if not goes_on(t, sides):
+            break
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
-                near_shapes(near, n, run, shapes, thread, threads)
-                find_sharp(near, sides, run, shapes, thread, threads)
                 forget_loads(t, run, thread, threads)
             tick(t, run, thread)
             turn_notes(t, thread)
@@ -195,6 +204,8 @@ def advance(
             read_velocities(t, n, run, thread, threads)
             round_places(near, t, n, thread, threads)
             barrier(threads)
+        done = k + 1
+    return done
 
 
 # A module each, so that only the kind that is run is compiled.
@@ -207,7 +218,7 @@ def run_soft_worlds(
 ):  # fmt: skip
     """Every world by itself, by one thread on the CPU."""
     t = view(s, first + wp.tid(), topo.particles, size)
-    advance(t, t, topo, sides, run, shapes, substeps, 0, 1)
+    advance(t, t, topo, sides, run, shapes, 0, substeps, 0, 1)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.run_soft_lanes")
@@ -217,7 +228,7 @@ def run_soft_lanes(
 ):  # fmt: skip
     """Sixteen worlds at once, by one thread on the CPU."""
     t = view(s, first + wp.tid(), topo.particles, size)
-    advance(t, t, topo, sides, run, shapes, substeps, 0, 1)
+    advance(t, t, topo, sides, run, shapes, 0, substeps, 0, 1)
 
 
 @wp.func
@@ -231,7 +242,7 @@ def advance_wide(
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(near, n, run, shapes, 0, 1)
-                find_sharp(near, sides, run, shapes, 0, 1)
+                near_sharp(near, sides, run, shapes, 0, 1)
                 forget_loads(t, run, 0, 1)
             tick(t, run, 0)
             turn_notes(t, 0)
@@ -274,7 +285,7 @@ def run_soft_fine_worlds(
     """Every world by itself, by one thread on the CPU, coordinates as doubles."""
     n, group = topo.particles, first + wp.tid()
     t = view(s, group, n, size)
-    advance(t, view(near, group, n, size), topo, sides, run, shapes, substeps, 0, 1)
+    advance(t, view(near, group, n, size), topo, sides, run, shapes, 0, substeps, 0, 1)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.run_soft_fine_lanes")
@@ -285,7 +296,7 @@ def run_soft_fine_lanes(
     """Sixteen worlds at once, by one thread on the CPU, coordinates as doubles."""
     n, group = topo.particles, first + wp.tid()
     t = view(s, group, n, size)
-    advance(t, view(near, group, n, size), topo, sides, run, shapes, substeps, 0, 1)
+    advance(t, view(near, group, n, size), topo, sides, run, shapes, 0, substeps, 0, 1)
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.run_soft_fine_wide")

@@ -18,7 +18,7 @@ from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared_memory import FINE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.solver.sides import put_sides
-from nuno.solver.soft_blocks import FEW_THREADS, MANY_THREADS, PLAIN, SHARP
+from nuno.solver.soft_blocks import FAR, FEW_THREADS, MANY_THREADS, SHARP
 from nuno.solver.soft_frame import (
     run_soft_fine_lanes,
     run_soft_fine_wide,
@@ -28,7 +28,7 @@ from nuno.solver.soft_frame import (
     run_soft_worlds,
 )
 from nuno.solver.soft_state import (
-    NoSides,
+    FarSides,
     Sides,
     SoftFine,
     SoftFineLanes,
@@ -131,7 +131,8 @@ class SoftSolver(ParticleSolver):
     def set_colliders(self, colliders: Colliders | None) -> None:
         """The static shapes that the body meets; None for none."""
         super().set_colliders(colliders)
-        self._sharp = colliders is not None and colliders.least_radius < ROUND * self._side
+        # a little more than what kernels take for sharp, of which none may be left undone
+        self._sharp = colliders is not None and colliders.least_radius < 1.001 * ROUND * self._side
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds = self.topology, self.world_count
@@ -143,8 +144,9 @@ class SoftSolver(ParticleSolver):
         size.soft = mu.shape[1]
         state.mu, state.bulk = (self._put(np.broadcast_to(m, (worlds, size.soft))) for m in (mu, bulk))
         self._topology = self._upload(shared=size.soft == 1)
-        self._surface, self._no_surface = Sides(), NoSides()
-        put_sides(self._surface, topology, self.device, STRETCHED)
+        self._surface, self._far_surface = Sides(), FarSides()
+        for surface in (self._surface, self._far_surface):
+            put_sides(surface, topology, self.device, STRETCHED)
         # of a cube whose face's diagonal is the longest edge
         self._side = self._surface.longest / (STRETCHED * np.sqrt(2.0))
         self.mass = np.repeat(topology.masses(values["density"]), worlds // len(values["density"]), axis=0)
@@ -156,6 +158,7 @@ class SoftSolver(ParticleSolver):
         self._damped = bool(np.any(values["damping"] > 0))
         self._reply = viscous_reply(topology, 2.0 * mu * values["damping"], self._inverse_mass)
         self._allocate_particles()
+        state.gone_to = self._empty(1, int)
 
     def _upload(self, shared: bool) -> Tetrahedra:
         """The stars on the device, sorted by colour; ``shared`` where all elements have the same moduli."""
@@ -211,10 +214,13 @@ class SoftSolver(ParticleSolver):
         fine = self._fine.bring(run)
         states = [self._state] if fine is None else [fine, self._state]
         if self._cuda:
-            kernel, threads = self._block_kernel(fine is not None)
-            surface = self._surface if self._sharp else self._no_surface
-            inputs = [*states, self._topology, surface, self._size, run, self._shapes, substeps, threads]
-            wp.launch(kernel, dim=self.group_count * threads, inputs=inputs, device=self.device, block_dim=threads)
+            name, threads = self._block_kernel(fine is not None)
+            after = [self._size, run, self._shapes, substeps, threads]
+            for kernels, surface in ((FAR, self._far_surface), (SHARP, self._surface))[: 2 if self._sharp else 1]:
+                wp.launch(
+                    kernels[name], dim=self.group_count * threads, inputs=[*states, self._topology, surface, *after],
+                    device=self.device, block_dim=threads,
+                )  # fmt: skip
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = self._widen()
@@ -232,18 +238,17 @@ class SoftSolver(ParticleSolver):
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
-    def _block_kernel(self, fine: bool) -> tuple[Any, int]:
+    def _block_kernel(self, fine: bool) -> tuple[str, int]:
         """The kernel that has as much of a world in shared memory and registers as fits, and its threads."""
-        kernels = SHARP if self._sharp else PLAIN
         if fine:
             fits = self.shared_memory and self.particle_count <= FINE_PARTICLES
-            return kernels["fine_blocks_partly" if fits else "fine_blocks"], FEW_THREADS
+            return "fine_blocks_partly" if fits else "fine_blocks", FEW_THREADS
         if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
-            return kernels["blocks"], FEW_THREADS
+            return "blocks", FEW_THREADS
         few = self.group_count <= wp.get_device(self.device).sm_count
         if self.particle_count > ROOMY_PARTICLES:
-            return kernels["few_partly" if few else "blocks_partly"], FEW_THREADS
-        return kernels["few_shared" if few else "blocks_shared"], FEW_THREADS if few else MANY_THREADS
+            return "few_partly" if few else "blocks_partly", FEW_THREADS
+        return ("few_shared", FEW_THREADS) if few else ("blocks_shared", MANY_THREADS)
 
 
 def rest_shapes(topology: SoftTopology) -> tuple[np.ndarray, np.ndarray]:

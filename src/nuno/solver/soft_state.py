@@ -20,7 +20,7 @@ def _make(name: str, number: type, integer: type, place: type) -> Any:
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=place) for name in PLACES}
     fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
-    fields |= {name: wp.array(dtype=int) for name in ("near", "sharp", "sharp_mark", "sharp_list")}
+    fields |= {name: wp.array(dtype=int) for name in ("near", "sharp", "sharp_mark", "sharp_list", "gone_to")}
     fields["sharp_wake"] = wp.array(dtype=float)
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
@@ -92,10 +92,15 @@ class Sides:
 
 
 @wp.struct
-class NoSides:
-    """In the place of `Sides` in kernels that have nothing to do with sharp shapes."""
+class FarSides:
+    """`Sides` in kernels that go on for as long as nothing sharp is near."""
 
-    none: int
+    particles: int
+    side: wp.array(dtype=wp.vec2i)
+    face: wp.array(dtype=wp.vec3i)
+    sharp_colour: wp.array(dtype=int)
+    side_colours: int
+    longest: float
 
 
 @wp.struct
@@ -143,6 +148,7 @@ def view(s: Any, group: int, n: int, size: SoftSizes):
     t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
     t.near = window(s.near, group * size.near, size.near)
     t.sharp = window(s.sharp, group * size.sharp, size.sharp)
+    t.gone_to = window(s.gone_to, group, 1)
     t.sharp_mark = window(s.sharp_mark, group * n, n)
     t.sharp_list = window(s.sharp_list, group * size.sharp_list, size.sharp_list)
     t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 1), size.sharp_list + 1)
