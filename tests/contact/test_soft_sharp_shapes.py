@@ -11,6 +11,7 @@ from nuno.scene.colliders import Colliders
 from nuno.scene.soft import SoftTopology
 from nuno.solver.soft_blocks import FAR, SHARP
 from nuno.solver.soft_solver import SoftSolver
+from nuno.solver.state import ALL_PARTS
 
 SIDE = 0.1
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too
@@ -218,6 +219,14 @@ def test_the_kernels_of_cuda_take_turns():
         gone.append(int(solver._state.gone_to.numpy()[0]))
     assert 0 < gone[0] < gone[1] == 24 * substeps
     assert gone[0] % substeps == 0
+    np.testing.assert_array_equal(solver.positions(), other.positions())
+    # one substep by itself is done by those that know of sharp shapes, whatever was done before
+    for made in (solver, other):
+        made.open(0.4, 1.0 / 60.0 / substeps, substeps)
+    other.step_parts(0, ALL_PARTS)
+    run = solver._opened
+    inputs = [solver._state, solver._topology, solver._surface, solver._size, run, solver._shapes, 1, 1]
+    wp.launch(SHARP["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
     np.testing.assert_array_equal(solver.positions(), other.positions())
 
 

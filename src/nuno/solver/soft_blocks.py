@@ -3,7 +3,7 @@
 Each is there twice, with and without what meets sharp shapes: beside that the elastic stars, which take all registers
 that a thread may have, would lose some of theirs whether anything sharp is near or not. Those without go on until
 something sharp is near at the start of a frame; those with it, launched behind them, do the rest. Which one does a
-substep hangs on the world alone.
+substep of a world hangs on that world alone.
 """
 
 from typing import Any
@@ -38,7 +38,8 @@ def first_of(t: Any, sides: FarSides, substeps: int):
 
 @wp.func
 def first_of(t: Any, sides: Sides, substeps: int):
-    return t.gone_to[0]
+    # a single substep, or a part of one, is theirs alone: one launch instead of two
+    return wp.where(substeps > 1, t.gone_to[0], 0)
 
 
 @wp.func

@@ -76,7 +76,7 @@ class SoftSolver(ParticleSolver):
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world) or "vector" (one world on
             the CPU by sixteen elements at a time).
 
-    A vertex touches shapes where it is, without a thickness. Inner vertices are tested too: in a cube of ten cells a
+    A vertex touches shapes where it is, without a thickness, and so do edges and triangles sharp ones. Inner vertices are tested too: in a cube of ten cells a
     side that is 2 % of a substep.
 
     Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated; a
@@ -216,7 +216,9 @@ class SoftSolver(ParticleSolver):
         if self._cuda:
             name, threads = self._block_kernel(fine is not None)
             after = [self._size, run, self._shapes, substeps, threads]
-            for kernels, surface in ((FAR, self._far_surface), (SHARP, self._surface))[: 2 if self._sharp else 1]:
+            turns = [(FAR, self._far_surface)] if substeps > 1 or not self._sharp else []
+            turns += [(SHARP, self._surface)] if self._sharp else []
+            for kernels, surface in turns:
                 wp.launch(
                     kernels[name], dim=self.group_count * threads, inputs=[*states, self._topology, surface, *after],
                     device=self.device, block_dim=threads,
