@@ -76,8 +76,8 @@ class SoftSolver(ParticleSolver):
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world) or "vector" (one world on
             the CPU by sixteen elements at a time).
 
-    A vertex touches shapes where it is, without a thickness, and so do edges and triangles sharp ones. Inner vertices are tested too: in a cube of ten cells a
-    side that is 2 % of a substep.
+    A vertex touches shapes where it is, without a thickness, and so do the surface's edges and triangles sharp ones.
+    Inner vertices are tested too: in a cube of ten cells a side that is 2 % of a substep.
 
     Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated; a
     soft body does not touch itself; linear tetrahedra are too stiff in bending, and near a Poisson ratio of 0.5, where
