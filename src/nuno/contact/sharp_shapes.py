@@ -38,6 +38,9 @@ STRETCHED = wp.constant(1.2)
 """How much longer than at rest an edge is taken to be at most."""
 QUICK = wp.constant(3.0)
 """[m/s] What comes nearer faster than this, where the surfaces do not yet touch, may be seen a substep late."""
+GONE, SOONEST, WAKE = wp.constant(0), wp.constant(1), wp.constant(2)
+"""Places in `State.sharp_wake`: how far anything may have gone since the lists were made, and from when on the first
+element wakes, and each, by how far anything has gone then [m]."""
 
 
 @wp.func
@@ -117,7 +120,8 @@ def forget_sharp(t: Any, topo: Topology, thread: int):
     if thread == 0:
         for k in range(topo.sharp_colour.shape[0]):
             t.sharp[k] = 0
-        t.sharp_wake[0] = 0.0
+        t.sharp_wake[GONE] = 0.0
+        t.sharp_wake[SOONEST] = 0.0
 
 
 @wp.func
@@ -197,4 +201,4 @@ def list_sharp(t: Any, topo: Topology, thread: int, threads: int):
                 if near != 0:
                     place = first + wp.atomic_add(t.sharp, 1 + c, 1)
                     t.sharp_list[place] = k
-                    t.sharp_wake[1 + place] = 0.0
+                    t.sharp_wake[WAKE + place] = 0.0

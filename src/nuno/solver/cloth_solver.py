@@ -202,7 +202,7 @@ class ClothSolver(ParticleSolver):
         state.moved = empty(size.moved, int)
         size.sharp_list = len(self._topology.side) + len(self._topology.face)
         state.sharp_mark, state.sharp_list = empty(n, int), empty(size.sharp_list, int)
-        state.sharp_wake = empty(size.sharp_list + 1, float)
+        state.sharp_wake = empty(size.sharp_list + 2, float)
         self._allocate_lists()
 
     def _allocate_lists(self) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.renewal import renew_lists, shares_work
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
+from nuno.contact.sharp_turns import touch_sharp
 from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
 from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
@@ -291,7 +291,6 @@ def meet_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: in
     """Edges and triangles against sharp shapes, where there are any nearby."""
     if t.sharp[0] > 0:
         touch_sharp(t, topo, run, shapes, thread, threads)
-        barrier(threads)
 
 
 @wp.func
@@ -321,7 +320,8 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            for _again in range(PASSES):
+            passes = int(PASSES)  # a variable: the loop stays a loop, and there is less code to fetch
+            for _again in range(passes):
                 touch_edge_edge(t, n, run, thread, threads)
                 touch_vertex_triangle(t, n, run, thread, threads)
                 barrier(threads)
