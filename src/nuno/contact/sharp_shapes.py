@@ -2,7 +2,7 @@
 
 Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box, the rim of a cylinder
 and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found which of
-those may come that near within the frame (`nuno.contact.between_vertices` looks at them); where a cloth lies on a
+those may come that near within the frame (`nuno.contact.sharp_turns` looks at them); where a cloth lies on a
 table, far from its rim, that is one question about its bounding box. What does not touch changes no bit, so that it
 does not matter what else is listed.
 """
