@@ -36,17 +36,20 @@ ROOM = wp.constant(128)
 
 
 @wp.func
-def travel(t: Any, run: Settings, shapes: Shapes):
-    """How far any vertex, and any shape, may have gone from where it was at the frame's start to the substep's [m]."""
-    return t.sharp_wake[GONE] + (largest(root(t.notes[SPEED])) + shapes.haste[0]) * run.dt
+def travel(t: Any, run: Settings, haste: float):
+    """How far any vertex and any shape, the fastest at ``haste`` [m/s], may have gone in the substep before [m]."""
+    return (largest(root(t.notes[SPEED])) + haste) * run.dt
 
 
 @wp.func
 def wake_up(t: Any, topo: Topology, gone: float, room: int, thread: int, threads: int):
-    """Wake what may be near again of the listed elements, the others get a number below zero; how many are awake.
+    """Wake what may be near again of the listed elements; the others get a number below zero.
 
     Where threads share the work a warp takes a colour, for of each colour few are listed, and the first ``room`` are
     queued.
+
+    Returns:
+        How many are awake, and if none is, how far anything must have gone before the first wakes [m].
     """
     share = wp.min(threads, WARP)
     awake = int(0)
@@ -71,14 +74,15 @@ def wake_up(t: Any, topo: Topology, gone: float, room: int, thread: int, threads
     if shares_work(threads):
         barrier(threads)
         awake = t.moved[0]
-    if awake == 0:
-        # all sleep until the first of them wakes
+    if awake == 0 and shares_work(threads):
         if thread == 0:
             t.sharp_wake[SOONEST] = FAR
         barrier(threads)
         if soon < FAR:
             wp.atomic_min(t.sharp_wake, SOONEST, soon)
-    return awake
+        barrier(threads)
+        soon = t.sharp_wake[SOONEST]
+    return awake, soon
 
 
 @wp.func
@@ -177,28 +181,53 @@ def touch_listed(
 
 
 @wp.func
+def touch_awake(t: Any, topo: Topology, run: Settings, shapes: Shapes, gone: float, thread: int, threads: int):
+    """What is awake of the listed edges and triangles against the sharp shapes nearby.
+
+    Args:
+        t: The state.
+        topo: The cloth's elements.
+        run: The run's settings.
+        shapes: All shapes.
+        gone: How far any vertex, and any shape, may have gone since the lists were made [m].
+        thread: The thread's number.
+        threads: How many share the work.
+
+    Returns:
+        How far these must have gone before anything is awake again [m].
+    """
+    room = int(0)
+    if topo.sharp_colour.shape[0] - 1 <= MOST_COLOURS:
+        room = wp.min(wp.min(ROOM, threads / 2), 4 * topo.particles - QUEUE)
+    awake, soon = wake_up(t, topo, gone, room, thread, threads)
+    if awake > 0:
+        soon = gone
+        queued = int(awake)
+        if awake > room:
+            queued = 0
+        for k in range(t.sharp[0]):
+            s = t.sharp[topo.sharp_colour.shape[0] + k]
+            touch_listed(t, topo, run, shapes, s, gone, queued, thread, threads)
+        if shares_work(threads):
+            # once all have read how many there were
+            barrier(threads)
+            for k in range(thread, wp.min(awake, room), threads):
+                t.moved[QUEUE + k] = 0
+            if thread == 0:
+                t.moved[0] = 0
+    return soon
+
+
+@wp.func
 def touch_sharp(t: Any, topo: Topology, run: Settings, shapes: Shapes, thread: int, threads: int):
-    """All listed edges and triangles against the sharp shapes nearby."""
-    gone = travel(t, run, shapes)
-    if gone >= t.sharp_wake[SOONEST]:
-        room = int(0)
-        if topo.sharp_colour.shape[0] - 1 <= MOST_COLOURS:
-            room = wp.min(wp.min(ROOM, threads / 2), 4 * topo.particles - QUEUE)
-        awake = wake_up(t, topo, gone, room, thread, threads)
-        if awake > 0:
-            queued = int(awake)
-            if awake > room:
-                queued = 0
-            for k in range(t.sharp[0]):
-                s = t.sharp[topo.sharp_colour.shape[0] + k]
-                touch_listed(t, topo, run, shapes, s, gone, queued, thread, threads)
-            if shares_work(threads):
-                # a barrier passed since the queue was read
-                for k in range(thread, wp.min(awake, room), threads):
-                    t.moved[QUEUE + k] = 0
-                if thread == 0:
-                    t.moved[0] = 0
-    # once all know what `travel` gave
+    """All listed edges and triangles against the sharp shapes nearby; what was gone until now is in `State`."""
+    gone = t.sharp_wake[GONE] + travel(t, run, shapes.haste[0])
+    soonest = t.sharp_wake[SOONEST]
+    # once all know
     barrier(threads)
+    if gone >= soonest:
+        soonest = touch_awake(t, topo, run, shapes, gone, thread, threads)
+        barrier(threads)
     if thread == 0:
         t.sharp_wake[GONE] = gone
+        t.sharp_wake[SOONEST] = soonest
