@@ -15,7 +15,7 @@ from nuno.background import Background
 from nuno.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.progress import with_bar
-from nuno.simulation import CHUNK, SOON, Simulation
+from nuno.simulation import CHUNK, CUDA_CHUNK, SOON, Simulation
 from nuno.trace import run_traced
 from nuno.validation import finite_array, number
 
@@ -66,7 +66,8 @@ class Running(Simulation):
             self._wait_until(begin + span)
             return
         frames = span * self.frame_rate
-        chunk = min(CHUNK, math.gcd(*(watcher.frames for watcher in self._watchers)) or CHUNK)
+        most = CUDA_CHUNK if self._device.startswith("cuda") else CHUNK
+        chunk = min(most, math.gcd(*(watcher.frames for watcher in self._watchers)) or most)
         chunk = 1 if self.drivers else chunk  # they are asked frame by frame
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
         ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]

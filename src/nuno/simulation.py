@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from nuno.watcher import Watcher
 
 CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
+CUDA_CHUNK = 60  # the same on CUDA, which idles while it is looked at
 
 
 class Simulation:

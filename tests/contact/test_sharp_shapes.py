@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import warp as wp
 
 import nuno
 from nuno import quaternion as quat
@@ -142,9 +143,9 @@ def test_what_a_cloth_over_edges_bears_is_its_weight():
     np.testing.assert_allclose(force, [0, 0, 0.25 * 0.16 * 9.81], rtol=0.03, atol=0.02)
 
 
-def crowded(count):
+def crowded(count, device="cpu"):
     """Return worlds with sharp shapes, still and moving, of all kinds, where a cloth falls."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.box((0.2, 1.0, 0.2), name="table", position=(0, 0, -0.1)))
     world.add(nuno.sphere(0.008, name="ball", position=(0.15, 0, -0.05)))
     world.add(nuno.cylinder(0.02, 0.1, name="can", position=(0.0, 0.1, 0.03)))
@@ -153,24 +154,34 @@ def crowded(count):
     return world.imagine(count) if count > 1 else world
 
 
+def shifted(count, which, device):
+    """Return where the cloth is after 0.5 s in all of ``count`` worlds, or in one alone; some of them meet no edge."""
+    shift = np.linspace(0.0, 0.6, count)
+    world = crowded(count if which is None else 1, device)
+    chosen = slice(None) if which is None else which
+    world.find("table").locate(np.stack([shift, 0 * shift, -0.1 + 0 * shift], axis=1)[chosen])
+    goal = np.stack([0.15 - shift, 0 * shift, 0 * shift], axis=1)
+    places = np.stack([np.broadcast_to([0.15, 0, -0.05], goal.shape), goal], axis=1)
+    world.move("ball", nuno.Path([0.0, 0.4], places[chosen]))
+    world.attach("cloth", nuno.Cloth(thickness=THICKNESS, air_drag=2.0))
+    world.run(0.5)
+    return world.find("cloth").vertices
+
+
 def test_a_world_of_a_batch_meets_edges_as_alone():
-    """Promise: bit for bit, in 18 worlds (more than the lanes of a vector), of which some meet no edge."""
-    shift = np.linspace(0.0, 0.6, 18)
-
-    def run(which):
-        world = crowded(18 if which is None else 1)
-        chosen = slice(None) if which is None else which
-        world.find("table").locate(np.stack([shift, 0 * shift, -0.1 + 0 * shift], axis=1)[chosen])
-        goal = np.stack([0.15 - shift, 0 * shift, 0 * shift], axis=1)
-        places = np.stack([np.broadcast_to([0.15, 0, -0.05], goal.shape), goal], axis=1)
-        world.move("ball", nuno.Path([0.0, 0.4], places[chosen]))
-        world.attach("cloth", nuno.Cloth(thickness=THICKNESS, air_drag=2.0))
-        world.run(0.5)
-        return world.find("cloth").vertices
-
-    batch = run(None)
+    """Promise: bit for bit, in 18 worlds: more than the lanes of a vector."""
+    batch = shifted(18, None, "cpu")
     for k in (0, 1, 16, 17):
-        np.testing.assert_array_equal(batch[k], run(k))
+        np.testing.assert_array_equal(batch[k], shifted(18, k, "cpu"))
+
+
+@pytest.mark.cuda
+def test_a_world_of_a_batch_meets_edges_as_alone_on_cuda():
+    """Promise: the same where blocks have half the threads, and so room for fewer elements at a time."""
+    count = wp.get_device("cuda:0").sm_count + 1
+    batch = shifted(count, None, "cuda:0")
+    for k in (0, 1, count // 2, count - 1):
+        np.testing.assert_array_equal(batch[k], shifted(count, k, "cuda:0"))
 
 
 def test_all_plans_meet_edges_alike():

@@ -6,22 +6,19 @@ the shape's outermost point against the triangle's plane that touches. Point and
 began, when nothing crossed, and the whole motion of the substep, relative to the shape, counts against them, so that
 what was pressed through within the substep is put back (`nuno.contact.sharp_pushes`).
 
-Elements come colour by colour, those of one colour, which share no vertex, all at once on CUDA. Vertices come after
-them, by themselves.
+All that is found here is of the substep's start, and so does not depend on which element is pushed first.
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.contact.distances import BOX, CYLINDER, FAR, SPHERE, distance_solid
-from nuno.contact.shapes import COLUMNS, LEAVE_SPEED
-from nuno.contact.sharp_pushes import PATIENCE, SLANT, push_apart, square_of
-from nuno.contact.sharp_shapes import QUICK, ROUND, pose_of, sharp_features
+from nuno.contact.distances import BOX, CYLINDER, SPHERE, distance_solid
+from nuno.contact.sharp_pushes import PATIENCE, SLANT, square_of
+from nuno.contact.sharp_shapes import WAKE, sharp_features
 from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
-    barrier,
     choose,
     fill,
     largest,
@@ -30,13 +27,11 @@ from nuno.solver.lanes import (  # noqa: F401
     most,
     mul,
     over,
-    per_world,
     root,
     size_of,
     sub,
     times,
 )
-from nuno.solver.state import CLOCK, FRICTION, SPEED, THICKNESS, Settings, Shapes
 
 STEPS = wp.constant(6)
 """Tangents looked at between two ends: the distance of a 40 mm edge from a ball of 4 mm, or from the edge of a box, is
@@ -130,303 +125,194 @@ def across_edge(
 
 
 @wp.func
-def travel(t: Any, run: Settings, shapes: Shapes):
-    """How far any vertex, and any shape, may have gone from where it was at the frame's start to the substep's [m]."""
-    return t.sharp_wake[0] + (largest(root(t.notes[SPEED])) + shapes.haste[0]) * run.dt
-
-
-@wp.func
 def sleep(t: Any, entry: int, gone: float, near: Any):
     """Let an element sleep until all have gone as far as ``near`` is below zero in every world."""
-    t.sharp_wake[1 + entry] = wp.min(t.sharp_wake[1 + entry], gone - largest(near))
+    t.sharp_wake[WAKE + entry] = wp.min(t.sharp_wake[WAKE + entry], gone - largest(near))
 
 
 @wp.func
-def wake_up(t: Any, topo: Any, gone: float, thread: int, threads: int):
-    """Wake what may be near again of the listed elements, the others get a number below zero.
+def into_frame(h: Any, dx: Any, dy: Any, dz: Any):
+    """A direction as the shape sees it."""
+    x = times(h.r00, dx) + times(h.r10, dy) + times(h.r20, dz)
+    y = times(h.r01, dx) + times(h.r11, dy) + times(h.r21, dz)
+    z = times(h.r02, dx) + times(h.r12, dy) + times(h.r22, dz)
+    return x, y, z
 
-    Whoever wakes an element also looks at it.
+
+@wp.func
+def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int, cell: float):
+    """Where an edge comes nearest to a shape: at its point 0 or 1 (``turn``), for over two edges of a box it has two.
+
+    Returns:
+        Whether the shape may touch it there (positive) and whether there is a second point; the point's part of the
+        way from i to j, its place in the shape's frame and the normal there (3 numbers each), and the gap [m], less
+        what of it may stay. What is deeper in than half a ``cell`` [m] has gone past the shape's edge.
     """
-    for c in range(topo.sharp_colour.shape[0] - 1):
-        first = topo.sharp_colour[c]
-        for k in range(first + thread, first + t.sharp[1 + c], threads):
-            element = t.sharp_list[k]
-            element = wp.max(element, -1 - element)
-            if gone >= t.sharp_wake[1 + k]:
-                t.sharp_wake[1 + k] = FAR
-            else:
-                element = -1 - element
-            t.sharp_list[k] = element
-
-
-@wp.func
-def touch_between(t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, thread: int, threads: int):
-    """The listed edges and triangles against one shape."""
-    like = fill(t.x[0], 0.0)
+    like = h.radius
     zero = fill(like, 0.0)
     one = fill(like, 1.0)
-    kind = shapes.kind[s]
-    slot = shapes.slot[s]
-    clock = int(largest(t.notes[CLOCK]))
-    # where the shape was when the substep began, and what its surface moves: e of its centre, d of its axes
-    cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose_of(like, t, shapes, s, clock - 1)
-    ex = zero
-    ey = zero
-    ez = zero
-    d00 = zero
-    d01 = zero
-    d02 = zero
-    d10 = zero
-    d11 = zero
-    d12 = zero
-    d20 = zero
-    d21 = zero
-    d22 = zero
-    if slot >= 0:
-        ex, ey, ez, d00, d01, d02, d10, d11, d12, d20, d21, d22 = pose_of(like, t, shapes, s, clock)
-        ex = ex - cx
-        ey = ey - cy
-        ez = ez - cz
-        d00 = d00 - r00
-        d01 = d01 - r01
-        d02 = d02 - r02
-        d10 = d10 - r10
-        d11 = d11 - r11
-        d12 = d12 - r12
-        d20 = d20 - r20
-        d21 = d21 - r21
-        d22 = d22 - r22
-    row = s * COLUMNS
-    sa = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 12)
-    sb = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 13)
-    sc = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 14)
-    mean = root(times(t.scalars[FRICTION], per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15)))
-    pair = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 16)
-    mu = choose(pair + fill(like, 0.5), pair, mean)
-    radius = t.scalars[THICKNESS] * 0.5
-    leave = fill(like, LEAVE_SPEED * run.dt)
-    # what is farther than this when a substep begins is not reached in it, and what is farther by its slack not before
-    # all have gone as far
-    reach = radius + fill(like, QUICK * run.dt)
-    broad = ROUND * run.cell
-    rough = fill(like, ROUGH)
-    quick = fill(like, QUICK * run.dt)
+    ax, ay, az = into_frame(h, minus(t.px[i], h.cx), minus(t.py[i], h.cy), minus(t.pz[i], h.cz))
+    lx, ly, lz = into_frame(h, t.px[j] - t.px[i], t.py[j] - t.py[i], t.pz[j] - t.pz[i])
+    hx = size_of(lx) * 0.5 + h.reach
+    hy = size_of(ly) * 0.5 + h.reach
+    hz = size_of(lz) * 0.5 + h.reach
+    on, _point = sharp_features(
+        h.kind, ax + lx * 0.5, ay + ly * 0.5, az + lz * 0.5, hx, hy, hz, h.sa, h.sb, h.sc, h.broad
+    )  # fmt: skip
+    sleep(t, entry, gone, on)
+    fa = zero
+    da = zero
+    fb = zero
+    db = zero
+    if anywhere(on):
+        fa, nx, ny, nz = distance_solid(h.kind, ax, ay, az, h.sa, h.sb, h.sc)
+        da = times(nx, lx) + times(ny, ly) + times(nz, lz)
+        fb, nx, ny, nz = distance_solid(h.kind, ax + lx, ay + ly, az + lz, h.sa, h.sb, h.sc)
+        db = times(nx, lx) + times(ny, ly) + times(nz, lz)
+        # over a face both ends see the same slope, which one may lose within the substep
+        on = least(-da, db) + h.reach - h.radius
+    at = zero
+    x = zero
+    y = zero
+    z = zero
+    gap = zero
+    nx = zero
+    ny = zero
+    nz = zero
+    more = int(0)
+    if anywhere(on):
+        tiny = -fill(like, 1.0e-12)
+        part = over(fb - db - fa, least(da - db, tiny))
+        # it is nowhere nearer than where the two ends' tangents cross
+        on = least(on, h.reach - (fa + times(da, part)))
+        if anywhere(on):
+            steps = int(STEPS)  # a variable, or Warp would unroll the loop
+            if h.kind == BOX:
+                steps = 1
+                part = past_box_edge(ax, ay, az, lx, ly, lz, part, h.sa, h.sb, h.sc)
+                part = most(zero, least(one, part))
+                # over two edges with a face between, it lies on both: on one at a time it would rock
+                left = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, zero, h.sa, h.sb, h.sc)))
+                right = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, one, h.sa, h.sb, h.sc)))
+                other = choose(left + right - part - part, right, left)
+                apart = size_of(other - part) - over(h.radius * 2.0, root(square_of(lx, ly, lz)) - tiny)
+                if anywhere(least(on, apart)):
+                    more = 1
+                if turn > 0:
+                    part = other
+                    on = least(on, apart)
+            elif h.kind == SPHERE:
+                steps = 1
+                part = over(times(ax, lx) + times(ay, ly) + times(az, lz), tiny - square_of(lx, ly, lz))
+            low = zero
+            high = one
+            for _k in range(steps):
+                at = most(low, least(high, part))
+                gap, nx, ny, nz = distance_solid(
+                    h.kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), h.sa, h.sb, h.sc
+                )
+                slope = times(nx, lx) + times(ny, ly) + times(nz, lz)
+                low = choose(slope, low, at)
+                fa = choose(slope, fa, gap)
+                da = choose(slope, da, slope)
+                high = choose(slope, at, high)
+                fb = choose(slope, gap, fb)
+                db = choose(slope, slope, db)
+                part = over(fb - times(db, high) - fa + times(da, low), least(da - db, tiny))
+            x = ax + times(at, lx)
+            y = ay + times(at, ly)
+            z = az + times(at, lz)
+            if (h.kind == BOX or h.kind == CYLINDER) and anywhere(fill(like, ROUGH) - gap):
+                gap, nx, ny, nz = across_edge(
+                    h.kind, x, y, z, lx, ly, lz, gap, nx, ny, nz, h.sa, h.sb, h.sc, 0.5 * cell
+                )  # fmt: skip
+            # across the edge: what of the normal is along it, all of it where the edge stands across the shape,
+            # parts nothing
+            slope = over(times(nx, lx) + times(ny, ly) + times(nz, lz), square_of(lx, ly, lz) - tiny)
+            nx = nx - times(slope, lx)
+            ny = ny - times(slope, ly)
+            nz = nz - times(slope, lz)
+            size = root(square_of(nx, ny, nz) + fill(like, 1.0e-20))
+            nx = over(nx, size)
+            ny = over(ny, size)
+            nz = over(nz, size)
+            gap = over(gap - h.radius, most(size, fill(like, SLANT)))
+            gap = gap - least(gap, zero) * PATIENCE
+            on = least(least(on, size - fill(like, SLANT)), least(at, one - at))
+            if turn > 0 and more == 0:
+                on = -one
+    return on, more, at, x, y, z, nx, ny, nz, gap
+
+
+@wp.func
+def meet_triangle(t: Any, h: Any, entry: int, gone: float, i: int, j: int, k: int, cell: float):
+    """Where a shape's outermost point meets a triangle, whose parts of the way are those from i to j and to k.
+
+    Returns:
+        As `meet_edge`, without the second of its numbers, and with two parts. What is deeper in than half a ``cell``
+        [m] has gone through.
+    """
+    like = h.radius
+    zero = fill(like, 0.0)
+    one = fill(like, 1.0)
     third = float(1.0 / 3.0)
-    gone = travel(t, run, shapes)
-    edges = topo.side.shape[0]
-    for c in range(topo.side_colours):
-        first = topo.sharp_colour[c]
-        for entry in range(first + thread, first + t.sharp[1 + c], threads):
-            element = t.sharp_list[entry]
-            if element < 0:
-                continue
-            ends = topo.side[element]
-            i = ends[0]
-            j = ends[1]
-            dx = minus(t.px[i], cx)
-            dy = minus(t.py[i], cy)
-            dz = minus(t.pz[i], cz)
-            ax = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            ay = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            az = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            dx = t.px[j] - t.px[i]
-            dy = t.py[j] - t.py[i]
-            dz = t.pz[j] - t.pz[i]
-            lx = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            ly = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            lz = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            hx = size_of(lx) * 0.5 + reach
-            hy = size_of(ly) * 0.5 + reach
-            hz = size_of(lz) * 0.5 + reach
-            on, _point = sharp_features(
-                kind, ax + lx * 0.5, ay + ly * 0.5, az + lz * 0.5, hx, hy, hz, sa, sb, sc, broad
-            )  # fmt: skip
-            sleep(t, entry, gone, on)
-            fa = zero
-            da = zero
-            fb = zero
-            db = zero
-            if anywhere(on):
-                fa, nx, ny, nz = distance_solid(kind, ax, ay, az, sa, sb, sc)
-                da = times(nx, lx) + times(ny, ly) + times(nz, lz)
-                fb, nx, ny, nz = distance_solid(kind, ax + lx, ay + ly, az + lz, sa, sb, sc)
-                db = times(nx, lx) + times(ny, ly) + times(nz, lz)
-                # over a face both ends see the same slope, which one may lose within the substep
-                on = least(-da, db) + quick
-            if anywhere(on):
-                tiny = -fill(like, 1.0e-12)
-                part = over(fb - db - fa, least(da - db, tiny))
-                # it is nowhere nearer than where the two ends' tangents cross
-                on = least(on, reach - (fa + times(da, part)))
-                if anywhere(on):
-                    other = part
-                    apart = one
-                    turns = int(1)  # variables, or Warp would unroll the loops
-                    steps = int(STEPS)
-                    if kind == BOX:
-                        steps = 1
-                        turns = 2
-                        part = past_box_edge(ax, ay, az, lx, ly, lz, part, sa, sb, sc)
-                        part = most(zero, least(one, part))
-                        # over two edges with a face between, it lies on both: on one at a time it would rock
-                        left = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, zero, sa, sb, sc)))
-                        right = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, one, sa, sb, sc)))
-                        other = choose(left + right - part - part, right, left)
-                        apart = size_of(other - part) - over(radius * 2.0, root(square_of(lx, ly, lz)) - tiny)
-                        if not anywhere(least(on, apart)):
-                            turns = 1
-                    elif kind == SPHERE:
-                        steps = 1
-                        part = over(times(ax, lx) + times(ay, ly) + times(az, lz), tiny - square_of(lx, ly, lz))
-                    for turn in range(turns):
-                        low = zero
-                        high = one
-                        at = part
-                        gap = fa
-                        for _k in range(steps):
-                            at = most(low, least(high, part))
-                            gap, nx, ny, nz = distance_solid(
-                                kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), sa, sb, sc
-                            )
-                            slope = times(nx, lx) + times(ny, ly) + times(nz, lz)
-                            low = choose(slope, low, at)
-                            fa = choose(slope, fa, gap)
-                            da = choose(slope, da, slope)
-                            high = choose(slope, at, high)
-                            fb = choose(slope, gap, fb)
-                            db = choose(slope, slope, db)
-                            part = over(fb - times(db, high) - fa + times(da, low), least(da - db, tiny))
-                        part = other
-                        if (kind == BOX or kind == CYLINDER) and anywhere(rough - gap):
-                            gap, nx, ny, nz = across_edge(
-                                kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), lx, ly, lz, gap, nx,
-                                ny, nz, sa, sb, sc, 0.5 * run.cell,
-                            )  # fmt: skip
-                        # what the point moves, less what the surface moves there
-                        rest = one - at
-                        ux = times(rest, t.x[i] - t.px[i]) + times(at, t.x[j] - t.px[j])
-                        uy = times(rest, t.y[i] - t.py[i]) + times(at, t.y[j] - t.py[j])
-                        uz = times(rest, t.z[i] - t.pz[i]) + times(at, t.z[j] - t.pz[j])
-                        if slot >= 0:
-                            x = ax + times(at, lx)
-                            y = ay + times(at, ly)
-                            z = az + times(at, lz)
-                            ux = ux - ex - times(d00, x) - times(d01, y) - times(d02, z)
-                            uy = uy - ey - times(d10, x) - times(d11, y) - times(d12, z)
-                            uz = uz - ez - times(d20, x) - times(d21, y) - times(d22, z)
-                        # across the edge: what of the normal is along it, all of it where the edge stands across the
-                        # shape, parts nothing
-                        slope = over(times(nx, lx) + times(ny, ly) + times(nz, lz), square_of(lx, ly, lz) - tiny)
-                        nx = nx - times(slope, lx)
-                        ny = ny - times(slope, ly)
-                        nz = nz - times(slope, lz)
-                        size = root(square_of(nx, ny, nz) + fill(like, 1.0e-20))
-                        nx = over(nx, size)
-                        ny = over(ny, size)
-                        nz = over(nz, size)
-                        wx = times(r00, nx) + times(r01, ny) + times(r02, nz)
-                        wy = times(r10, nx) + times(r11, ny) + times(r12, nz)
-                        wz = times(r20, nx) + times(r21, ny) + times(r22, nz)
-                        gap = over(gap - radius, most(size, fill(like, SLANT)))
-                        gap = gap - least(gap, zero) * PATIENCE + times(ux, wx) + times(uy, wy) + times(uz, wz)
-                        touching = least(least(on, least(at, rest)), least(-gap, size - fill(like, SLANT)))
-                        if turn > 0:
-                            touching = least(touching, apart)
-                        if anywhere(touching):
-                            push_apart(t, i, j, i, rest, at, zero, gap, wx, wy, wz, ux, uy, uz, mu, leave, touching)
-        if t.sharp[1 + c] > 0:
-            barrier(threads)
-    for c in range(topo.side_colours, topo.sharp_colour.shape[0] - 1):
-        first = topo.sharp_colour[c]
-        for entry in range(first + thread, first + t.sharp[1 + c], threads):
-            element = t.sharp_list[entry]
-            if element < 0:
-                continue
-            corners = topo.face[element - edges]
-            i = corners[0]
-            j = corners[1]
-            k = corners[2]
-            dx = minus(t.px[i], cx)
-            dy = minus(t.py[i], cy)
-            dz = minus(t.pz[i], cz)
-            ax = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            ay = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            az = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            dx = t.px[j] - t.px[i]
-            dy = t.py[j] - t.py[i]
-            dz = t.pz[j] - t.pz[i]
-            lx = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            ly = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            lz = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            dx = t.px[k] - t.px[i]
-            dy = t.py[k] - t.py[i]
-            dz = t.pz[k] - t.pz[i]
-            mx = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            my = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            mz = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            ox = (lx + mx) * third
-            oy = (ly + my) * third
-            oz = (lz + mz) * third
-            far = most(square_of(lx - ox, ly - oy, lz - oz), square_of(mx - ox, my - oy, mz - oz))
-            h = root(most(square_of(ox, oy, oz), far)) + reach
-            _along, on = sharp_features(kind, ax + ox, ay + oy, az + oz, h, h, h, sa, sb, sc, broad)
-            sleep(t, entry, gone, on)
-            if not anywhere(on):
-                continue
-            nx = times(ly, mz) - times(lz, my)
-            ny = times(lz, mx) - times(lx, mz)
-            nz = times(lx, my) - times(ly, mx)
-            nn = times(nx, nx) + times(ny, ny) + times(nz, nz) + fill(like, 1.0e-20)
-            # away from the shape's middle
-            size = over(choose(times(nx, ax) + times(ny, ay) + times(nz, az), one, -one), root(nn))
-            qx = times(nx, size)
-            qy = times(ny, size)
-            qz = times(nz, size)
-            sx, sy, sz = outermost(kind, qx, qy, qz, sa, sb, sc)
-            dx = sx - ax
-            dy = sy - ay
-            dz = sz - az
-            gap = -(times(dx, qx) + times(dy, qy) + times(dz, qz))
-            # weights of the vertices where the shape's point is over the triangle
-            bj = over(
-                times(times(dy, mz) - times(dz, my), nx)
-                + times(times(dz, mx) - times(dx, mz), ny)
-                + times(times(dx, my) - times(dy, mx), nz),
-                nn,
-            )
-            bk = over(
-                times(times(ly, dz) - times(lz, dy), nx)
-                + times(times(lz, dx) - times(lx, dz), ny)
-                + times(times(lx, dy) - times(ly, dx), nz),
-                nn,
-            )
-            bi = one - bj - bk
-            # deeper than half a cell it has gone through
-            on = least(least(bi, least(bj, bk)), least(reach - gap, gap + fill(like, 0.5 * run.cell)))
-            if anywhere(on):
-                ux = times(bi, t.x[i] - t.px[i]) + times(bj, t.x[j] - t.px[j]) + times(bk, t.x[k] - t.px[k])
-                uy = times(bi, t.y[i] - t.py[i]) + times(bj, t.y[j] - t.py[j]) + times(bk, t.y[k] - t.py[k])
-                uz = times(bi, t.z[i] - t.pz[i]) + times(bj, t.z[j] - t.pz[j]) + times(bk, t.z[k] - t.pz[k])
-                if slot >= 0:
-                    # the triangle's point
-                    sx = sx + times(gap, qx)
-                    sy = sy + times(gap, qy)
-                    sz = sz + times(gap, qz)
-                    ux = ux - ex - times(d00, sx) - times(d01, sy) - times(d02, sz)
-                    uy = uy - ey - times(d10, sx) - times(d11, sy) - times(d12, sz)
-                    uz = uz - ez - times(d20, sx) - times(d21, sy) - times(d22, sz)
-                wx = times(r00, qx) + times(r01, qy) + times(r02, qz)
-                wy = times(r10, qx) + times(r11, qy) + times(r12, qz)
-                wz = times(r20, qx) + times(r21, qy) + times(r22, qz)
-                gap = gap - radius
-                gap = gap - least(gap, zero) * PATIENCE + times(ux, wx) + times(uy, wy) + times(uz, wz)
-                on = least(on, -gap)
-                if anywhere(on):
-                    push_apart(
-                        t, i, j, k, bi, bj, bk, gap, wx, wy, wz, ux, uy, uz, mu, leave, on
-                    )  # fmt: skip
-        if t.sharp[1 + c] > 0:
-            barrier(threads)
+    ax, ay, az = into_frame(h, minus(t.px[i], h.cx), minus(t.py[i], h.cy), minus(t.pz[i], h.cz))
+    lx, ly, lz = into_frame(h, t.px[j] - t.px[i], t.py[j] - t.py[i], t.pz[j] - t.pz[i])
+    mx, my, mz = into_frame(h, t.px[k] - t.px[i], t.py[k] - t.py[i], t.pz[k] - t.pz[i])
+    ox = (lx + mx) * third
+    oy = (ly + my) * third
+    oz = (lz + mz) * third
+    far = most(square_of(lx - ox, ly - oy, lz - oz), square_of(mx - ox, my - oy, mz - oz))
+    size = root(most(square_of(ox, oy, oz), far)) + h.reach
+    _along, on = sharp_features(
+        h.kind, ax + ox, ay + oy, az + oz, size, size, size, h.sa, h.sb, h.sc, h.broad
+    )  # fmt: skip
+    sleep(t, entry, gone, on)
+    bj = zero
+    bk = zero
+    sx = zero
+    sy = zero
+    sz = zero
+    qx = zero
+    qy = zero
+    qz = zero
+    gap = zero
+    if anywhere(on):
+        nx = times(ly, mz) - times(lz, my)
+        ny = times(lz, mx) - times(lx, mz)
+        nz = times(lx, my) - times(ly, mx)
+        nn = times(nx, nx) + times(ny, ny) + times(nz, nz) + fill(like, 1.0e-20)
+        # away from the shape's middle
+        size = over(choose(times(nx, ax) + times(ny, ay) + times(nz, az), one, -one), root(nn))
+        qx = times(nx, size)
+        qy = times(ny, size)
+        qz = times(nz, size)
+        sx, sy, sz = outermost(h.kind, qx, qy, qz, h.sa, h.sb, h.sc)
+        dx = sx - ax
+        dy = sy - ay
+        dz = sz - az
+        gap = -(times(dx, qx) + times(dy, qy) + times(dz, qz))
+        # weights of the vertices where the shape's point is over the triangle
+        bj = over(
+            times(times(dy, mz) - times(dz, my), nx)
+            + times(times(dz, mx) - times(dx, mz), ny)
+            + times(times(dx, my) - times(dy, mx), nz),
+            nn,
+        )
+        bk = over(
+            times(times(ly, dz) - times(lz, dy), nx)
+            + times(times(lz, dx) - times(lx, dz), ny)
+            + times(times(lx, dy) - times(ly, dx), nz),
+            nn,
+        )
+        on = least(least(one - bj - bk, least(bj, bk)), least(h.reach - gap, gap + fill(like, 0.5 * cell)))
+        # the triangle's point
+        sx = sx + times(gap, qx)
+        sy = sy + times(gap, qy)
+        sz = sz + times(gap, qz)
+        gap = gap - h.radius
+        gap = gap - least(gap, zero) * PATIENCE
+    return on, bj, bk, sx, sy, sz, qx, qy, qz, gap
 
 
 @wp.func
@@ -447,15 +333,3 @@ def outermost(kind: int, nx: Any, ny: Any, nz: Any, a: Any, b: Any, c: Any):
     else:
         z = z + times(a, nz)
     return x, y, z
-
-
-@wp.func
-def touch_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
-    """All listed edges and triangles against the sharp shapes nearby."""
-    gone = travel(t, run, shapes)
-    wake_up(t, topo, gone, thread, threads)
-    for k in range(t.sharp[0]):
-        touch_between(t, topo, run, shapes, t.sharp[topo.sharp_colour.shape[0] + k], thread, threads)
-    # a barrier passed: all know what `travel` gave
-    if thread == 0:
-        t.sharp_wake[0] = gone

@@ -16,6 +16,52 @@ and to push it would not part them."""
 
 @wp.func
 def push_apart(
+    t: Any, h: Any, i: int, j: int, k: int, bi: Any, bj: Any, bk: Any, x: Any, y: Any, z: Any, nx: Any, ny: Any,
+    nz: Any, gap: Any, on: Any,
+):  # fmt: skip
+    """Push a point of an element out of a shape along the normal, with friction, as a particle is.
+
+    Args:
+        t: The state.
+        h: The shape, a `nuno.contact.sharp_pose.SharpFloat` or lanes of them.
+        i: The element's first vertex; ``j`` and ``k`` the others, of an edge i once more.
+        j: See ``i``.
+        k: See ``i``.
+        bi: The weight of the first vertex in the point; ``bj`` and ``bk`` those of the others.
+        bj: See ``bi``.
+        bk: See ``bi``.
+        x: The point in the shape's frame when the substep began, with ``y`` and ``z`` [m].
+        y: See ``x``.
+        z: See ``x``.
+        nx: The normal there, with ``ny`` and ``nz``.
+        ny: See ``nx``.
+        nz: See ``nx``.
+        gap: How far it was from where it must stay [m].
+        on: Positive where it counts.
+    """
+    # what the point moved in the substep, less what the surface did
+    ux = times(bi, t.x[i] - t.px[i]) + times(bj, t.x[j] - t.px[j])
+    uy = times(bi, t.y[i] - t.py[i]) + times(bj, t.y[j] - t.py[j])
+    uz = times(bi, t.z[i] - t.pz[i]) + times(bj, t.z[j] - t.pz[j])
+    if k != i:
+        ux = ux + times(bk, t.x[k] - t.px[k])
+        uy = uy + times(bk, t.y[k] - t.py[k])
+        uz = uz + times(bk, t.z[k] - t.pz[k])
+    if h.slot >= 0:
+        ux = ux - h.ex - times(h.d00, x) - times(h.d01, y) - times(h.d02, z)
+        uy = uy - h.ey - times(h.d10, x) - times(h.d11, y) - times(h.d12, z)
+        uz = uz - h.ez - times(h.d20, x) - times(h.d21, y) - times(h.d22, z)
+    wx = times(h.r00, nx) + times(h.r01, ny) + times(h.r02, nz)
+    wy = times(h.r10, nx) + times(h.r11, ny) + times(h.r12, nz)
+    wz = times(h.r20, nx) + times(h.r21, ny) + times(h.r22, nz)
+    depth = gap + times(ux, wx) + times(uy, wy) + times(uz, wz)
+    touching = least(on, -depth)
+    if anywhere(touching):
+        give_way(t, i, j, k, bi, bj, bk, depth, wx, wy, wz, ux, uy, uz, h.mu, h.leave, touching)
+
+
+@wp.func
+def give_way(
     t: Any,
     i: int,
     j: int,
@@ -34,10 +80,7 @@ def push_apart(
     leave: Any,
     on: Any,
 ):
-    """Push a point of an element, weights b of its vertices, out along the normal, with friction, as a particle is.
-
-    ``gap`` is negative where it is too near, and u what the point moved in the substep, less what the surface did.
-    """
+    """Move the vertices of a point that is too near, by a gap below zero [m], and that moved by u [m]."""
     zero = fill(gap, 0.0)
     un = times(ux, nx) + times(uy, ny) + times(uz, nz)
     push = least(most(-gap, zero), most(leave - un, zero))

@@ -2,7 +2,7 @@
 
 Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box, the rim of a cylinder
 and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found which of
-those may come that near within the frame (`nuno.contact.between_vertices` looks at them); where a cloth lies on a
+those may come that near within the frame (`nuno.contact.sharp_turns` looks at them); where a cloth lies on a
 table, far from its rim, that is one question about its bounding box. What does not touch changes no bit, so that it
 does not matter what else is listed.
 """
@@ -11,7 +11,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.distances import BOX, CYLINDER, PLANE
+from nuno.contact.distances import BOX, CYLINDER, FAR, PLANE
 from nuno.contact.led import led_place, led_turn
 from nuno.contact.shapes import COLUMNS, reach_of_frame
 from nuno.solver.lanes import (  # noqa: F401
@@ -29,13 +29,20 @@ from nuno.solver.lanes import (  # noqa: F401
     sub,
     times,
 )
-from nuno.solver.state import CLOCK, ORIGIN, Settings, Shapes
+from nuno.solver.state import CLOCK, ORIGIN, THICKNESS, Settings, Shapes
 
 ROUND = wp.constant(3.0)
 """Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
 twenty-fourth of it into such a ball, its diagonal a twelfth."""
 QUICK = wp.constant(3.0)
 """[m/s] What comes nearer faster than this, where the surfaces do not yet touch, may be seen a substep late."""
+GONE, SOONEST, WAKE = wp.constant(0), wp.constant(1), wp.constant(2)
+"""Places in `State.sharp_wake`: how far anything may have gone since the lists were made, and from when on the first
+element wakes, and each, by how far anything has gone then [m]."""
+
+
+MOST_SLACK = wp.constant(100.0)
+"""[m] As far as a mark counts."""
 
 
 @wp.func
@@ -115,20 +122,23 @@ def forget_sharp(t: Any, topo: Any, thread: int):
     if thread == 0:
         for k in range(topo.sharp_colour.shape[0]):
             t.sharp[k] = 0
-        t.sharp_wake[0] = 0.0
+        t.sharp_wake[GONE] = 0.0
 
 
 @wp.func
 def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
     """List the sharp shapes near the cloth, and mark the vertices by which they may touch within the frame.
 
-    By 1 where an edge at the vertex may be touched, by 2 where a triangle may.
+    By 1 where an edge at the vertex may be touched, by 2 where a triangle may, and by four times how far anything must
+    go before [um].
     """
     like = t.x[0]
     clock = int(largest(t.notes[CLOCK]))
     grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + fill(like, QUICK * run.dt)
     # no point of an edge or triangle is farther from the nearest of its vertices than 0.6 of its longest edge
     around = grow + fill(like, 0.6 * topo.longest)
+    # and within a substep
+    soon = t.scalars[THICKNESS] * 0.5 + fill(like, QUICK * run.dt + 0.6 * topo.longest)
     broad = ROUND * run.cell
     found = int(0)
     for near in range(t.near[0]):
@@ -170,29 +180,64 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
                     z = times(r02, dx) + times(r12, dy) + times(r22, dz)
                     along, point = sharp_features(kind, x, y, z, around, around, around, sa, sb, sc, broad)
                     if anywhere(along):
-                        t.sharp_mark[i] = t.sharp_mark[i] | 1
-                    if anywhere(point):
-                        t.sharp_mark[i] = t.sharp_mark[i] | 2
+                        at_once, _point = sharp_features(kind, x, y, z, soon, soon, soon, sa, sb, sc, broad)
+                        slack = int(1.0e6 * wp.clamp(-largest(at_once), 0.0, MOST_SLACK))
+                        mark = t.sharp_mark[i]
+                        if mark != 0:
+                            slack = wp.min(slack, mark >> 2)
+                        mark = (mark & 3) | 1
+                        if anywhere(point):
+                            mark = mark | 2
+                        t.sharp_mark[i] = mark | slack << 2
     if thread == 0:
         t.sharp[0] = found
+        t.sharp_wake[SOONEST] = wp.where(found > 0, 0.0, FAR)
+
+
+@wp.func
+def slack_of(t: Any, topo: Any, k: int):
+    """How far anything must go before element k may be touched [um], by its marked vertices; below zero for never."""
+    edges = topo.side.shape[0]
+    mark = int(0)
+    slack = int(1.0e6 * MOST_SLACK)
+    if k < edges:
+        e = topo.side[k]
+        for c in range(2):
+            at = t.sharp_mark[e[c]]
+            mark = mark | (at & 1)
+            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
+    elif k < edges + topo.face.shape[0]:
+        f = topo.face[k - edges]
+        for c in range(3):
+            at = t.sharp_mark[f[c]]
+            mark = mark | (at & 2)
+            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
+    return wp.where(mark != 0, slack, -1)
+
+
+@wp.func
+def note_sharp(t: Any, topo: Any, k: int, slack: int):
+    """List element k where its slack is not below zero."""
+    if slack >= 0:
+        c = int(0)
+        while k >= topo.sharp_colour[c + 1]:
+            c += 1
+        place = topo.sharp_colour[c] + wp.atomic_add(t.sharp, 1 + c, 1)
+        t.sharp_list[place] = k
+        t.sharp_wake[WAKE + place] = 1.0e-6 * float(slack)
 
 
 @wp.func
 def list_sharp(t: Any, topo: Any, thread: int, threads: int):
     """List the edges and triangles with marked vertices, once all are marked."""
     if t.sharp[0] > 0:
-        edges = topo.side.shape[0]
-        for c in range(topo.sharp_colour.shape[0] - 1):
-            first = topo.sharp_colour[c]
-            for k in range(first + thread, topo.sharp_colour[c + 1], threads):
-                near = int(0)
-                if k < edges:
-                    e = topo.side[k]
-                    near = (t.sharp_mark[e[0]] | t.sharp_mark[e[1]]) & 1
-                else:
-                    f = topo.face[k - edges]
-                    near = (t.sharp_mark[f[0]] | t.sharp_mark[f[1]] | t.sharp_mark[f[2]]) & 2
-                if near != 0:
-                    place = first + wp.atomic_add(t.sharp, 1 + c, 1)
-                    t.sharp_list[place] = k
-                    t.sharp_wake[1 + place] = 0.0
+        for k in range(thread, topo.side.shape[0] + topo.face.shape[0], 4 * threads):
+            # four at a time, so that a thread waits for all their marks together
+            a = slack_of(t, topo, k)
+            b = slack_of(t, topo, k + threads)
+            c = slack_of(t, topo, k + 2 * threads)
+            d = slack_of(t, topo, k + 3 * threads)
+            note_sharp(t, topo, k, a)
+            note_sharp(t, topo, k + threads, b)
+            note_sharp(t, topo, k + 2 * threads, c)
+            note_sharp(t, topo, k + 3 * threads, d)

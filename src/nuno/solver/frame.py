@@ -9,11 +9,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.renewal import renew_lists, shares_work
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
-from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
+from nuno.contact.sharp_shapes import GONE, SOONEST, forget_sharp, list_sharp, mark_sharp
+from nuno.contact.sharp_turns import touch_awake, touch_sharp, travel
 from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
 from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
@@ -291,7 +291,6 @@ def meet_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
     """Edges and triangles against sharp shapes, where there are any nearby."""
     if t.sharp[0] > 0:
         touch_sharp(t, topo, run, shapes, thread, threads)
-        barrier(threads)
 
 
 @wp.func
@@ -301,11 +300,17 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
     ``near`` is the same state with coordinates as floats, for lists of what is near; ``t`` itself where they are.
     """
     n = topo.particles
+    # kept by each thread: most often there is nothing more to ask about sharp shapes
+    haste = shapes.haste[0]
+    gone = t.sharp_wake[GONE]
+    soonest = t.sharp_wake[SOONEST]
     for k in range(substeps):
         if run.parts & MOTION != 0:
             if (run.first + k) % run.frame == 0:
                 near_shapes(near, n, run, shapes, thread, threads)
                 near_sharp(near, topo, run, shapes, thread, threads)
+                gone = float(0.0)
+                soonest = t.sharp_wake[SOONEST]
                 forget_loads(t, run, thread, threads)
             # before the listing, which asks how far anything went in the substep before
             tick(t, run, thread)
@@ -321,14 +326,18 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            for _again in range(PASSES):
+            passes = int(PASSES)  # a variable: the loop stays a loop, and there is less code to fetch
+            for _again in range(passes):
                 touch_edge_edge(t, n, run, thread, threads)
                 touch_vertex_triangle(t, n, run, thread, threads)
                 barrier(threads)
                 take_moves(t, n, thread, threads)
                 barrier(threads)
         if run.parts & SHAPES != 0:
-            meet_sharp(t, topo, run, shapes, thread, threads)
+            gone += travel(t, run, haste)
+            if gone >= soonest:
+                soonest = touch_awake(t, topo, run, shapes, gone, thread, threads)
+                barrier(threads)
             read_loads(t, run, thread, threads)
             barrier(threads)
             meet_shapes(t, n, shapes, run.dt, thread, threads)
@@ -339,6 +348,9 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
             read_velocities(t, n, run, thread, threads)
             round_places(near, t, n, thread, threads)
             barrier(threads)
+    if thread == 0:
+        t.sharp_wake[GONE] = gone
+        t.sharp_wake[SOONEST] = soonest
 
 
 # A module each, so that only the kind that is run is compiled.

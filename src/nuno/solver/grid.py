@@ -14,10 +14,10 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
+from nuno.contact.sharp_turns import touch_sharp
 from nuno.contact.team_listing import Lists, renew_by_team
 from nuno.solver.grips import forget_loads, pull_points
 from nuno.solver.integrate import reset_speed, tick

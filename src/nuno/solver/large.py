@@ -14,11 +14,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.between_vertices import touch_sharp
 from nuno.contact.distances import PLANE
 from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
+from nuno.contact.sharp_turns import touch_sharp
 from nuno.solver.broad import PairFinder
 from nuno.solver.frame import meet_shapes
 from nuno.solver.grips import forget_loads, pull_points, read_loads

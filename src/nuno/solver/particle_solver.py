@@ -152,7 +152,7 @@ class ParticleSolver:
         state.box = self._empty(6, self._number)
         self._size.sharp_list = len(self._surface.side) + len(self._surface.face)
         state.sharp_mark, state.sharp_list = self._empty(n, int), self._empty(self._size.sharp_list, int)
-        state.sharp_wake = self._empty(self._size.sharp_list + 1, float)
+        state.sharp_wake = self._empty(self._size.sharp_list + 2, float)
         state.worlds = self.world_count
 
     # -- state

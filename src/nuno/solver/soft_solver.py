@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.sharp_shapes import ROUND
+from nuno.contact.sharp_turns import QUEUE, ROOM
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
 from nuno.solver.fine_places import FinePlaces
@@ -158,7 +159,8 @@ class SoftSolver(ParticleSolver):
         self._damped = bool(np.any(values["damping"] > 0))
         self._reply = viscous_reply(topology, 2.0 * mu * values["damping"], self._inverse_mass)
         self._allocate_particles()
-        state.gone_to = self._empty(1, int)
+        size.moved = min(4 * topology.vertex_count, QUEUE + ROOM)
+        state.gone_to, state.moved = self._empty(1, int), self._empty(size.moved, int)
 
     def _upload(self, shared: bool) -> Tetrahedra:
         """The stars on the device, sorted by colour; ``shared`` where all elements have the same moduli."""

@@ -20,7 +20,7 @@ def _make(name: str, number: type, integer: type, place: type) -> Any:
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=place) for name in PLACES}
     fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
-    fields |= {name: wp.array(dtype=int) for name in ("near", "sharp", "sharp_mark", "sharp_list", "gone_to")}
+    fields |= {name: wp.array(dtype=int) for name in ("near", "sharp", "sharp_mark", "sharp_list", "gone_to", "moved")}
     fields["sharp_wake"] = wp.array(dtype=float)
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
@@ -114,6 +114,7 @@ class SoftSizes:
     near: int
     sharp: int
     sharp_list: int
+    moved: int
 
 
 @wp.func
@@ -151,5 +152,6 @@ def view(s: Any, group: int, n: int, size: SoftSizes):
     t.gone_to = window(s.gone_to, group, 1)
     t.sharp_mark = window(s.sharp_mark, group * n, n)
     t.sharp_list = window(s.sharp_list, group * size.sharp_list, size.sharp_list)
-    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 1), size.sharp_list + 1)
+    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 2), size.sharp_list + 2)
+    t.moved = window(s.moved, group * size.moved, size.moved)
     return t

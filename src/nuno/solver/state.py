@@ -272,7 +272,7 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.sharp = window(s.sharp, group * size.sharp, size.sharp)
     t.sharp_mark = window(s.sharp_mark, group * n, n)
     t.sharp_list = window(s.sharp_list, group * size.sharp_list, size.sharp_list)
-    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 1), size.sharp_list + 1)
+    t.sharp_wake = window(s.sharp_wake, group * (size.sharp_list + 2), size.sharp_list + 2)
     t.help = window(s.help, group * HELP, HELP)
     t.near_blocks = window(s.near_blocks, group * size.near_blocks, size.near_blocks)
     return t

@@ -1,0 +1,233 @@
+"""In which order, and by whom, edges and triangles are pushed out of sharp shapes.
+
+Elements come colour by colour, those of one colour, which share no vertex, all at once on CUDA. Vertices come after
+them, by themselves. Of the elements that are listed for a frame few may be near within a substep, and those are known
+without a look at them: an element sleeps until anything may have come as near as it was away. Of those that are awake
+again few are pushed.
+
+So the threads of a block first queue what is awake. Two threads take an element, for at two edges of a box it has two
+points; all find those at once, and only then do they push, one colour after the other. Where more are awake than that,
+they come a colour at a time, with the same bits. On the CPU a thread takes one after the other.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.between_vertices import meet_edge, meet_triangle
+from nuno.contact.distances import FAR
+from nuno.contact.renewal import shares_work
+from nuno.contact.sharp_pose import sharp_pose
+from nuno.contact.sharp_pushes import push_apart
+from nuno.contact.sharp_shapes import GONE, SOONEST, WAKE
+from nuno.solver.lanes import add, anywhere, barrier, fill, largest, mul, root, sub  # noqa: F401
+from nuno.solver.state import SPEED, Settings, Shapes
+from nuno.solver.warps import WARP, lowest
+
+QUEUE = wp.constant(3)
+"""Where in a state's `moved`, which is zero meanwhile, the queue begins: places in the list, and colours. Before it are
+how many these are, and the sets of colours that have first and second points to be pushed."""
+COLOUR = wp.constant(1 << 24)
+"""By which a colour is multiplied in the queue."""
+MOST_COLOURS = wp.constant(31)
+"""Colours that fit the bits of a number."""
+ROOM = wp.constant(128)
+"""Elements that are queued at most."""
+
+
+@wp.func
+def travel(t: Any, run: Settings, haste: float):
+    """How far any vertex and any shape, the fastest at ``haste`` [m/s], may have gone in the substep before [m]."""
+    return (largest(root(t.notes[SPEED])) + haste) * run.dt
+
+
+@wp.func
+def wake_up(t: Any, topo: Any, gone: float, room: int, thread: int, threads: int):
+    """Wake what may be near again of the listed elements; the others get a number below zero.
+
+    Where threads share the work a warp takes a colour, for of each colour few are listed, and the first ``room`` are
+    queued.
+
+    Returns:
+        How many are awake, and if none is, how far anything must have gone before the first wakes [m].
+    """
+    share = wp.min(threads, WARP)
+    awake = int(0)
+    soon = float(FAR)
+    for c in range(thread / share, topo.sharp_colour.shape[0] - 1, threads / share):
+        first = topo.sharp_colour[c]
+        for k in range(first + thread % share, first + t.sharp[1 + c], share):
+            element = t.sharp_list[k]
+            element = wp.max(element, -1 - element)
+            wake = t.sharp_wake[WAKE + k]
+            if gone >= wake:
+                t.sharp_wake[WAKE + k] = FAR
+                if shares_work(threads):
+                    place = wp.atomic_add(t.moved, 0, 1)
+                    if place < room:
+                        t.moved[QUEUE + place] = c * COLOUR + k
+                awake += 1
+            else:
+                element = -1 - element
+                soon = wp.min(soon, wake)
+            t.sharp_list[k] = element
+    if shares_work(threads):
+        barrier(threads)
+        awake = t.moved[0]
+    if awake == 0 and shares_work(threads):
+        if thread == 0:
+            t.sharp_wake[SOONEST] = FAR
+        barrier(threads)
+        if soon < FAR:
+            wp.atomic_min(t.sharp_wake, SOONEST, soon)
+        barrier(threads)
+        soon = t.sharp_wake[SOONEST]
+    return awake, soon
+
+
+@wp.func
+def touch_listed(
+    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, gone: float, queued: int, thread: int, threads: int
+):
+    """The elements that are awake against one shape: those ``queued``, or all of them in turn where that is 0."""
+    like = fill(t.x[0], 0.0)
+    zero = fill(like, 0.0)
+    one = fill(like, 1.0)
+    h = sharp_pose(like, t, run, shapes, s)
+    edges = topo.side.shape[0]
+    together = wp.max(threads / 2, 1)
+    mine = thread / 2
+    c = int(0)
+    start = int(0)
+    while c < topo.sharp_colour.shape[0] - 1:
+        entry = int(-1)
+        colour = int(c)
+        if queued > 0:
+            if mine < queued:
+                place = t.moved[QUEUE + mine]
+                entry = place % COLOUR
+                colour = place / COLOUR
+        elif start + mine < t.sharp[1 + c]:
+            entry = topo.sharp_colour[c] + start + mine
+        element = int(-1)
+        if entry >= 0:
+            element = t.sharp_list[entry]
+        turn = thread % 2
+        more = int(1)
+        while more > 0:
+            more = 0
+            on = -one
+            i = int(0)
+            j = int(0)
+            k = int(0)
+            bi = zero
+            bj = zero
+            bk = zero
+            x = zero
+            y = zero
+            z = zero
+            nx = zero
+            ny = zero
+            nz = zero
+            gap = zero
+            if element >= edges:
+                if turn == 0:
+                    corners = topo.face[element - edges]
+                    i = corners[0]
+                    j = corners[1]
+                    k = corners[2]
+                    on, bj, bk, x, y, z, nx, ny, nz, gap = meet_triangle(t, h, entry, gone, i, j, k, run.cell)
+                    bi = one - bj - bk
+            elif element >= 0:
+                ends = topo.side[element]
+                i = ends[0]
+                j = ends[1]
+                k = i
+                on, more, bj, x, y, z, nx, ny, nz, gap = meet_edge(t, h, entry, gone, i, j, turn, run.cell)
+                bi = one - bj
+            if shares_work(threads):
+                more = 0
+                first = 1 << wp.min(c, MOST_COLOURS)
+                second = int(first)
+                if queued > 0:
+                    if anywhere(on):
+                        wp.atomic_or(t.moved, 1 + turn, 1 << colour)
+                    barrier(threads)
+                    second = t.moved[2]
+                    first = t.moved[1] | second
+                    barrier(threads)
+                    if first != 0 and thread < 2:
+                        t.moved[1 + thread] = 0
+                elif t.sharp[1 + c] == 0:
+                    first = 0
+                while first != 0:
+                    now = lowest(first)
+                    for point in range(1 + ((second >> now) & 1)):
+                        if turn == point and wp.min(colour, MOST_COLOURS) == now and anywhere(on):
+                            push_apart(t, h, i, j, k, bi, bj, bk, x, y, z, nx, ny, nz, gap, on)
+                        barrier(threads)
+                    first = first & (first - 1)
+            else:
+                if anywhere(on):
+                    push_apart(t, h, i, j, k, bi, bj, bk, x, y, z, nx, ny, nz, gap, on)
+                more = more * (1 - turn)
+                turn = 1
+        start += together
+        if queued > 0:
+            c = topo.sharp_colour.shape[0]
+        elif start >= t.sharp[1 + c]:
+            c += 1
+            start = 0
+
+
+@wp.func
+def touch_awake(t: Any, topo: Any, run: Settings, shapes: Shapes, gone: float, thread: int, threads: int):
+    """What is awake of the listed edges and triangles against the sharp shapes nearby.
+
+    Args:
+        t: The state.
+        topo: The surface's elements.
+        run: The run's settings.
+        shapes: All shapes.
+        gone: How far any vertex, and any shape, may have gone since the lists were made [m].
+        thread: The thread's number.
+        threads: How many share the work.
+
+    Returns:
+        How far these must have gone before anything is awake again [m].
+    """
+    room = int(0)
+    if topo.sharp_colour.shape[0] - 1 <= MOST_COLOURS:
+        room = wp.min(wp.min(ROOM, threads / 2), 4 * topo.particles - QUEUE)
+    awake, soon = wake_up(t, topo, gone, room, thread, threads)
+    if awake > 0:
+        soon = gone
+        queued = int(awake)
+        if awake > room:
+            queued = 0
+        for k in range(t.sharp[0]):
+            s = t.sharp[topo.sharp_colour.shape[0] + k]
+            touch_listed(t, topo, run, shapes, s, gone, queued, thread, threads)
+        if shares_work(threads):
+            # once all have read how many there were
+            barrier(threads)
+            for k in range(thread, wp.min(awake, room), threads):
+                t.moved[QUEUE + k] = 0
+            if thread == 0:
+                t.moved[0] = 0
+    return soon
+
+
+@wp.func
+def touch_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, threads: int):
+    """All listed edges and triangles against the sharp shapes nearby; what was gone until now is in `State`."""
+    gone = t.sharp_wake[GONE] + travel(t, run, shapes.haste[0])
+    soonest = t.sharp_wake[SOONEST]
+    # once all know
+    barrier(threads)
+    if gone >= soonest:
+        soonest = touch_awake(t, topo, run, shapes, gone, thread, threads)
+        barrier(threads)
+    if thread == 0:
+        t.sharp_wake[GONE] = gone
+        t.sharp_wake[SOONEST] = soonest
