@@ -95,13 +95,18 @@ auto near_edges = [&](const float* x, const float* y, const float* z, int step, 
 """
 
 KEEP = """
-// adds those of 16 pairs whose bit is set to a list of every `lanes`-th number; what does not fit is only counted
-auto keep = [&](unsigned set, I a, I b, I c, I d, wp::uint64 counts, int which, wp::uint64 list, int room) ALONE {
-    int& count = ((int*)counts)[which * lanes];
+// adds those of 16 pairs whose bit is set to a list with number c of pair k at k * next + c * row; what does not fit is
+// only counted
+auto keep = [&](unsigned set, I a, I b, I c, I d, int& count, int* list, int next, int row, int room) ALONE {
+    if (next == 1 && count + 16 <= room) {
+        pack(list, count, a, set), pack(list + row, count, b, set), pack(list + 2 * row, count, c, set);
+        count = pack(list + 3 * row, count, d, set);
+        return;
+    }
     for (; set; set &= set - 1) {
         const int l = __builtin_ctz(set), k = count++;
-        int* to = (int*)list + 4 * k * lanes;
-        if (k < room) to[0] = a[l], to[lanes] = b[l], to[2 * lanes] = c[l], to[3 * lanes] = d[l];
+        int* to = list + k * next;
+        if (k < room) to[0] = a[l], to[row] = b[l], to[2 * row] = c[l], to[3 * row] = d[l];
     }
 };
 """

@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.contact.block_renewal import find_together
 from nuno.contact.pair_lists import FORGET, PICK_AHEAD, swept
-from nuno.contact.world_listing import list_world, pick_world
+from nuno.contact.world_listing import list_world, pick_world, reach_world
 from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     LANES,
     add,
@@ -31,6 +31,9 @@ from nuno.solver.state import (
     StateLanes,
     Topology,
 )
+
+SLACK = wp.constant(1.1)
+"""Times that reach by which the pairs of a substep are found: a hundredth of the thickness more, against rounding."""
 
 
 @wp.func_native("""
@@ -142,6 +145,8 @@ def renew_lists(t: StateLanes, topo: Topology, run: Settings, thread: int, threa
                 t.notes[PICKED][k] = 0.0
                 t.notes[PICK_REACH][k] = ahead[k]
                 pick_world(t, t.scalars[THICKNESS][k] + 1.01 * ahead[k], k, lanes)
+    for k in range(worlds):
+        reach_world(t, t.scalars[THICKNESS][k] + SLACK * near[k], k, lanes)
 
 
 @wp.func
@@ -165,3 +170,4 @@ def renew_lists(t: StateFloat, topo: Topology, run: Settings, thread: int, threa
             t.notes[PICKED] = 0.0
             t.notes[PICK_REACH] = ahead
             pick_world(t, t.scalars[THICKNESS] + 1.01 * ahead, 0, 1)
+        reach_world(t, t.scalars[THICKNESS] + SLACK * near, 0, 1)

@@ -65,25 +65,26 @@ auto safe = [&](int a, int start) ALONE {
     const I at = smaller(low, points / columns - WINDOW) * columns + smaller(left, columns - WINDOW);
     return bits((right - left < WINDOW) & (high - low < WINDOW) & take_int(tame, at));
 };
+int* listed[2] = {(int*)pair_count, (int*)pair_count + lanes};
+for (int c = 0; c < 2; ++c) {
+    int* most_listed = listed[c] + MOST_LISTED * lanes;
+    if (*listed[c] > *most_listed) *most_listed = *listed[c];
+    *listed[c] = 0;
+}
 // suspects wait until there are sixteen
 int vertex_of[32], face_of[32], edge_of[32], other_of[32], faces_waiting = 0, edges_waiting = 0;
 auto test_faces = [&](int count) ALONE {
     const I i = *(const I*)vertex_of, f = *(const I*)face_of;
     const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
     const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit) > 0.f);
-    keep(hit & ((1u << count) - 1), i, a, b, c, pair_count, 0, triangles, most_triangles);
+    keep(hit & ((1u << count) - 1), i, a, b, c, *listed[0], (int*)triangles, 1, most_triangles, most_triangles);
 };
 auto test_edges = [&](int count) ALONE {
     const I e = *(const I*)edge_of, f = *(const I*)other_of;
     const I a = take_int(end, e), b = take_int(end + edges, e), c = take_int(end, f), d = take_int(end + edges, f);
     const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
-    keep(hit & ((1u << count) - 1), a, b, c, d, pair_count, 1, pairs, most_pairs);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *listed[1], (int*)pairs, 1, most_pairs, most_pairs);
 };
-for (int c = 0; c < 2; ++c) {
-    int *listed = (int*)pair_count + c * lanes, *most_listed = listed + MOST_LISTED * lanes;
-    if (*listed > *most_listed) *most_listed = *listed;
-    *listed = 0;
-}
 for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
 for (int a = 0; a < blocks; ++a) {
     float low[3], high[3];
@@ -186,7 +187,7 @@ for (int k = 0; k < creases; k += 16) {
     const I a = take_int(table, row), b = take_int(table + 1, row);
     const I c = take_int(table + 2, row), d = take_int(table + 3, row);
     const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
-    keep(hit, a, b, c, d, pair_count, 1, pairs, most_pairs);
+    keep(hit, a, b, c, d, *listed[1], (int*)pairs, 1, most_pairs, most_pairs);
 }
 #endif
 """.replace("RANGES", str(RANGES))
@@ -230,24 +231,24 @@ def search_world(
     + """
 const float *x0 = (const float*)x, *y0 = (const float*)y, *z0 = (const float*)z;
 const V limit = (V){} + far * far;
-const int* listed[2] = {(const int*)triangles, (const int*)pairs};
-const wp::uint64 picked[2] = {touch_triangles, touch_pairs};
+const int* from[2] = {(const int*)triangles, (const int*)pairs};
+int* to[2] = {(int*)near_triangles_out, (int*)near_pairs_out};
 const int room[2] = {most_triangles, most_pairs};
 for (int kind = 0; kind < 2; ++kind) {
-    ((int*)touch_count)[kind * lanes] = 0;
-    const int found = ((const int*)pair_count)[kind * lanes], count = found < room[kind] ? found : room[kind];
+    const int found = ((const int*)counts)[kind * lanes], count = found < room[kind] ? found : room[kind];
+    int near_count = 0;
     for (int k = 0; k < count; k += 16) {
-        const I row = smaller(OWN + k, count - 1) * (4 * lanes);
         I q[4];
-        for (int c = 0; c < 4; ++c) q[c] = take_int(listed[kind] + c * lanes, row);
+        for (int c = 0; c < 4; ++c) q[c] = *(const I*)(from[kind] + c * room[kind] + k);
         V near;
         if (kind == 0)
             near = near_triangles(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
         else
             near = near_edges(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
         const unsigned hit = bits((near > 0.f) & (OWN + k < count));
-        keep(hit, q[0], q[1], q[2], q[3], touch_count, kind, picked[kind], room[kind]);
+        keep(hit, q[0], q[1], q[2], q[3], near_count, to[kind], next, next == 1 ? room[kind] : lanes, room[kind]);
     }
+    ((int*)near_counts)[kind * lanes] = near_count;
 }
 #endif
 """
@@ -258,17 +259,27 @@ def filter_world(
     z: wp.uint64,
     far: float,
     lanes: int,
-    pair_count: wp.uint64,
+    counts: wp.uint64,
     triangles: wp.uint64,
     most_triangles: int,
     pairs: wp.uint64,
     most_pairs: int,
-    touch_count: wp.uint64,
-    touch_triangles: wp.uint64,
-    touch_pairs: wp.uint64,
+    near_counts: wp.uint64,
+    near_triangles_out: wp.uint64,
+    near_pairs_out: wp.uint64,
+    next: int,
 ):
-    """Copy those of the listed pairs that are nearer than ``far`` [m] to the list of what may touch, in their order."""
+    """Copy those pairs of a list that are nearer than ``far`` [m] to another, in their order.
+
+    The other list is one like the first where ``next`` is 1; where it is 4 ``lanes`` it has every ``lanes``-th number.
+    """
     ...
+
+
+@wp.func
+def pairs_of(pairs: wp.array(dtype=Any), which: int):
+    """Where the list of world ``which`` of a vector stands, which has all pairs' first vertices, then all second ones ..."""
+    return pairs.ptr + wp.uint64(4 * which) * wp.uint64(pairs.shape[0])
 
 
 @wp.func
@@ -310,9 +321,9 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         far,
         lanes,
         t.pair_count.ptr + skip,
-        t.vertex_triangle.ptr + skip,
+        pairs_of(t.vertex_triangle, which),
         t.vertex_triangle.shape[0] / 4,
-        t.edge_edge.ptr + skip,
+        pairs_of(t.edge_edge, which),
         t.edge_edge.shape[0] / 4,
     )
 
@@ -328,11 +339,37 @@ def pick_world(t: Any, far: float, which: int, lanes: int):
         far,
         lanes,
         t.pair_count.ptr + skip,
-        t.vertex_triangle.ptr + skip,
+        pairs_of(t.vertex_triangle, which),
         t.vertex_triangle.shape[0] / 4,
-        t.edge_edge.ptr + skip,
+        pairs_of(t.edge_edge, which),
         t.edge_edge.shape[0] / 4,
+        t.picked_count.ptr + skip,
+        pairs_of(t.picked_triangle, which),
+        pairs_of(t.picked_edge, which),
+        1,
+    )
+
+
+@wp.func
+def reach_world(t: Any, far: float, which: int, lanes: int):
+    """Find the picked pairs of world ``which`` that are nearer than ``far`` [m]: those that a substep may bring together.
+
+    A substep takes sixteen worlds at once, as many pairs as the one has that has most of them.
+    """
+    skip = wp.uint64(4 * which)
+    filter_world(
+        t.x.ptr + skip,
+        t.y.ptr + skip,
+        t.z.ptr + skip,
+        far,
+        lanes,
+        t.picked_count.ptr + skip,
+        pairs_of(t.picked_triangle, which),
+        t.picked_triangle.shape[0] / 4,
+        pairs_of(t.picked_edge, which),
+        t.picked_edge.shape[0] / 4,
         t.touch_count.ptr + skip,
         t.touch_triangle.ptr + skip,
         t.touch_edge.ptr + skip,
+        4 * lanes,
     )

@@ -18,6 +18,7 @@ from nuno.solver.fine_places import FinePlaces
 from nuno.solver.frame import run_fine_lanes, run_fine_worlds, run_lanes, run_worlds
 from nuno.solver.grid import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
+from nuno.solver.lanes import LANES
 from nuno.solver.large import LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
@@ -213,6 +214,13 @@ class ClothSolver(ParticleSolver):
         else:
             state.touch_triangle = self._list(4 * size.vertex_triangle)
             state.touch_edge = self._list(4 * size.edge_edge)
+        if self._cuda or self.plan in LARGE:  # solve all that is picked
+            state.picked_triangle, state.picked_edge = state.touch_triangle, state.touch_edge
+            state.picked_count = state.touch_count
+        else:
+            state.picked_triangle = self._list(4 * size.vertex_triangle)
+            state.picked_edge = self._list(4 * size.edge_edge)
+            state.picked_count = empty(2, self._integer)
         state.near_blocks = empty(size.near_blocks, self._integer)
         self._counts = state.pair_count
         self._allocate_help()
@@ -221,7 +229,9 @@ class ClothSolver(ParticleSolver):
         """Zeros, whole numbers, ``count`` a world or group of lanes; on the CPU they take memory once written to."""
         if self._cuda:
             return self._empty(count, self._integer)
-        shape = (self.group_count * count, self.lanes) if self.lanes > 1 else (self.group_count * count,)
+        # a vector is read where the last pairs are fewer
+        rows = self.group_count * count + LANES
+        shape = (rows, self.lanes) if self.lanes > 1 else (rows,)
         return wp.array(np.zeros(shape, dtype=np.int32), dtype=self._integer, device=self.device, copy=False)
 
     def _allocate_help(self) -> None:

@@ -57,6 +57,9 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
         "vertex_triangle",
         "edge_edge",
         "pair_count",
+        "picked_triangle",
+        "picked_edge",
+        "picked_count",
         "touch_triangle",
         "touch_edge",
         "touch_count",
@@ -263,6 +266,9 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.grip_corner = window(s.grip_corner, group * 3 * size.grips, 3 * size.grips)
     t.vertex_triangle = window(s.vertex_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
     t.edge_edge = window(s.edge_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
+    t.picked_triangle = window(s.picked_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
+    t.picked_edge = window(s.picked_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
+    t.picked_count = window(s.picked_count, group * 2, 2)
     t.touch_triangle = window(s.touch_triangle, group * 4 * size.vertex_triangle, 4 * size.vertex_triangle)
     t.touch_edge = window(s.touch_edge, group * 4 * size.edge_edge, 4 * size.edge_edge)
     t.touch_count = window(s.touch_count, group * 2, 2)
