@@ -42,9 +42,8 @@ def at(x: wp.array(dtype=float), i: int):
     return x[i]
 
 
-@wp.func
-def at(x: wp.array(dtype=lane), i: int):
-    return x[i]
+@wp.func_native("return x.data[i];")
+def at(x: wp.array(dtype=lane), i: int) -> lane: ...
 
 
 @wp.func_native(_GATHER)
@@ -57,39 +56,34 @@ def put(x: wp.array(dtype=float), i: int, value: float):
     x[i] = value
 
 
-@wp.func
-def put(x: wp.array(dtype=lane), i: int, value: lane):
-    x[i] = value
+@wp.func_native("x.data[i] = value;")
+def put(x: wp.array(dtype=lane), i: int, value: lane): ...
 
 
 @wp.func_native(_SCATTER)
 def put(x: wp.array(dtype=float), i: lane_int, value: lane): ...
 
 
-@wp.func
-def corner(table: wp.array(dtype=wp.vec2i), k: int, which: int, count: int):
+@wp.func_native("return table.data[k][which];")
+def corner(table: wp.array(dtype=wp.vec2i), k: int, which: int, count: int) -> int:
     """Column ``which`` of row k of a table of ``count`` columns: an element's own, or those of sixteen elements."""
-    return table[k][which]
+    ...
 
 
-@wp.func
-def corner(table: wp.array(dtype=wp.vec3i), k: int, which: int, count: int):
-    return table[k][which]
+@wp.func_native("return table.data[k][which];")
+def corner(table: wp.array(dtype=wp.vec3i), k: int, which: int, count: int) -> int: ...
 
 
-@wp.func
-def corner(table: wp.array(dtype=wp.vec4i), k: int, which: int, count: int):
-    return table[k][which]
+@wp.func_native("return table.data[k][which];")
+def corner(table: wp.array(dtype=wp.vec4i), k: int, which: int, count: int) -> int: ...
 
 
-@wp.func
-def corner(table: wp.array(dtype=wp.vec3), k: int, which: int, count: int):
-    return table[k][which]
+@wp.func_native("return table.data[k][which];")
+def corner(table: wp.array(dtype=wp.vec3), k: int, which: int, count: int) -> float: ...
 
 
-@wp.func
-def corner(table: wp.array(dtype=wp.vec4), k: int, which: int, count: int):
-    return table[k][which]
+@wp.func_native("return table.data[k][which];")
+def corner(table: wp.array(dtype=wp.vec4), k: int, which: int, count: int) -> float: ...
 
 
 @wp.func
