@@ -31,6 +31,7 @@ from nuno.solver.state import (
     StateLanes,
     Topology,
 )
+from nuno.solver.vector import at, put
 
 SLACK = wp.constant(1.1)
 """Times that reach by which the pairs of a substep are found: a hundredth of the thickness more, against rounding."""
@@ -55,17 +56,17 @@ def measure_moves(t: Any, topo: Topology):
     regions = topo.region_start.shape[0] - 1
     for g in range(regions):
         i = topo.region_corner[topo.region_start[g]]
-        lx = t.x[i] - t.listed[i]
-        ly = t.y[i] - t.listed[n + i]
-        lz = t.z[i] - t.listed[2 * n + i]
+        lx = at(t.x, i) - at(t.listed, i)
+        ly = at(t.y, i) - at(t.listed, n + i)
+        lz = at(t.z, i) - at(t.listed, 2 * n + i)
         hx = lx
         hy = ly
         hz = lz
         for k in range(topo.region_start[g] + 1, topo.region_start[g + 1]):
             i = topo.region_corner[k]
-            dx = t.x[i] - t.listed[i]
-            dy = t.y[i] - t.listed[n + i]
-            dz = t.z[i] - t.listed[2 * n + i]
+            dx = at(t.x, i) - at(t.listed, i)
+            dy = at(t.y, i) - at(t.listed, n + i)
+            dz = at(t.z, i) - at(t.listed, 2 * n + i)
             lx = least(lx, dx)
             ly = least(ly, dy)
             lz = least(lz, dz)
@@ -73,12 +74,12 @@ def measure_moves(t: Any, topo: Topology):
             hy = most(hy, dy)
             hz = most(hz, dz)
         k = 6 * (regions + g)
-        t.bounds[k] = lx
-        t.bounds[k + 1] = ly
-        t.bounds[k + 2] = lz
-        t.bounds[k + 3] = hx
-        t.bounds[k + 4] = hy
-        t.bounds[k + 5] = hz
+        put(t.bounds, k, lx)
+        put(t.bounds, k + 1, ly)
+        put(t.bounds, k + 2, lz)
+        put(t.bounds, k + 3, hx)
+        put(t.bounds, k + 4, hy)
+        put(t.bounds, k + 5, hz)
 
 
 @wp.func
@@ -97,10 +98,10 @@ def most_closer(t: Any, topo: Topology, far: Any):
             for c in range(3):
                 a = 6 * g + c
                 b = 6 * h + c
-                gap = most(gap, most(t.bounds[a] - t.bounds[b + 3], t.bounds[b] - t.bounds[a + 3]))
+                gap = most(gap, most(at(t.bounds, a) - at(t.bounds, b + 3), at(t.bounds, b) - at(t.bounds, a + 3)))
                 a = a + 6 * regions
                 b = b + 6 * regions
-                span = most(t.bounds[a + 3] - t.bounds[b], t.bounds[b + 3] - t.bounds[a])
+                span = most(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
                 square = square + times(span, span)
             worst = most(worst, root(square) - most(gap - far, zero))
     return worst

@@ -32,6 +32,7 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     within,
 )
 from nuno.solver.state import FRICTION, THICKNESS, Settings
+from nuno.solver.vector import at
 
 LEAVE_SPEED = wp.constant(0.5)
 """[m/s] Layers found too close part no faster than this."""
@@ -163,10 +164,10 @@ def touch_vertex_triangle(t: Any, n: int, run: Settings, thread: int, threads: i
     leave = fill(like, LEAVE_SPEED * run.dt)
     one = fill(like, 1.0)
     for k in range(thread, count, threads):
-        a = t.touch_triangle[4 * k]
-        b = t.touch_triangle[4 * k + 1]
-        c = t.touch_triangle[4 * k + 2]
-        d = t.touch_triangle[4 * k + 3]
+        a = at(t.touch_triangle, 4 * k)
+        b = at(t.touch_triangle, 4 * k + 1)
+        c = at(t.touch_triangle, 4 * k + 2)
+        d = at(t.touch_triangle, 4 * k + 3)
         bx = gather(t.px, b)
         by = gather(t.py, b)
         bz = gather(t.pz, b)
@@ -216,10 +217,10 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
     leave = fill(like, LEAVE_SPEED * run.dt)
     one = fill(like, 1.0)
     for k in range(thread, count, threads):
-        a = t.touch_edge[4 * k]
-        b = t.touch_edge[4 * k + 1]
-        c = t.touch_edge[4 * k + 2]
-        d = t.touch_edge[4 * k + 3]
+        a = at(t.touch_edge, 4 * k)
+        b = at(t.touch_edge, 4 * k + 1)
+        c = at(t.touch_edge, 4 * k + 2)
+        d = at(t.touch_edge, 4 * k + 3)
         x0 = gather(t.px, a)
         y0 = gather(t.py, a)
         z0 = gather(t.pz, a)

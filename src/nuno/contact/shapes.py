@@ -47,6 +47,7 @@ from nuno.solver.lanes import (  # noqa: F401
     times,
 )
 from nuno.solver.state import CLOCK, FRICTION, ORIGIN, SPEED, THICKNESS, Shapes
+from nuno.solver.vector import at, put
 from nuno.solver.warps import leads_warp, most_of_warp
 
 COLUMNS = 20
@@ -74,12 +75,12 @@ def press(t: Any, i: int, gap: Any, nx: Any, ny: Any, nz: Any, ux: Any, uy: Any,
     tz = uz - times(un, nz)
     slip = root(times(tx, tx) + times(ty, ty) + times(tz, tz) + fill(gap, 1.0e-24))
     hold = least(over(times(mu, push), slip), fill(gap, 1.0))
-    free = choose(t.w[i], fill(gap, 1.0), zero)
+    free = choose(at(t.w, i), fill(gap, 1.0), zero)
     push = times(push, free)
     hold = times(hold, free)
-    t.x[i] = t.x[i] + times(push, nx) - times(hold, tx)
-    t.y[i] = t.y[i] + times(push, ny) - times(hold, ty)
-    t.z[i] = t.z[i] + times(push, nz) - times(hold, tz)
+    put(t.x, i, at(t.x, i) + times(push, nx) - times(hold, tx))
+    put(t.y, i, at(t.y, i) + times(push, ny) - times(hold, ty))
+    put(t.z, i, at(t.z, i) + times(push, nz) - times(hold, tz))
 
 
 @wp.func
@@ -149,9 +150,9 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     # what comes nearer than this may have passed through within the substep
     near = radius + fill(like, SWIFT * dt)
     for i in range(thread, n, threads):
-        dx = minus(t.x[i], cx)
-        dy = minus(t.y[i], cy)
-        dz = minus(t.z[i], cz)
+        dx = minus(at(t.x, i), cx)
+        dy = minus(at(t.y, i), cy)
+        dz = minus(at(t.z, i), cz)
         # into the shape's frame
         x = times(r00, dx) + times(r10, dy) + times(r20, dz)
         y = times(r01, dx) + times(r11, dy) + times(r21, dz)
@@ -171,9 +172,9 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
             if kind == HULL and anywhere(near - gap):
                 gap, nx, ny, nz = distance_hull(shapes, s, x, y, z, near)
         if anywhere(near - gap):
-            ux = t.x[i] - t.px[i]
-            uy = t.y[i] - t.py[i]
-            uz = t.z[i] - t.pz[i]
+            ux = at(t.x, i) - at(t.px, i)
+            uy = at(t.y, i) - at(t.py, i)
+            uz = at(t.z, i) - at(t.pz, i)
             if slot >= 0:
                 ux = ux - ex - times(d00, x) - times(d01, y) - times(d02, z)
                 uy = uy - ey - times(d10, x) - times(d11, y) - times(d12, z)
@@ -255,12 +256,12 @@ def measure_box(t: Any, n: int, thread: int, threads: int):
     hy = ly
     hz = lz
     for i in range(thread, n, threads):
-        lx = least(lx, t.x[i])
-        ly = least(ly, t.y[i])
-        lz = least(lz, t.z[i])
-        hx = most(hx, t.x[i])
-        hy = most(hy, t.y[i])
-        hz = most(hz, t.z[i])
+        lx = least(lx, at(t.x, i))
+        ly = least(ly, at(t.y, i))
+        lz = least(lz, at(t.z, i))
+        hx = most(hx, at(t.x, i))
+        hy = most(hy, at(t.y, i))
+        hz = most(hz, at(t.z, i))
     widen(t.box, 0, lx, hx, thread, threads)
     widen(t.box, 1, ly, hy, thread, threads)
     widen(t.box, 2, lz, hz, thread, threads)

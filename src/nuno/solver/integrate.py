@@ -6,6 +6,7 @@ import warp as wp
 
 from nuno.solver.lanes import add, choose, fill, most, mul, over, root, rough, sub, times  # noqa: F401
 from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings, StateFloat, StateLanes
+from nuno.solver.vector import at, put
 from nuno.solver.warps import leads_warp, most_of_warp
 
 
@@ -19,31 +20,31 @@ def predict(t: Any, n: int, run: Settings, thread: int, threads: int):
     gy = fill(one, run.gravity[1] * run.dt)
     gz = fill(one, run.gravity[2] * run.dt)
     for i in range(thread, n, threads):
-        w = t.w[i]
+        w = at(t.w, i)
         free = choose(w, one, zero)
-        ux = t.vx[i] + gx
-        uy = t.vy[i] + gy
-        uz = t.vz[i] + gz
+        ux = at(t.vx, i) + gx
+        uy = at(t.vy, i) + gy
+        uz = at(t.vz, i) + gz
         if run.pushed != 0:
-            ux = ux + times(w, t.fx[i]) * run.dt
-            uy = uy + times(w, t.fy[i]) * run.dt
-            uz = uz + times(w, t.fz[i]) * run.dt
+            ux = ux + times(w, at(t.fx, i)) * run.dt
+            uy = uy + times(w, at(t.fy, i)) * run.dt
+            uz = uz + times(w, at(t.fz, i)) * run.dt
         keep = times(free, slow)
         ux = times(ux, keep)
         uy = times(uy, keep)
         uz = times(uz, keep)
-        x = t.x[i]
-        y = t.y[i]
-        z = t.z[i]
-        t.px[i] = x
-        t.py[i] = y
-        t.pz[i] = z
-        t.vx[i] = ux
-        t.vy[i] = uy
-        t.vz[i] = uz
-        t.x[i] = x + ux * run.dt
-        t.y[i] = y + uy * run.dt
-        t.z[i] = z + uz * run.dt
+        x = at(t.x, i)
+        y = at(t.y, i)
+        z = at(t.z, i)
+        put(t.px, i, x)
+        put(t.py, i, y)
+        put(t.pz, i, z)
+        put(t.vx, i, ux)
+        put(t.vy, i, uy)
+        put(t.vz, i, uz)
+        put(t.x, i, x + ux * run.dt)
+        put(t.y, i, y + uy * run.dt)
+        put(t.z, i, z + uz * run.dt)
 
 
 @wp.func
@@ -73,12 +74,12 @@ def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
     rate = 1.0 / run.dt
     top = fill(t.x[0], 0.0)
     for i in range(thread, n, threads):
-        vx = t.vx[i] + (t.x[i] - (t.px[i] + t.vx[i] * run.dt)) * rate
-        vy = t.vy[i] + (t.y[i] - (t.py[i] + t.vy[i] * run.dt)) * rate
-        vz = t.vz[i] + (t.z[i] - (t.pz[i] + t.vz[i] * run.dt)) * rate
-        t.vx[i] = vx
-        t.vy[i] = vy
-        t.vz[i] = vz
+        vx = at(t.vx, i) + (at(t.x, i) - (at(t.px, i) + at(t.vx, i) * run.dt)) * rate
+        vy = at(t.vy, i) + (at(t.y, i) - (at(t.py, i) + at(t.vy, i) * run.dt)) * rate
+        vz = at(t.vz, i) + (at(t.z, i) - (at(t.pz, i) + at(t.vz, i) * run.dt)) * rate
+        put(t.vx, i, vx)
+        put(t.vy, i, vy)
+        put(t.vz, i, vz)
         top = most(top, times(vx, vx) + times(vy, vy) + times(vz, vz))
     raise_speed(t.notes, top, thread, threads)
 

@@ -71,12 +71,12 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
         beside = times(wa, times(ex, dx) + times(ey, dy) + times(ez, dz))
         gain = times(beside, pivot)
         if k > first:
-            gains[k - 1] = gain
+            put(gains, k - 1, gain)
         alpha = scaled(at(t.stretch_soft, table.edge_soft[k]), table.edge_scale[k] * rate)
         pivot = over(one, wa + wb + alpha + fill(ax, 1.0e-12) - times(beside, gain))
         pull = times(spread(ax, table.edge_rest[k]) - length + times(beside, pull), pivot)
-        pulls[k] = pull
-        inverses[k] = inverse
+        put(pulls, k, pull)
+        put(inverses, k, inverse)
         ax = bx
         ay = by
         az = bz
@@ -93,11 +93,11 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
         i = corner(table.edge, k, 0, 2)
         j = corner(table.edge, k, 1, 2)
         if back > 0:
-            pull = pulls[k] + times(gains[k], pull)
+            pull = at(pulls, k) + times(at(gains, k), pull)
         bx = at(t.x, i)
         by = at(t.y, i)
         bz = at(t.z, i)
-        s = times(pull, inverses[k])
+        s = times(pull, at(inverses, k))
         dx = times(bx - ax, s)
         dy = times(by - ay, s)
         dz = times(bz - az, s)

@@ -46,6 +46,15 @@ def at(x: wp.array(dtype=float), i: int):
 def at(x: wp.array(dtype=lane), i: int) -> lane: ...
 
 
+@wp.func
+def at(x: wp.array(dtype=int), i: int):
+    return x[i]
+
+
+@wp.func_native("return x.data[i];")
+def at(x: wp.array(dtype=lane_int), i: int) -> lane_int: ...
+
+
 @wp.func_native(_GATHER)
 def at(x: wp.array(dtype=float), i: lane_int) -> lane: ...
 
