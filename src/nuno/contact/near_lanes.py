@@ -56,8 +56,10 @@ auto pack = [](int* to, int count, I values, unsigned set) {
 """
 
 NEAR_TRIANGLES = """
-// positive where vertex i may be nearer to triangle f g h than the root of far2: nearness.near_triangle
-auto near_triangles = [&](const float* x, const float* y, const float* z, int step, I i, I f, I g, I h, V far2) ALONE {
+// positive where vertex i may be nearer to triangle f g h than the root of far2: nearness.near_triangle; and where none of
+// its weights over the triangle is less than -rim
+auto near_triangles = [&](const float* x, const float* y, const float* z, int step, I i, I f, I g, I h, V far2,
+                          float rim) ALONE {
     i *= step, f *= step, g *= step, h *= step;
     const V px = take(x, f), py = take(y, f), pz = take(z, f);
     const V ax = take(x, g) - px, ay = take(y, g) - py, az = take(z, g) - pz;
@@ -70,7 +72,7 @@ auto near_triangles = [&](const float* x, const float* y, const float* z, int st
     const V w = (ay * dz - az * dy) * nx + (az * dx - ax * dz) * ny + (ax * dy - ay * dx) * nz;
     const V outside = least(least(nn - v - w, (V){}), least(v, w));
     const V aa = ax * ax + ay * ay + az * az, bb = bx * bx + by * by + bz * bz, cc = cx * cx + cy * cy + cz * cz;
-    return most(aa, most(bb, cc)) * (far2 * nn - high * high) - outside * outside;
+    return least(most(aa, most(bb, cc)) * (far2 * nn - high * high) - outside * outside, outside + rim * nn);
 };
 """
 

@@ -76,7 +76,7 @@ int vertex_of[32], face_of[32], edge_of[32], other_of[32], faces_waiting = 0, ed
 auto test_faces = [&](int count) ALONE {
     const I i = *(const I*)vertex_of, f = *(const I*)face_of;
     const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
-    const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit) > 0.f);
+    const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit, 1e9f) > 0.f);
     keep(hit & ((1u << count) - 1), i, a, b, c, *listed[0], (int*)triangles, 1, most_triangles, most_triangles);
 };
 auto test_edges = [&](int count) ALONE {
@@ -242,7 +242,7 @@ for (int kind = 0; kind < 2; ++kind) {
         for (int c = 0; c < 4; ++c) q[c] = *(const I*)(from[kind] + c * room[kind] + k);
         V near;
         if (kind == 0)
-            near = near_triangles(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
+            near = near_triangles(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit, rim);
         else
             near = near_edges(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
         const unsigned hit = bits((near > 0.f) & (OWN + k < count));
@@ -268,6 +268,7 @@ def filter_world(
     near_triangles_out: wp.uint64,
     near_pairs_out: wp.uint64,
     next: int,
+    rim: float,
 ):
     """Copy those pairs of a list that are nearer than ``far`` [m] to another, in their order.
 
@@ -347,6 +348,7 @@ def pick_world(t: Any, far: float, which: int, lanes: int):
         pairs_of(t.picked_triangle, which),
         pairs_of(t.picked_edge, which),
         1,
+        1.0e9,
     )
 
 
@@ -372,4 +374,5 @@ def reach_world(t: Any, far: float, which: int, lanes: int):
         t.touch_triangle.ptr + skip,
         t.touch_edge.ptr + skip,
         4 * lanes,
+        2.0e-3,
     )
