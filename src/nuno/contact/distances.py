@@ -10,6 +10,7 @@ import warp as wp
 
 from nuno.solver.lanes import (  # noqa: F401
     add,
+    anywhere,
     choose,
     fill,
     lane,
@@ -48,16 +49,19 @@ def distance_box(x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
     ox = most(qx, zero)
     oy = most(qy, zero)
     oz = most(qz, zero)
-    outside = root(times(ox, ox) + times(oy, oy) + times(oz, oz) + fill(x, 1.0e-24))
-    inside = most(qx, most(qy, qz))
-    # inside, the nearest face gives the normal
+    # inside and over a face, the nearest face gives distance and normal
+    gap = most(qx, most(qy, qz))
     fz = choose(qz - most(qx, qy), one, zero)
     fx = times(one - fz, choose(qx - qy, one, zero))
     fy = one - fz - fx
-    nx = times(sx, choose(inside, over(ox, outside), fx))
-    ny = times(sy, choose(inside, over(oy, outside), fy))
-    nz = times(sz, choose(inside, over(oz, outside), fz))
-    return choose(inside, outside, inside), nx, ny, nz
+    corner = ox + oy + oz - most(gap, zero)
+    if not anywhere(corner):
+        return gap, times(sx, fx), times(sy, fy), times(sz, fz)
+    outside = root(times(ox, ox) + times(oy, oy) + times(oz, oz) + fill(x, 1.0e-24))
+    nx = times(sx, choose(corner, over(ox, outside), fx))
+    ny = times(sy, choose(corner, over(oy, outside), fy))
+    nz = times(sz, choose(corner, over(oz, outside), fz))
+    return choose(corner, outside, gap), nx, ny, nz
 
 
 @wp.func
@@ -89,17 +93,13 @@ def distance_round(x: Any, y: Any, z: Any, r: Any, half: Any):
 @wp.func
 def distance_solid(kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
     """Signed distance and normal of a primitive shape of sizes a, b, c."""
-    gap = z
-    nx = fill(z, 0.0)
-    ny = fill(z, 0.0)
-    nz = fill(z, 1.0)
     if kind == BOX:
-        gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
-    elif kind == CYLINDER:
-        gap, nx, ny, nz = distance_cylinder(x, y, z, a, b)
-    elif kind == SPHERE or kind == CAPSULE:
-        gap, nx, ny, nz = distance_round(x, y, z, a, b)
-    return gap, nx, ny, nz
+        return distance_box(x, y, z, a, b, c)
+    if kind == CYLINDER:
+        return distance_cylinder(x, y, z, a, b)
+    if kind == SPHERE or kind == CAPSULE:
+        return distance_round(x, y, z, a, b)
+    return z, fill(z, 0.0), fill(z, 0.0), fill(z, 1.0)
 
 
 @wp.func

@@ -56,7 +56,7 @@ auto pack = [](int* to, int count, I values, unsigned set) {
 """
 
 NEAR_TRIANGLES = """
-// positive where vertex i may be nearer to triangle f g h than the root of far2: nearness.near_triangle; and where none of
+// positive where vertex i may be nearer to triangle f g h than the root of far2, as nearness.near_triangle, and none of
 // its weights over the triangle is less than -rim
 auto near_triangles = [&](const float* x, const float* y, const float* z, int step, I i, I f, I g, I h, V far2,
                           float rim) ALONE {

@@ -14,17 +14,12 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.distances import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
     HULL,
     PLANE,
     SHELL_MESH,
     SOLID_MESH,
-    SPHERE,
     distance_box,
-    distance_cylinder,
-    distance_round,
+    distance_solid,
     gap_mesh,
     way_in,
 )
@@ -81,6 +76,50 @@ def press(t: Any, i: int, gap: Any, nx: Any, ny: Any, nz: Any, ux: Any, uy: Any,
     put(t.x, i, at(t.x, i) + times(push, nx) - times(hold, tx))
     put(t.y, i, at(t.y, i) + times(push, ny) - times(hold, ty))
     put(t.z, i, at(t.z, i) + times(push, nz) - times(hold, tz))
+
+
+# Functions that return from their branches: a vector that is assigned in a branch goes through memory afterwards, for
+# Warp joins branches by `wp.where`, of which Clang makes a choice between two addresses.
+
+
+@wp.func
+def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, near: Any):
+    """Signed distance and normal of shape s, of a mesh those of its bounding box."""
+    if kind < SOLID_MESH:
+        return distance_solid(kind, x, y, z, a, b, c)
+    gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
+    if kind == HULL and anywhere(near - gap):
+        return distance_hull(shapes, s, x, y, z, near)
+    return gap, nx, ny, nz
+
+
+@wp.func
+def way_into(
+    shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, a: Any, b: Any, c: Any
+):
+    """Where a way that ends at x, y, z and is u long enters a convex shape: see `nuno.contact.distances.way_in`."""
+    if kind == HULL:
+        return way_into_hull(shapes, s, x, y, z, ux, uy, uz)
+    return way_in(kind, x, y, z, ux, uy, uz, a, b, c)
+
+
+@wp.func
+def less_surface(slot: int, u: Any, e: Any, d0: Any, d1: Any, d2: Any, x: Any, y: Any, z: Any):
+    """What a particle moves along one axis, less what a shape's surface moves there."""
+    if slot < 0:
+        return u
+    return u - e - times(d0, x) - times(d1, y) - times(d2, z)
+
+
+@wp.func
+def turned(
+    r00: Any, r01: Any, r02: Any, r10: Any, r11: Any, r12: Any, r20: Any, r21: Any, r22: Any, x: Any, y: Any, z: Any
+):
+    """A direction, turned by a matrix of three rows."""
+    wx = times(r00, x) + times(r01, y) + times(r02, z)
+    wy = times(r10, x) + times(r11, y) + times(r12, z)
+    wz = times(r20, x) + times(r21, y) + times(r22, z)
+    return wx, wy, wz
 
 
 @wp.func
@@ -154,65 +193,34 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
         dy = minus(at(t.y, i), cy)
         dz = minus(at(t.z, i), cz)
         # into the shape's frame
-        x = times(r00, dx) + times(r10, dy) + times(r20, dz)
-        y = times(r01, dx) + times(r11, dy) + times(r21, dz)
-        z = times(r02, dx) + times(r12, dy) + times(r22, dz)
-        gap = z
-        nx = fill(z, 0.0)
-        ny = fill(z, 0.0)
-        nz = fill(z, 1.0)
-        if kind == BOX:
-            gap, nx, ny, nz = distance_box(x, y, z, sa, sb, sc)
-        elif kind == CYLINDER:
-            gap, nx, ny, nz = distance_cylinder(x, y, z, sa, sb)
-        elif kind == SPHERE or kind == CAPSULE:
-            gap, nx, ny, nz = distance_round(x, y, z, sa, sb)
-        elif kind >= SOLID_MESH:
-            gap, nx, ny, nz = distance_box(x, y, z, sa, sb, sc)
-            if kind == HULL and anywhere(near - gap):
-                gap, nx, ny, nz = distance_hull(shapes, s, x, y, z, near)
+        x, y, z = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, dx, dy, dz)
+        gap, nx, ny, nz = distance_shape(shapes, s, kind, x, y, z, sa, sb, sc, near)
         if anywhere(near - gap):
-            ux = at(t.x, i) - at(t.px, i)
-            uy = at(t.y, i) - at(t.py, i)
-            uz = at(t.z, i) - at(t.pz, i)
-            if slot >= 0:
-                ux = ux - ex - times(d00, x) - times(d01, y) - times(d02, z)
-                uy = uy - ey - times(d10, x) - times(d11, y) - times(d12, z)
-                uz = uz - ez - times(d20, x) - times(d21, y) - times(d22, z)
-            if kind == SOLID_MESH or kind == SHELL_MESH:
-                lx = times(r00, ux) + times(r10, uy) + times(r20, uz)
-                ly = times(r01, ux) + times(r11, uy) + times(r21, uz)
-                lz = times(r02, ux) + times(r12, uy) + times(r22, uz)
-                gap, nx, ny, nz = gap_mesh(shapes, s, g, w, x, y, z, lx, ly, lz, sa, sb, sc, radius)
-            wx = times(r00, nx) + times(r01, ny) + times(r02, nz)
-            wy = times(r10, nx) + times(r11, ny) + times(r12, nz)
-            wz = times(r20, nx) + times(r21, ny) + times(r22, nz)
+            ux = less_surface(slot, at(t.x, i) - at(t.px, i), ex, d00, d01, d02, x, y, z)
+            uy = less_surface(slot, at(t.y, i) - at(t.py, i), ey, d10, d11, d12, x, y, z)
+            uz = less_surface(slot, at(t.z, i) - at(t.pz, i), ez, d20, d21, d22, x, y, z)
+            wx, wy, wz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, nx, ny, nz)
             un = times(ux, wx) + times(uy, wy) + times(uz, wz)
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
             passed = -least(gap, gap - un)
-            if (kind < PLANE or kind == HULL) and anywhere(passed):
-                lx = times(r00, ux) + times(r10, uy) + times(r20, uz)
-                ly = times(r01, ux) + times(r11, uy) + times(r21, uz)
-                lz = times(r02, ux) + times(r12, uy) + times(r22, uz)
-                at = gap
-                ax = nx
-                ay = ny
-                az = nz
-                met = gap
-                if kind == HULL:
-                    at, ax, ay, az, met = way_into_hull(shapes, s, x, y, z, lx, ly, lz)
-                else:
-                    at, ax, ay, az, met = way_in(kind, x, y, z, lx, ly, lz, sa, sb, sc)
+            if kind == SOLID_MESH or kind == SHELL_MESH:
+                lx, ly, lz = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, ux, uy, uz)
+                deep, ax, ay, az = gap_mesh(shapes, s, g, w, x, y, z, lx, ly, lz, sa, sb, sc, radius)
+                bx, by, bz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, ax, ay, az)
+                bn = times(ux, bx) + times(uy, by) + times(uz, bz)
+                press(t, i, deep - radius, bx, by, bz, ux, uy, uz, bn, mu, leave)
+            elif kind != PLANE and anywhere(passed):
+                lx, ly, lz = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, ux, uy, uz)
+                deep, ax, ay, az, met = way_into(shapes, s, kind, x, y, z, lx, ly, lz, sa, sb, sc)
                 met = least(met, passed)
-                gap = choose(met, at, gap)
-                nx = choose(met, ax, nx)
-                ny = choose(met, ay, ny)
-                nz = choose(met, az, nz)
-                wx = times(r00, nx) + times(r01, ny) + times(r02, nz)
-                wy = times(r10, nx) + times(r11, ny) + times(r12, nz)
-                wz = times(r20, nx) + times(r21, ny) + times(r22, nz)
-                un = times(ux, wx) + times(uy, wy) + times(uz, wz)
-            press(t, i, gap - radius, wx, wy, wz, ux, uy, uz, un, mu, leave)
+                ax = choose(met, ax, nx)
+                ay = choose(met, ay, ny)
+                az = choose(met, az, nz)
+                bx, by, bz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, ax, ay, az)
+                bn = times(ux, bx) + times(uy, by) + times(uz, bz)
+                press(t, i, choose(met, deep, gap) - radius, bx, by, bz, ux, uy, uz, bn, mu, leave)
+            elif anywhere(radius - gap):
+                press(t, i, gap - radius, wx, wy, wz, ux, uy, uz, un, mu, leave)
 
 
 @wp.func

@@ -279,7 +279,7 @@ def filter_world(
 
 @wp.func
 def pairs_of(pairs: wp.array(dtype=Any), which: int):
-    """Where the list of world ``which`` of a vector stands, which has all pairs' first vertices, then all second ones ..."""
+    """Where the list of world ``which`` of a vector stands: all pairs' first vertices, then all second ones, and so on."""
     return pairs.ptr + wp.uint64(4 * which) * wp.uint64(pairs.shape[0])
 
 
@@ -354,9 +354,9 @@ def pick_world(t: Any, far: float, which: int, lanes: int):
 
 @wp.func
 def reach_world(t: Any, far: float, which: int, lanes: int):
-    """Find the picked pairs of world ``which`` that are nearer than ``far`` [m]: those that a substep may bring together.
+    """Find the picked pairs of world ``which`` that the coming substep may bring together: those nearer than ``far`` [m].
 
-    A substep takes sixteen worlds at once, as many pairs as the one has that has most of them.
+    It takes the worlds of a vector together, as many pairs as the one of them has that has the most.
     """
     skip = wp.uint64(4 * which)
     filter_world(
