@@ -279,7 +279,7 @@ def filter_world(
 
 @wp.func
 def pairs_of(pairs: wp.array(dtype=Any), which: int):
-    """Where the list of world ``which`` of a vector stands: all pairs' first vertices, then all second ones, and so on."""
+    """Where the list of world ``which`` of a vector stands: all first vertices, then all second ones, and so on."""
     return pairs.ptr + wp.uint64(4 * which) * wp.uint64(pairs.shape[0])
 
 
@@ -354,7 +354,7 @@ def pick_world(t: Any, far: float, which: int, lanes: int):
 
 @wp.func
 def reach_world(t: Any, far: float, which: int, lanes: int):
-    """Find the picked pairs of world ``which`` that the coming substep may bring together: those nearer than ``far`` [m].
+    """Find the picked pairs of world ``which`` nearer than ``far`` [m]: those that the coming substep may bring together.
 
     It takes the worlds of a vector together, as many pairs as the one of them has that has the most.
     """
