@@ -354,7 +354,7 @@ def pick_world(t: Any, far: float, which: int, lanes: int):
 
 @wp.func
 def reach_world(t: Any, far: float, which: int, lanes: int):
-    """Find the picked pairs of world ``which`` nearer than ``far`` [m]: those that the coming substep may bring together.
+    """Find the picked pairs of world ``which`` nearer than ``far`` [m]: those that this substep may bring together.
 
     It takes the worlds of a vector together, as many pairs as the one of them has that has the most.
     """

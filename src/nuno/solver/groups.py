@@ -12,7 +12,7 @@ import warp as wp
 
 from nuno.solver.state import Settings
 
-PIECES = 4
+PIECES = 12
 """Launches of a group of lanes in a run, between which threads may change groups."""
 
 _threads: ThreadPoolExecutor | None = None
