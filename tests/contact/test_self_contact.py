@@ -73,6 +73,45 @@ def test_the_margin_changes_no_bit() -> None:
     assert np.array_equal(lifted(PICKS, 0.8, margin=0.28).positions(), lifted(PICKS, 0.8, margin=0.5).positions())
 
 
+def near_edges(x: np.ndarray, edges: np.ndarray, far: float) -> set[tuple[tuple[int, ...], ...]]:
+    """Return the pairs of edges without a common vertex that are nearer than ``far`` [m]."""
+    near = np.argwhere(np.triu(edge_edge_distances(x, edges) < far, 1))
+    pairs = [(edges[a].tolist(), edges[b].tolist()) for a, b in near.tolist()]
+    return {tuple(sorted((tuple(sorted(a)), tuple(sorted(b))))) for a, b in pairs if not set(a) & set(b)}
+
+
+@pytest.mark.parametrize("worlds", [1, 3])
+def test_a_substep_solves_all_pairs_in_reach(worlds: int) -> None:
+    """Brute force over where the last substep began finds no pair within 1.1 thicknesses that it did not look at.
+
+    That is the least that `swept` adds up to. A vertex counts where it is over the triangle; what is beside one belongs
+    to the edges.
+    """
+    solver = lifted(PICKS[5 : 5 + worlds], 0.9)
+    state, faces = solver._state, solver.topology.faces
+    far = 1.1 * float(solver._scalars[0, THICKNESS])
+    count = solver._get(state.touch_count, 2)
+    start = np.stack([solver._get(a, solver.particle_count) for a in (state.px, state.py, state.pz)], axis=-1)
+    found = np.zeros(2, dtype=int)
+    for k in range(worlds):
+        x = start[k].astype(float)
+        rows = solver._get(state.touch_triangle, 4 * solver._size.vertex_triangle)[k].reshape(-1, 4)[: count[k, 0]]
+        have = {(r[0], *sorted(r[1:])) for r in rows.tolist()}
+        a, b, c = (x[faces[:, j]] for j in range(3))
+        normal = np.cross(b - a, c - a)
+        weights = [(np.cross(q - p, x[:, None] - p) * normal).sum(axis=-1) for p, q in ((a, b), (b, c), (c, a))]
+        over = np.min(weights, axis=0) >= 0.0
+        near = np.argwhere(over & (vertex_triangle_distances(x, faces) < far))
+        want = {(i, *sorted(faces[f].tolist())) for i, f in near.tolist() if i not in faces[f]}
+        assert want <= have
+        rows = solver._get(state.touch_edge, 4 * solver._size.edge_edge)[k].reshape(-1, 4)[: count[k, 1]]
+        have = {tuple(sorted((tuple(sorted(r[:2])), tuple(sorted(r[2:]))))) for r in rows.tolist()}
+        edges = near_edges(x, solver.topology.edges.vertices, far)
+        assert edges <= have
+        found += (len(want), len(edges))
+    assert (found > 0).all()
+
+
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_lists_hold_all_near_pairs(worlds: int) -> None:
     """Brute force over all pairs finds none within the thickness and the margin that is not listed."""
@@ -81,20 +120,16 @@ def test_lists_hold_all_near_pairs(worlds: int) -> None:
     edges = solver.topology.edges.vertices
     far = float(solver._scalars[0, THICKNESS]) + solver.settings(0.0, 1e-3, 20).margin
     listed = solver._get(state.listed, solver._size.listed)[:, : 3 * n].reshape(worlds, 3, n).transpose(0, 2, 1)
-    count = solver.pair_counts
     found = 0
     for k in range(worlds):
         x = listed[k].astype(float)
-        rows = solver._get(state.vertex_triangle, 4 * solver._size.vertex_triangle)[k].reshape(-1, 4)[: count[k, 0]]
-        have = {(r[0], *sorted(r[1:])) for r in rows.tolist()}
+        triangles, pairs = solver.listed_pairs(k)
+        have = {(r[0], *sorted(r[1:])) for r in triangles.tolist()}
         near = np.argwhere(vertex_triangle_distances(x, faces) < far)
         want = {(i, *sorted(faces[f].tolist())) for i, f in near.tolist() if i not in faces[f]}
         assert want <= have
-        rows = solver._get(state.edge_edge, 4 * solver._size.edge_edge)[k].reshape(-1, 4)[: count[k, 1]]
-        have = {tuple(sorted((tuple(sorted(r[:2])), tuple(sorted(r[2:]))))) for r in rows.tolist()}
-        near = np.argwhere(np.triu(edge_edge_distances(x, edges) < far, 1))
-        pairs = [(edges[a].tolist(), edges[b].tolist()) for a, b in near.tolist()]
-        want = {tuple(sorted((tuple(sorted(a)), tuple(sorted(b))))) for a, b in pairs if not set(a) & set(b)}
+        have = {tuple(sorted((tuple(sorted(r[:2])), tuple(sorted(r[2:]))))) for r in pairs.tolist()}
+        want = near_edges(x, edges, far)
         assert want <= have
         found += len(want)
     assert found > 10  # the case has folds to find

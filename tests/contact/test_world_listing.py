@@ -42,12 +42,10 @@ def shapes() -> dict[str, np.ndarray]:
 def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) -> tuple[list[np.ndarray], float]:
     """The (k, 4) vertex-triangle and edge-edge rows of the last world of a batch, and how near they are to be [m]."""
     made = ClothSolver(sheet(), nuno.Cloth(thickness=thickness), positions, 0 * positions, substeps=20, plan=plan)
-    state, size, settings = made._state, made._size, made.settings
+    size, settings = made._size, made.settings
     for kind in ("vertex_triangle", "edge_edge"):  # a sheet pressed together lists more than any that moves
         setattr(size, kind, 20 * getattr(size, kind))
-        setattr(state, kind, made._empty(4 * getattr(size, kind), made._integer))
-    state.touch_triangle = made._empty(4 * size.vertex_triangle, made._integer)
-    state.touch_edge = made._empty(4 * size.edge_edge, made._integer)
+    made._allocate_lists()
 
     def with_margin(time: float, dt: float, frame: int) -> object:
         run = settings(time, dt, frame)
@@ -58,8 +56,7 @@ def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) ->
     made.run(0.0, 1e-4)
     count = made.pair_counts[-1]
     assert count[0] <= size.vertex_triangle and count[1] <= size.edge_edge
-    kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
-    rows = [made._get(array, 4 * width)[-1].reshape(-1, 4)[:k] for (array, width), k in zip(kinds, count, strict=True)]
+    rows = made.listed_pairs(len(positions) - 1)
     return rows, float(made._scalars[-1, THICKNESS]) + margin
 
 

@@ -229,10 +229,10 @@ class ClothSolver(ParticleSolver):
         """Zeros, whole numbers, ``count`` a world or group of lanes; on the CPU they take memory once written to."""
         if self._cuda:
             return self._empty(count, self._integer)
-        # a vector is read where the last pairs are fewer
-        rows = self.group_count * count + LANES
-        shape = (rows, self.lanes) if self.lanes > 1 else (rows,)
-        return wp.array(np.zeros(shape, dtype=np.int32), dtype=self._integer, device=self.device, copy=False)
+        rows = self.group_count * count
+        # of the last pairs a whole vector is read, too
+        values = np.zeros((rows + LANES, self.lanes) if self.lanes > 1 else rows + LANES, dtype=np.int32)[:rows]
+        return wp.array(values, dtype=self._integer, device=self.device, copy=False)
 
     def _allocate_help(self) -> None:
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
@@ -253,6 +253,16 @@ class ClothSolver(ParticleSolver):
     def listings(self) -> np.ndarray:
         """(worlds,) float, how often pairs were listed since the state was set."""
         return self._get(self._state.notes, NOTES)[:, LISTINGS]
+
+    def listed_pairs(self, world: int) -> list[np.ndarray]:
+        """The vertices of a world's listed vertex-triangle and edge-edge candidates, (k, 4) int each."""
+        state, size, rows = self._state, self._size, []
+        kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
+        for (array, room), count in zip(kinds, self.pair_counts[world], strict=True):
+            numbers = array.numpy().ravel()[4 * room * world : 4 * room * (world + 1)]
+            by_pair = self._cuda or self.plan in LARGE
+            rows.append((numbers.reshape(room, 4) if by_pair else numbers.reshape(4, room).T)[:count])
+        return rows
 
     def make_room(self) -> bool:
         """Make lists longer that were too short by the last counts; return whether any is.
