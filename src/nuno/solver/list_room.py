@@ -25,7 +25,8 @@ PAIRS = 6, 16
 MORE = 4.0
 """Times that room where memory allows: four layers have 15 and 43 candidates a vertex, many 20 and 56."""
 PAIR_BYTES = 32
-"""[B] A candidate's four vertices, among all and among those that are picked."""
+"""[B] A candidate's four vertices, among all and among those that are picked. (The CPU has a third list, of a substep's
+pairs, but takes memory for what is written only.)"""
 LISTS = 4.0e9
 """[B] That the lists of all worlds may take together for this."""
 MOST_LISTS = 16.0e9
