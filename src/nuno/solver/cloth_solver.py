@@ -203,7 +203,11 @@ class ClothSolver(ParticleSolver):
         self._allocate_lists()
 
     def _allocate_lists(self) -> None:
-        """Room for candidate pairs, none of them listed."""
+        """Room for candidate pairs, none of them listed.
+
+        Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks for one world
+        after the other stands world by world: see `listed_pairs`.
+        """
         state, size, empty = self._state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
         state.edge_edge = self._list(4 * size.edge_edge)

@@ -6,8 +6,8 @@ constraint functions serve both and the plain float: an index is an ``int`` or a
 read and write particles by either. Elements of a colour share no particle, so that the order does not matter and the
 bits are the same in all three.
 
-Lanes and tables are read in C++: Warp's own brackets look whether an index is negative and ask the array for its strides,
-which is more work than what a constraint does with the number.
+Lanes and tables are read in C++: Warp's own brackets look whether an index is negative and ask the array for its
+strides, which is more work than what a constraint does with the number.
 """
 
 import warp as wp
