@@ -205,8 +205,8 @@ class ClothSolver(ParticleSolver):
     def _allocate_lists(self) -> None:
         """Room for candidate pairs, none of them listed.
 
-        Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks for one world
-        after the other stands world by world: see `listed_pairs`.
+        Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks, for one
+        world after the other, stands world by world: see `listed_pairs`.
         """
         state, size, empty = self._state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
