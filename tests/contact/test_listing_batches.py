@@ -19,11 +19,9 @@ def listed(cloth, positions, device):
     )
     made.open(0.0, 1e-3, 20)
     made.step_parts(0, MOTION)
-    state, counts = made._state, made.pair_counts[0]
+    counts = made.pair_counts[0]
     assert counts[0] <= made._size.vertex_triangle and counts[1] <= made._size.edge_edge
-    faces, edges = (
-        a.numpy().reshape(-1, 4)[:k] for a, k in zip((state.vertex_triangle, state.edge_edge), counts, strict=True)
-    )
+    faces, edges = made.listed_pairs(0)
     near = {(int(q[0]), *sorted(map(int, q[1:]))) for q in faces}
     return near, {frozenset((frozenset(map(int, q[:2])), frozenset(map(int, q[2:])))) for q in edges}, made
 

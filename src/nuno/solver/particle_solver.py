@@ -273,13 +273,10 @@ class ParticleSolver:
     @property
     def memory_bytes(self) -> int:
         """Bytes of device memory that this body holds, elements shared by all worlds included."""
-        total = 0
-        holders: tuple[Any, ...] = (self._state, *{self._topology, self._surface})
-        for holder in holders:
-            for name in holder._cls.vars:
-                value = getattr(holder, name)
-                total += value.capacity if isinstance(value, wp.array) else 0
-        return total
+        holders = (self._state, self._topology, self._surface)
+        values = [getattr(holder, name) for holder in holders for name in holder._cls.vars]
+        # some arrays go by two names
+        return sum({value.ptr: value.capacity for value in values if isinstance(value, wp.array)}.values())
 
     # -- what acts on the particles
 
