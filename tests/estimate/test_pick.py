@@ -73,6 +73,14 @@ def result(seen):
     return nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE]))
 
 
+def test_what_was_learned_is_asked_unless_left_out(result, seen):
+    """The truth is found without it too, by other evidence: that of the hand-made likelihood alone."""
+    without = nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE], learned=False))
+    assert without.best == seen[1]
+    assert np.abs(without.scores - result.scores).max() > 0.1
+    np.testing.assert_allclose(without.eq1, result.eq1, atol=1e-12)  # same futures, of which it changes nothing
+
+
 def test_the_picked_point_is_found(result, seen):
     """The best of 36 is the point that was picked, and the rest are ranked behind it."""
     assert result.best == seen[1]

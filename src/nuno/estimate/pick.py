@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
+from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
@@ -63,6 +65,7 @@ def estimate_pick(
     discretisations: Sequence[Discretisation] = DISCRETISATIONS,
     sure: float = SURE,
     turns: Sequence[float] = TURNS,
+    learned: bool = True,
     score: str = "evidence",
     device: str = "auto",
     progress: bool | None = None,
@@ -101,6 +104,8 @@ def estimate_pick(
         sure: The rest of them is left out once a candidate is as likely as this, where evidence ranks; 1 runs all.
         turns: Angles [rad] about the hand's vertical by which every future is turned to be compared, 0 among them;
             "chamfer", "iou" and "eq1" look at 0 only.
+        learned: Whether a network that was trained on imagined picks has a say in the likelihood of silhouettes
+            (`nuno.estimate.learned`); "chamfer", "iou" and "eq1" are without it.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -168,6 +173,7 @@ def estimate_pick(
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
     ranked: Ranked | None = None
+    outline: Outline | None = None
     for discretisation in with_bar(discretisations, "imagining", progress, "mesh"):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
@@ -186,10 +192,17 @@ def estimate_pick(
             futures, seen.camera, seen.silhouette, table, pattern=seen.pattern, turns=angles, hand=hand_at,
             coarse=seen.coarse,
         )  # fmt: skip
-        comparisons.append(Comparison(
+        comparison = Comparison(
             chosen, angles, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
             None if seen.pattern is None else values["pattern"],
-        ))  # fmt: skip
+        )  # fmt: skip
+        if learned and score in EVIDENCE:
+            if not comparisons:
+                outline = outline_of(seen.mask, seen.hidden, camera, hand_at)
+            if outline is not None:
+                added = correction(outline, futures, comparison, table, hand_at)
+                comparison = replace(comparison, correction=added)
+        comparisons.append(comparison)
         batches.append(futures)
         ranked = rank(comparisons, score, len(uv))
         seconds["compare"] += time.perf_counter() - clock

@@ -7,7 +7,8 @@ likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a consta
 heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
 independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
-(docs/accuracy.md).
+(docs/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
+(`nuno.estimate.learned`).
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ class Comparison:
         eq1: The paper's eq. (1).
         finite: Whether the future's state is a number, (guesses, c).
         pattern: How badly the cloth's pattern fits, see `nuno.estimate.appearance`; None where only masks are known.
+        correction: What is added to every guess's log likelihood, (guesses, c), see `nuno.estimate.learned`; None is
+            nothing.
     """
 
     candidates: np.ndarray
@@ -53,6 +56,7 @@ class Comparison:
     eq1: np.ndarray
     finite: np.ndarray
     pattern: np.ndarray | None = None
+    correction: np.ndarray | None = None
 
     def error(self, score: str) -> np.ndarray:
         """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
@@ -64,6 +68,8 @@ class Comparison:
             if score == "evidence" and self.pattern is not None:
                 error = error + PATTERN_WEIGHT * self.pattern
             error = error - log_prior(self.turns)[:, None, None]
+            if self.correction is not None:
+                error = error - self.correction
         else:
             error = self.chamfer if score == "chamfer" else 1.0 - getattr(self, score)
             error = np.where(self.turns[:, None, None] == 0.0, error, np.inf)

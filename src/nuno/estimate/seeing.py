@@ -34,6 +34,7 @@ class Seen:
 
     Attributes:
         mask: (h, w) bool, the cloth.
+        hidden: (h, w) bool, pixels of the hand and of what else hides the cloth.
         camera: The camera at `IMAGE_SCALE`.
         silhouette: The cloth's silhouette there, without what the hand hides.
         coarse: The same at `TURNED_SCALE`.
@@ -42,6 +43,7 @@ class Seen:
     """
 
     mask: np.ndarray
+    hidden: np.ndarray
     camera: Camera
     silhouette: Silhouette
     coarse: tuple[Camera, Silhouette]
@@ -86,7 +88,7 @@ def begin_to_see(
         pattern = None
         if with_pattern and before is not None and after is not None:
             pattern = find_pattern(before, after, mask & ~ignored, rectangle, camera, hand)
-        return Seen(mask, small, silhouette, coarse, pattern, _oddities(mask, ignored) + _doubts(mask, doubt))
+        return Seen(mask, ignored, small, silhouette, coarse, pattern, _oddities(mask, ignored) + _doubts(mask, doubt))
 
     if not meanwhile:
         seen = look()

@@ -1,0 +1,60 @@
+"""The network that looks at two silhouettes: its layers, its weights, and what it tells apart."""
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from scipy.signal import correlate2d
+
+from nuno.estimate.outline_net import SCALARS, SIZE, _convolved, log_ratios, weights
+
+TYPICAL = (np.log(8.0), 0.8, 0.0, 0.0, -0.4, 0.5, 1.0)
+"""8 px off, four fifths in common, not turned, held at the top, pixels of 1 cm."""
+
+
+def pictures(*widths):
+    """Cloths (n, SIZE, SIZE) that hang from a point, as wide at the bottom as is said [px]."""
+    y, x = np.mgrid[:SIZE, :SIZE]
+    inside = (y >= 8) & (y < 56)
+    return np.stack([inside & (np.abs(x - 31.5) <= 2 + w / 2 * (y - 8) / 48) for w in widths]).astype(float)
+
+
+@pytest.mark.parametrize(("side", "stride"), [(5, 2), (3, 1), (3, 2)])
+def test_a_layer_is_a_correlation(side, stride):
+    """As SciPy has it with a rim of zeros; float32 sums of 75 products keep six digits."""
+    rng = np.random.default_rng(side + stride)
+    x, layer = rng.normal(size=(2, 12, 16, 3)), rng.normal(size=(4, side, side, 3))
+    found = _convolved(x.astype(np.float32), layer.reshape(4, -1).astype(np.float32), stride)
+    for n in range(2):
+        for k in range(4):
+            sums = sum(correlate2d(x[n, ..., c], layer[k, ..., c], mode="same") for c in range(3))
+            np.testing.assert_allclose(found[n, ..., k], sums[::stride, ::stride], atol=2e-5)
+
+
+def test_the_weights_fit_the_layers():
+    """Each reads what the one before gives; the file is below 1 MB, as a package may hold it."""
+    net, channels = weights(), 2
+    for k, side in enumerate((5, 3, 3, 3, 3)):
+        assert net[f"conv{k}"].shape == (len(net[f"conv{k}.bias"]), side * side * channels)
+        channels = len(net[f"conv{k}.bias"])
+    assert net["dense"].shape[1] == channels * (SIZE // 16) ** 2
+    assert net["mix"].shape[1] == len(net["dense"]) + SCALARS and net["narrow"].shape[1] == len(net["mix"])
+    assert net["ratio"].shape == (1, len(net["narrow"])) and net["mean"].shape == net["deviation"].shape == (SCALARS,)
+    assert all(value.dtype == np.float32 and np.isfinite(value).all() for value in net.values())
+    assert len((files("nuno.estimate") / "outline_net.npz").read_bytes()) < 1e6
+
+
+def test_a_pair_is_judged_alike_in_any_company():
+    """The same bits when asked again; alone or among 40 the same to float32's rounding in sums of 1,536."""
+    imagined, scalars = pictures(*range(40)), np.tile(TYPICAL, (40, 1))
+    found = log_ratios(pictures(20)[0], imagined, scalars)
+    assert found.shape == (40,) and np.isfinite(found).all()
+    np.testing.assert_array_equal(found, log_ratios(pictures(20)[0], imagined, scalars))
+    np.testing.assert_allclose(log_ratios(pictures(20)[0], imagined[7:8], scalars[7:8])[0], found[7], atol=1e-3)
+    assert log_ratios(pictures(20)[0], imagined[:0], scalars[:0]).shape == (0,)
+
+
+def test_the_same_shape_is_likelier_than_another():
+    """By what the pictures show: all else that it is told is the same for the pairs."""
+    found = log_ratios(pictures(24)[0], pictures(24, 48), np.tile(TYPICAL, (2, 1)))
+    assert found[0] > found[1] + 1.0
