@@ -26,7 +26,7 @@ OVERLAP_WEIGHT = 10.0
 PATTERN_WEIGHT = 25.0
 EVIDENCE = ("evidence", "silhouette")
 """The rankings that average over guesses and turns."""
-SURE = 0.95
+SURE = 0.98
 """A candidate as likely as this after some of the guesses stayed the best one after all, in all cases made for choosing
 (docs/accuracy.md)."""
 SHARE = 0.97
