@@ -160,11 +160,11 @@ class CoupledBodies:
 
     def _surface(self, body: Body) -> SurfaceOfRigid:
         own: Any = body._dynamics
-        parts, points = [], []
+        parts, points, radii = [], [], []
         for part in own.parts:
             place = (np.zeros(3) if part.position is None else part.position) - own.centre
             turn = quat.IDENTITY if part.quaternion is None else part.quaternion
-            kind, mesh, corners = KINDS[part.kind], None, np.zeros((0, 3))
+            kind, mesh, corners, round_by = KINDS[part.kind], None, np.zeros((0, 3)), 0.0
             radius = float(np.linalg.norm(np.maximum(np.abs(part.low), np.abs(part.high))))
             if kind == BOX:
                 signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
@@ -176,9 +176,15 @@ class CoupledBodies:
             elif kind == SOLID_MESH:
                 corners = part.corners
                 mesh = self._hull_mesh(part)
+            else:
+                # balls along the axis of a capsule, so near that what touches between two is a 32nd of the radius off
+                round_by, along = part.half[0], part.half[1] if kind == CAPSULE else 0.0
+                corners = np.insert(np.zeros((1 + int(np.ceil(4 * along / round_by)), 2)), 2, 0.0, axis=1)
+                corners[:, 2] = np.linspace(-along, along, len(corners)) if along else 0.0
             parts.append(RigidPart(kind, part.half, place, turn, radius, mesh))
             points.append(place + quat.rotate(turn, corners))
-        return SurfaceOfRigid(own.slot, tuple(parts), np.concatenate(points))
+            radii.append(np.full(len(corners), round_by))
+        return SurfaceOfRigid(own.slot, tuple(parts), np.concatenate(points), np.concatenate(radii))
 
     def _hull_mesh(self, part: Any) -> Any:
         faces = np.concatenate([np.stack([np.full(len(r) - 2, r[0]), r[1:-1], r[2:]], axis=1) for r in part.loops])

@@ -86,6 +86,7 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
     n = wp.vec3(0.0, 0.0, 1.0)
     weights = wp.vec4(1.0, 0.0, 0.0, 0.0)
     inside = float(1.0)
+    radius = float(0.0)
     if kind == VERTEX_TRIANGLE:
         x = particles.p[first + q[0]]
         height, n0, b = over_triangle(
@@ -119,20 +120,24 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
         n = wp.quat_rotate(turn, normal)
         rows.point[r] = x - normal * gap
     else:
-        x = point_before(rigid, world * rigid.capacity + rows.slot[r], rows.point[r])
+        i = world * rigid.capacity + rows.slot[r]
+        point = elements.point[rows.part[r]]
+        radius = elements.point_radius[rows.part[r]]
+        x = point_before(rigid, i, point)
         height, n0, b = over_triangle(
             x, particles.p[first + q[0]], particles.p[first + q[1]], particles.p[first + q[2]]
         )
         side = wp.where(height < 0.0, 1.0, -1.0)
         if elements.solid[bodies[0]] != 0:
             side = -1.0
-        gap = -height * side
+        gap = -height * side - radius
         n = n0 * side
+        rows.point[r] = point + wp.quat_rotate_inv(rigid.rotation_before[i], n) * radius
         weights = wp.vec4(b[0], b[1], b[2], 0.0)
         inside = wp.min(b[0], wp.min(b[1], b[2])) + 1.0e-3
     if inside <= 0.0 or gap > apart + reach:
         return
-    inner = apart + reach
+    inner = apart + reach + radius
     if bodies[0] == bodies[1]:
         # the far side of a thin part is inside of it too
         inner = apart

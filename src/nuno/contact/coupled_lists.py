@@ -36,8 +36,9 @@ class Elements:
     part_turn: wp.array(dtype=wp.quat)
     part_radius: wp.array(dtype=float)
     part_mesh: wp.array(dtype=wp.uint64)
-    # corners of rigid bodies, in their bodies' frames
+    # corners of rigid bodies, and the middles of what is round with its radius, in their bodies' frames
     point: wp.array(dtype=wp.vec3)
+    point_radius: wp.array(dtype=float)
     point_slot: wp.array(dtype=int)
     point_body: wp.array(dtype=int)
     # tables by world and pair of bodies, and by world and body
@@ -242,11 +243,12 @@ def list_point(
     particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, bvh: wp.uint64, root: int,
     world: int, k: int, far: float,
 ):  # fmt: skip
-    """Triangles near corner k of a rigid body."""
+    """Triangles near corner k of a rigid body, or near what is round about it."""
     slot = elements.point_slot[k]
     body = elements.point_body[k]
     x = point_of(rigid, world * rigid.capacity + slot, elements.point[k])
-    reach = wp.vec3(far, far, far)
+    around = far + elements.point_radius[k]
+    reach = wp.vec3(around, around, around)
     query = wp.bvh_query_aabb(bvh, x - reach, x + reach, root)
     hit = int(0)
     while wp.bvh_query_next(query, hit):
@@ -254,9 +256,9 @@ def list_point(
         other = elements.triangle_body[t]
         if may_touch(elements, world, body, other):
             f = elements.triangle[t]
-            if near_triangle(particles, world * particles.count, x, f, far):
+            if near_triangle(particles, world * particles.count, x, f, around):
                 corners = wp.vec4i(f[0], f[1], f[2], -1)
-                add_row(rows, world, TRIANGLE_RIGID, corners, slot, -1, wp.vec2i(other, body), elements.point[k])
+                add_row(rows, world, TRIANGLE_RIGID, corners, slot, k, wp.vec2i(other, body), elements.point[k])
 
 
 @wp.kernel(enable_backward=False, module="nuno.contact.coupled_lists")

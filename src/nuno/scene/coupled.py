@@ -62,12 +62,14 @@ class SurfaceOfRigid:
     Attributes:
         slot: The body's number in the rigid solver.
         parts: What it is made of.
-        points: (k, 3) float [m], its corners, in the frame of the centre of mass.
+        points: (k, 3) float [m], its corners and the middles of what is round, in the frame of the centre of mass.
+        radii: (k,) float [m], how far it reaches about each of these.
     """
 
     slot: int
     parts: tuple[RigidPart, ...]
     points: np.ndarray
+    radii: np.ndarray
 
 
 def make_elements(
@@ -132,6 +134,7 @@ def make_elements(
     made.part_radius = put([p[2].radius for p in parts], float)
     made.part_mesh = put([0 if p[2].mesh is None else p[2].mesh.id for p in parts], wp.uint64)
     made.point = put(joined([p[2] for p in points], 3), wp.vec3)
+    made.point_radius = put(joined([surface.radii for surface in rigid]), float)
     made.point_slot = put(joined([np.full(len(p[2]), p[0]) for p in points]), int)
     made.point_body = put(joined([np.full(len(p[2]), p[1]) for p in points]), int)
     made.vertices, made.triangles, made.edges = made.vertex.shape[0], made.triangle.shape[0], made.edge.shape[0]
