@@ -179,8 +179,8 @@ class CoupledBodies:
             else:
                 # balls along the axis of a capsule, so near that what touches between two is a 32nd of the radius off
                 round_by, along = part.half[0], part.half[1] if kind == CAPSULE else 0.0
-                corners = np.insert(np.zeros((1 + int(np.ceil(4 * along / round_by)), 2)), 2, 0.0, axis=1)
-                corners[:, 2] = np.linspace(-along, along, len(corners)) if along else 0.0
+                corners = np.zeros((1 + int(np.ceil(4 * along / round_by)), 3))
+                corners[:, 2] = np.linspace(-along, along, len(corners))
             parts.append(RigidPart(kind, part.half, place, turn, radius, mesh))
             points.append(place + quat.rotate(turn, corners))
             radii.append(np.full(len(corners), round_by))
