@@ -24,6 +24,7 @@ from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import (
     FEW_THREADS,
+    MANY_AT_ONCE,
     MANY_THREADS,
     run_blocks,
     run_blocks_many,
@@ -58,6 +59,9 @@ from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
+TURN_FRAMES = 15
+"""Frames that a world is advanced by before another has its turn, where worlds queue up for a CUDA device: so few that
+blocks end at about the same time, and so many that to read and write a world costs nothing beside them."""
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
@@ -309,11 +313,15 @@ class ClothSolver(ParticleSolver):
             if self._state.helpers and substeps > 1:
                 blocks += self._state.helpers
                 self._state.help.zero_()
-            threads = FEW_THREADS if self.world_count <= wp.get_device(self.device).sm_count else MANY_THREADS
-            wp.launch(
-                kernel, dim=blocks * threads, inputs=[*common, substeps, threads],
-                device=self.device, block_dim=threads,
-            )  # fmt: skip
+            cores = wp.get_device(self.device).sm_count
+            threads = FEW_THREADS if self.world_count <= cores else MANY_THREADS
+            inputs = [*common, substeps, threads]
+            if kernel is run_blocks_many:
+                blocks = min(blocks, cores * MANY_AT_ONCE)
+                # worlds that find room together have the whole run for their turn
+                inputs.append(substeps if blocks == self.world_count else min(substeps, TURN_FRAMES * run.frame))
+                self._state.help.zero_()
+            wp.launch(kernel, dim=blocks * threads, inputs=inputs, device=self.device, block_dim=threads)
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)

@@ -24,6 +24,7 @@ from nuno.solver.shared_memory import (
     whole,
 )
 from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
+from nuno.solver.turns import end_turn, next_turn
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
@@ -192,11 +193,21 @@ def run_blocks_shared(
 
 @wp.kernel(enable_backward=False, launch_bounds=(MANY_THREADS, MANY_AT_ONCE), module="nuno.solver.run_blocks_many")
 def run_blocks_many(
-    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int, turn: int
 ):
-    """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor."""
-    tid = wp.tid()
-    advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+    """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor.
+
+    A block advances a world by ``turn`` substeps, whole frames unless that is all, and goes on to the next in turn.
+    """
+    thread = wp.tid() % threads
+    turns = s.worlds * ((substeps + turn - 1) / turn)
+    k = next_turn(s.help, s.worlds, turns)
+    while k < turns:
+        world = k % s.worlds
+        left = substeps - k / s.worlds * turn
+        advance_blocks_shared(s, topo, size, run, shapes, wp.min(turn, left), world, thread, threads)
+        end_turn(s.help, world)
+        k = next_turn(s.help, s.worlds, turns)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_fine_blocks")

@@ -1,0 +1,57 @@
+"""Worlds that take turns: where there are more than a CUDA device has room for, each is advanced by a few frames at a time.
+
+With a block per world for a whole run, the last blocks of a launch would leave most of the device idle for as long as
+a run of one takes, a twentieth of the time of twenty worlds for each place. So there are as many blocks as fit, and each
+takes the next of all turns: those of all worlds, one world after the other, then the second turns of all, and so on. The
+turn before of the same world was given out long ago, and to a block that is running; only if it is not over does a
+block wait for it, and so the launch ends however many blocks there is room for. What is computed is the same.
+"""
+
+import warp as wp
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__shared__ int next;
+// all have done with what was shared, and read the last number
+__syncthreads();
+if (threadIdx.x == 0) {
+    const int k = atomicAdd(help.data + 1, 1);
+    if (k < turns) {
+        volatile int* over = help.data + 8 * (k % worlds);
+        while (*over < k / worlds) __nanosleep(200);
+        // what the block before wrote of this world is seen from here on
+        __threadfence();
+    }
+    next = k;
+}
+__syncthreads();
+return next;
+#else
+return turns;
+#endif
+""")
+def next_turn(help: wp.array(dtype=int), worlds: int, turns: int) -> int:
+    """Take the next of all turns, once the same world's turn before is over; ``turns`` or more says that none is left.
+
+    Args:
+        help: `State.help`, which nobody needs where worlds queue up, zero before the launch: of each world how many
+            turns are over, and at place 1 how many are given out.
+        worlds: How many worlds there are.
+        turns: How many turns all of them have.
+    """
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+__syncthreads();
+if (threadIdx.x == 0) {
+    __threadfence();
+    atomicAdd(help.data + 8 * world, 1);
+}
+#endif
+""")
+def end_turn(help: wp.array(dtype=int), world: int):
+    """Say that a world's turn is over, once all threads of the block have done with it."""
+    ...
