@@ -19,12 +19,16 @@ from nuno.surface import SurfacePoints
 from nuno.world import World
 
 if TYPE_CHECKING:
+    import warp as wp
+
     from nuno.body import Body
 
 LIFT_SECONDS = 1.5
 """[s] How long the hand's motion takes where it is not known."""
 SETTLE_SECONDS = 2.5
 """[s] At most so long the cloth may take to come to rest in the hand."""
+LOOK_SECONDS = 0.25
+"""[s] After so long each it is asked whether it has."""
 REST_SPEED = 0.03
 """[m/s] Below this root mean square speed a cloth counts as at rest: under 1 mm between two looks at it."""
 DRAWN_THICKNESS = 0.002
@@ -54,6 +58,15 @@ class Futures:
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool: which futures' states are numbers."""
         return solver_of(self.body).finite().reshape(len(self.discretisation.spread), self.candidates)
+
+    @property
+    def positions(self) -> wp.array:
+        """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
+        return solver_of(self.body).positions_on_device()
+
+    def whole(self, world: int) -> tuple[Futures, int]:
+        """The batch whose world is as these futures are, and the place in it of number ``world`` of these."""
+        return self, world
 
 
 def solver_of(body: Body) -> Any:
@@ -88,7 +101,7 @@ def is_turned(rectangle: ClothRectangle) -> bool:
     return bool(along[0] * across[1] - along[1] * across[0] < 0)
 
 
-def imagine_picks(
+def begin_picks(
     rectangle: ClothRectangle,
     candidates: np.ndarray,
     grid: tuple[int, int],
@@ -100,19 +113,7 @@ def imagine_picks(
     device: str,
     lift_seconds: float = LIFT_SECONDS,
 ) -> Futures:
-    """Pick the cloth at every candidate under every hypothesis, move it to the hand and let it come to rest.
-
-    Args:
-        rectangle: The cloth before.
-        candidates: (k, 2) float, (u, v) in [0, 1] along the longer and shorter side from C00.
-        grid: Candidates along both sides, where they form a grid: the mesh gets vertices there.
-        discretisation: Mesh, step, hypotheses.
-        table: The table.
-        hand: (3,) float, where the picked point ends [m].
-        rest_height: Height of the cloth's middle surface above the table [m].
-        device: Where to simulate.
-        lift_seconds: Duration of the hand's motion [s], on a straight line with minimum jerk.
-    """
+    """What `imagine_picks` does before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=discretisation.substeps)
     k, spread = len(candidates), discretisation.spread
@@ -159,17 +160,54 @@ def imagine_picks(
         "minimum_jerk",
     )
     futures.grip(body, where, to=path)
-    futures.run(lift_seconds, progress=False)
-    settled, chunk = 0.0, 0.25
-    while settled < SETTLE_SECONDS:
-        futures.run(chunk, progress=False)
-        settled += chunk
-        if rest_speed(body) < REST_SPEED:
-            break
     return Futures(futures, body, world, k, discretisation)
+
+
+def imagine_picks(
+    rectangle: ClothRectangle,
+    candidates: np.ndarray,
+    grid: tuple[int, int],
+    discretisation: Discretisation,
+    *,
+    table: Table,
+    hand: np.ndarray,
+    rest_height: float,
+    device: str,
+    lift_seconds: float = LIFT_SECONDS,
+) -> Futures:
+    """Pick the cloth at every candidate under every hypothesis, move it to the hand and let it come to rest.
+
+    Args:
+        rectangle: The cloth before.
+        candidates: (k, 2) float, (u, v) in [0, 1] along the longer and shorter side from C00.
+        grid: Candidates along both sides, where they form a grid: the mesh gets vertices there.
+        discretisation: Mesh, step, hypotheses.
+        table: The table.
+        hand: (3,) float, where the picked point ends [m].
+        rest_height: Height of the cloth's middle surface above the table [m].
+        device: Where to simulate.
+        lift_seconds: Duration of the hand's motion [s], on a straight line with minimum jerk.
+    """
+    futures = begin_picks(
+        rectangle, candidates, grid, discretisation, table=table, hand=hand, rest_height=rest_height, device=device,
+        lift_seconds=lift_seconds,
+    )  # fmt: skip
+    futures.world.run(lift_seconds, progress=False)
+    settled = 0.0
+    while settled < SETTLE_SECONDS:
+        futures.world.run(LOOK_SECONDS, progress=False)
+        settled += LOOK_SECONDS
+        if rest_speed(futures.body) < REST_SPEED:
+            break
+    return futures
 
 
 def rest_speed(body: Body) -> float:
     """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
+    return float(np.percentile(mean_speeds(body), 90))
+
+
+def mean_speeds(body: Body) -> np.ndarray:
+    """(worlds,) float, a cloth's root mean square speed in each [m/s]."""
     vx, vy, vz = solver_of(body).velocities_apart()
-    return float(np.percentile(np.sqrt((vx * vx + vy * vy + vz * vz).mean(axis=-1)), 90))
+    return np.asarray(np.sqrt((vx * vx + vy * vy + vz * vz).mean(axis=-1)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table, table_margin
 from nuno.device import checked_device, found_device
-from nuno.errors import EstimationError, InvalidInputError
+from nuno.errors import EstimationError, InvalidInputError, SimulationDiverged
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
@@ -30,6 +31,7 @@ from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
 from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
+from nuno.estimate.together import Together, alike, has_room, imagine_together
 from nuno.estimate.turns import TURNS, checked_turns
 from nuno.progress import with_bar, with_clock
 from nuno.validation import finite_array, number
@@ -174,15 +176,26 @@ def estimate_pick(
     batches: list[Futures] = []
     ranked: Ranked | None = None
     outline: Outline | None = None
-    for discretisation in with_bar(discretisations, "imagining", progress, "mesh"):
+    settings: dict[str, Any] = dict(
+        rectangle=rectangle, grid=grid, table=table, hand=hand_at, rest_height=rest_height, device=device,
+        lift_seconds=lift_seconds,
+    )  # fmt: skip
+    ahead: Together | None = None
+    for k, discretisation in enumerate(with_bar(discretisations, "imagining", progress, "mesh")):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
         if ranked is not None and discretisation.best is not None:
             chosen = ranked.plausible(discretisation.best)
-        futures = imagine_picks(
-            rectangle, uv[chosen], grid, discretisation, table=table, hand=hand_at, rest_height=rest_height,
-            device=device, lift_seconds=lift_seconds,
-        )  # fmt: skip
+        futures: Futures | None = None
+        if ranked is not None and has_room(device):
+            futures = None if ahead is None else ahead.part(discretisation, chosen)
+            stages = alike(discretisations[k:])
+            if futures is None and len(stages) > 1:
+                with suppress(SimulationDiverged):  # then each stage is by itself
+                    ahead = imagine_together(stages, chosen, uv, **settings)
+                    futures = ahead.part(discretisation, chosen)
+        if futures is None:
+            futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **settings)
         seconds["imagine"] += time.perf_counter() - clock
         clock = time.perf_counter()
         seen = wait_for_seen()
@@ -214,12 +227,13 @@ def estimate_pick(
     clock = time.perf_counter()
     chosen_batch, best_index, best_turn = _most_alike(comparisons, score, int(ranked.order[0]))
     masks = _masks(comparisons, batches, score, seen.camera, table, hand_at)
+    best_batch, best_index = batches[chosen_batch].whole(best_index)
     seconds["compare"] += time.perf_counter() - clock
     seconds["total"] = time.perf_counter() - started
     result = PickResult(
         labels=labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name,
         eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds,
-        futures=batches[chosen_batch], best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
+        futures=best_batch, best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
         real=seen.silhouette, image_before=image_before, image_after=image_after, mask_before=mask_before,
         mask_after=seen.mask, seen_warnings=seen.warnings,
     )  # fmt: skip

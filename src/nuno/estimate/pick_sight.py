@@ -19,7 +19,7 @@ from nuno.camera.table import Table
 from nuno.camera.view import Region, View, view
 from nuno.estimate import appearance, similarity
 from nuno.estimate.appearance import Pattern, begin_pattern
-from nuno.estimate.futures import DRAWN_THICKNESS, Futures, solver_of
+from nuno.estimate.futures import DRAWN_THICKNESS, Futures
 from nuno.estimate.similarity import Silhouette, begin_scores
 from nuno.estimate.turns import turn, view_of_turned
 
@@ -53,7 +53,7 @@ def score_futures(
     shape = (len(futures.discretisation.spread), futures.candidates)
     device = futures.world.device
     angles = [float(angle) for angle in turns]
-    positions = solver_of(futures.body).positions_on_device()
+    positions = futures.positions
     faces = _on_device(futures.body.faces, wp.vec3i, device)
     finite = futures.finite.ravel()
     seen = {angle: (camera, real) if coarse is None or angle == 0.0 else coarse for angle in angles}
@@ -121,7 +121,7 @@ def draw_futures(
         angle: By how much the cloth is turned [rad] about the vertical through ``hand`` (3,) [m].
         hand: That point.
     """
-    positions = solver_of(futures.body).positions_on_device()
+    positions = futures.positions
     faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
     (region,) = regions_of(positions, [view_of_turned(camera, hand, angle)], margin=MARGIN)
     return _drawn(futures, positions, faces, camera, region, table, angle, hand), region
@@ -131,7 +131,7 @@ def masks_of_turned(
     futures: Futures, worlds: np.ndarray, turns: np.ndarray, camera: Camera, table: Table, hand: ArrayLike
 ) -> np.ndarray:
     """Masks (k, h, w) bool of some worlds (k,) of a batch, each at a turn (k,) [rad] of its own."""
-    positions = solver_of(futures.body).positions_on_device()
+    positions = futures.positions
     moved = np.stack([turn(p, hand, a) for p, a in zip(positions.numpy()[worlds], turns, strict=True)])
     turned = _on_device(moved, wp.vec3, positions.device)
     (region,) = regions_of(turned, [camera], margin=MARGIN)
