@@ -21,7 +21,8 @@ pattern is blurred to `BLUR`: finer detail would ask for futures that are right 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -73,6 +74,21 @@ class Pattern:
     image: np.ndarray
     weights: np.ndarray
     variance: float
+    _on: dict[str, tuple[wp.array, wp.array, wp.array]] = field(default_factory=dict)
+
+    def on(self, device: str | wp.Device) -> tuple[wp.array, wp.array, wp.array]:
+        """Texture, image and weights on a device, for this pattern and those that differ from it by the camera."""
+        name = str(wp.get_device(device))
+        if name not in self._on:
+            self._on[name] = (
+                _upload(self.texture, wp.vec3, device), _upload(self.image, wp.vec3, device),
+                _upload(self.weights, float, device),
+            )  # fmt: skip
+        return self._on[name]
+
+
+def _upload(values: np.ndarray, dtype: type, device: Any) -> wp.array:
+    return wp.array(np.ascontiguousarray(values, dtype=np.float32), dtype=dtype, device=device)
 
 
 def find_pattern(
@@ -253,18 +269,13 @@ def begin_pattern(
     device, worlds, height = keys.device, keys.shape[0], keys.shape[1]
     region, camera = pattern.region, pattern.camera
     u, v = np.meshgrid(np.arange(region.width) + region.x0, np.arange(region.height) + region.y0)
-
-    def upload(values: np.ndarray, dtype: type) -> wp.array:
-        return wp.array(np.ascontiguousarray(values, dtype=np.float32), dtype=dtype, device=device)
-
     kinds = (wp.mat44, wp.vec4, wp.mat44, wp.vec4, wp.vec2)
     sums = [wp.empty((worlds, height), dtype=kind, device=device) for kind in kinds]
     wp.launch(
         _sum_rows, dim=(worlds, height), device=device,
         inputs=[
-            keys, positions, faces, upload(uv, wp.vec2), upload(pattern.texture, wp.vec3),
-            upload(pattern.image, wp.vec3), upload(pattern.weights, float),
-            upload(camera.rays(np.stack([u, v], axis=-1)), wp.vec3),
+            keys, positions, faces, _upload(uv, wp.vec2, device), *pattern.on(device),
+            _upload(camera.rays(np.stack([u, v], axis=-1)), wp.vec3, device),
             wp.vec3(*camera.camera_to_world[:3, 3].tolist()), wp.vec3(*pattern.mean.tolist()),
         ],
         outputs=sums,

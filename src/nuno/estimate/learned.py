@@ -60,8 +60,11 @@ class Outline:
 
     def cut(self, masks: np.ndarray) -> np.ndarray:
         """(n, SIZE, SIZE) float, the pictures of masks (n, h, w)."""
-        visible = (masks & ~self.hidden).astype(np.float32)
-        return np.asarray(self.down @ visible @ self.across.T)
+        # the part of the image that the picture shows
+        shown = (np.flatnonzero(weights.any(axis=0)) for weights in (self.down, self.across))
+        rows, columns = (slice(k[0], k[-1] + 1) for k in shown)
+        visible = (masks[:, rows, columns] & ~self.hidden[rows, columns]).astype(np.float32)
+        return np.asarray(self.down[:, rows] @ visible @ self.across[:, columns].T)
 
 
 def outline_of(mask: np.ndarray, hidden: np.ndarray, camera: Camera, hand: ArrayLike) -> Outline | None:

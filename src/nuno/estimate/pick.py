@@ -6,6 +6,7 @@ The experiment is that of Ueda et al. on the state of a picked-up cloth, its eq.
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -165,7 +166,8 @@ def estimate_pick(
         image_before, image_after, mask_before,
         None if after_mask is None else check_mask(after_mask, camera, "after_mask"),
         camera=camera, table=table, rectangle=rectangle, hand=hand_at, hand_radius=hand_radius, hidden=covered,
-        with_pattern=score == "evidence", meanwhile=device != "cpu",
+        with_pattern=score == "evidence",
+        meanwhile=device != "cpu" or len(os.sched_getaffinity(0)) > 1,
     )  # fmt: skip
     seconds["see"] = time.perf_counter() - clock
     with with_clock("compiling kernels, which are kept for later runs", progress):

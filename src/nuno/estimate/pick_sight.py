@@ -27,6 +27,7 @@ MARGIN = 4
 """[px] around a cloth's vertices: it is drawn thicker than they tell."""
 
 Scores = dict[str, np.ndarray]
+Ground = tuple[wp.array, wp.array] | None
 
 
 def score_futures(
@@ -59,12 +60,14 @@ def score_futures(
     seen = {angle: (camera, real) if coarse is None or angle == 0.0 else coarse for angle in angles}
     regions = regions_of(positions, [view_of_turned(seen[a][0], hand, a) for a in angles], margin=MARGIN)
     around = dict(zip(angles, regions, strict=True))
+    ground = _ground(futures, table, device)
+    compare = None if pattern is None else _pattern_comparison(futures, positions, faces, pattern, ground, hand)
 
     def begin(angle: float) -> Callable[[], Scores]:
         seen_by, silhouette = seen[angle]
-        keys = _drawn(futures, positions, faces, seen_by, around[angle], table, angle, hand)
+        keys = _drawn(positions, faces, seen_by, around[angle], ground, angle, hand)
         outline = begin_scores(keys, silhouette, region=around[angle])
-        inside = None if pattern is None else _begin_pattern(futures, positions, faces, pattern, table, angle, hand)
+        inside = None if compare is None else compare(angle)
 
         def wait() -> Scores:
             scores = outline()
@@ -94,19 +97,27 @@ def _at_each(begin: Callable[[float], Callable[[], Scores]], turns: list[float],
         return [waiting[angle].result() for angle in turns]
 
 
-def _begin_pattern(
-    futures: Futures, positions: wp.array, faces: wp.array, pattern: Pattern, table: Table, angle: float,
-    hand: ArrayLike,
-) -> Callable[[], np.ndarray]:  # fmt: skip
-    """Begin to tell how well the pattern, carried along by every future, explains the image: (worlds,) float."""
+def _pattern_comparison(
+    futures: Futures, positions: wp.array, faces: wp.array, pattern: Pattern, ground: Ground, hand: ArrayLike
+) -> Callable[[float], Callable[[], np.ndarray]]:
+    """What begins to tell, at a turn [rad], how well the pattern that every future carries along explains the image.
+
+    It returns a function that waits for the answer, (worlds,) float.
+    """
     device: Any = positions.device
-    keys = raster.key_images(positions.shape[0], pattern.region, device, ids=True)
-    _begin_with_table(keys, futures, table, view(pattern.camera, pattern.region), raster.LAST_LABEL)
-    # light is fitted in the frame of the cloth, which is turned as a whole
-    turned = replace(pattern, camera=view_of_turned(pattern.camera, hand, angle))
-    raster.draw(keys, positions, faces, view(turned.camera, pattern.region), None)
-    lay = np.asarray(futures.origin.find(futures.body.name).vertices)
-    return begin_pattern(keys, positions, faces, pattern.rectangle.fractions(lay), turned)
+    layer = _table_layer(ground, view(pattern.camera, pattern.region), raster.LAST_LABEL, device, ids=True)
+    uv = pattern.rectangle.fractions(np.asarray(futures.origin.find(futures.body.name).vertices))
+    pattern.on(device)  # here, for every thread would do it for itself
+
+    def begin(angle: float) -> Callable[[], np.ndarray]:
+        keys = raster.key_images(positions.shape[0], pattern.region, device, ids=True)
+        raster.clear(keys, layer)
+        # light is fitted in the frame of the cloth, which is turned as a whole
+        turned = replace(pattern, camera=view_of_turned(pattern.camera, hand, angle))
+        raster.draw(keys, positions, faces, view(turned.camera, pattern.region), None)
+        return begin_pattern(keys, positions, faces, uv, turned)
+
+    return begin
 
 
 def draw_futures(
@@ -124,7 +135,8 @@ def draw_futures(
     positions = futures.positions
     faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
     (region,) = regions_of(positions, [view_of_turned(camera, hand, angle)], margin=MARGIN)
-    return _drawn(futures, positions, faces, camera, region, table, angle, hand), region
+    ground = _ground(futures, table, positions.device)
+    return _drawn(positions, faces, camera, region, ground, angle, hand), region
 
 
 def masks_of_turned(
@@ -136,34 +148,39 @@ def masks_of_turned(
     turned = _on_device(moved, wp.vec3, positions.device)
     (region,) = regions_of(turned, [camera], margin=MARGIN)
     faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
-    keys = _drawn(futures, turned, faces, camera, region, table)
+    keys = _drawn(turned, faces, camera, region, _ground(futures, table, positions.device))
     masks = np.zeros((len(worlds), camera.height, camera.width), dtype=bool)
     part = raster.masks_of(keys).numpy()
     masks[:, region.y0 : region.y0 + region.height, region.x0 : region.x0 + region.width] = part
     return masks
 
 
+def _ground(futures: Futures, table: Table, device: Any) -> Ground:
+    """The table's triangles on the device, where its extents are known."""
+    if table.half_extents is None:
+        return None
+    body = futures.origin.find("table")
+    return _on_device(np.asarray(body.vertices)[None], wp.vec3, device), _on_device(body.faces, wp.vec3i, device)
+
+
 def _drawn(
-    futures: Futures, positions: wp.array, faces: wp.array, camera: Camera, region: Region, table: Table,
-    angle: float = 0.0, hand: ArrayLike = (0.0, 0.0, 0.0),
+    positions: wp.array, faces: wp.array, camera: Camera, region: Region, ground: Ground, angle: float = 0.0,
+    hand: ArrayLike = (0.0, 0.0, 0.0),
 ) -> wp.array:  # fmt: skip
     device: Any = positions.device
     keys = raster.key_images(positions.shape[0], region, device)
-    _begin_with_table(keys, futures, table, view(camera, region), 1)
+    raster.clear(keys, _table_layer(ground, view(camera, region), 1, device))
     looking = view(view_of_turned(camera, hand, angle), region)
     raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
     return keys
 
 
-def _begin_with_table(keys: wp.array, futures: Futures, table: Table, looking: View, label: int) -> None:
-    """Reset key images to the table, where its extents are known."""
-    device: Any = keys.device
-    layer = raster.key_images(1, Region(0, 0, looking.width, looking.height), device, ids=keys.dtype == wp.int64)
-    if table.half_extents is not None:
-        body = futures.origin.find("table")
-        points = _on_device(np.asarray(body.vertices)[None], wp.vec3, device)
-        raster.draw(layer, points, _on_device(body.faces, wp.vec3i, device), looking, label)
-    raster.clear(keys, layer)
+def _table_layer(ground: Ground, looking: View, label: int, device: Any, *, ids: bool = False) -> wp.array:
+    """A key image of the table alone, or of nothing."""
+    layer = raster.key_images(1, Region(0, 0, looking.width, looking.height), device, ids=ids)
+    if ground is not None:
+        raster.draw(layer, *ground, looking, label)
+    return layer
 
 
 def _on_device(values: ArrayLike, dtype: Any, device: Any) -> wp.array:

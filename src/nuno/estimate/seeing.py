@@ -70,7 +70,8 @@ def begin_to_see(
         hand_radius: Radius of what hides the cloth around it [m].
         hidden: (h, w) bool, what else is hidden, or None.
         with_pattern: Whether to look for the pattern.
-        meanwhile: On a thread, while a GPU computes; else at once, since the CPU has nothing to wait for.
+        meanwhile: On a thread, while the first pick is imagined, which leaves a core idle now and then, or all on a
+            GPU; else at once.
     """
 
     def look() -> Seen:

@@ -1,10 +1,10 @@
-"""Worlds that take turns: where there are more than a CUDA device has room for, each is advanced by a few frames at a time.
+"""Worlds that take turns: where there are more than a CUDA device has room for, each goes on by a few frames at a time.
 
-With a block per world for a whole run, the last blocks of a launch would leave most of the device idle for as long as
-a run of one takes, a twentieth of the time of twenty worlds for each place. So there are as many blocks as fit, and each
-takes the next of all turns: those of all worlds, one world after the other, then the second turns of all, and so on. The
-turn before of the same world was given out long ago, and to a block that is running; only if it is not over does a
-block wait for it, and so the launch ends however many blocks there is room for. What is computed is the same.
+With a block per world for a whole run, the last blocks of a launch would leave most of the device idle for about half
+as long as a run of one takes, and worlds that fold more for longer. So there are as many blocks as fit, and each takes
+the next of all turns: those of all worlds, one world after the other, then the second turns of all, and so on. The turn
+before of the same world was given out long ago, and to a block that is running; only if it is not over does a block
+wait for it, and so the launch ends however many blocks there is room for. What is computed is the same.
 """
 
 import warp as wp
