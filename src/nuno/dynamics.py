@@ -146,11 +146,9 @@ class ParticleDynamics(Dynamics):
         check_material(shape, material, world.world_count)
         super().__init__(material, friction, world)
         self.solver = _solver_class(material)(
-            topology_of(shape), material, positions.astype(np.float32), velocities.astype(np.float32),
-            device=world.device, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
-            friction=friction,
+            topology_of(shape), material, positions, velocities, device=world.device, gravity=world.gravity,
+            frame_rate=world.frame_rate, substeps=world.substeps, friction=friction,
         )  # fmt: skip
-        self.solver.set_state(positions, velocities)  # once more, in float64: it may keep an origin of its own
         self._pushing: tuple[Push, ...] = ()
 
     @property
@@ -261,7 +259,8 @@ def start_dynamics(body: Body, material: Any, world: Simulation) -> Dynamics:
         return RigidDynamics(body, material, material.friction, world)
     vertices = body._vertices()
     positions = np.broadcast_to(vertices, (world.world_count, *vertices.shape[-2:]))
-    return ParticleDynamics(body.shape, material, positions, np.zeros_like(positions), material.friction, world)
+    still = np.broadcast_to(np.zeros(3), positions.shape)
+    return ParticleDynamics(body.shape, material, positions, still, material.friction, world)
 
 
 def default_material(body: Body) -> Material:

@@ -160,8 +160,9 @@ def make_grip(
         raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
     if target is not None and target._dynamics is not None:
         return Grip(body, make_tie(body, where, target, compliance, world), target)
-    vertices, corners, weights = chosen_points(where, body.vertices.shape[-2], body.faces, worlds)
-    positions = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
+    present = body.vertices
+    vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
+    positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
     rows = np.arange(worlds)[:, None]
     if vertices is not None:
         held, valid = positions[rows, vertices], vertices >= 0

@@ -75,9 +75,10 @@ class Part(Futures):
         """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
         import warp as wp
 
-        found: Any = self.moment.positions
-        places: wp.array = wp.array(self.places.astype(np.int32), dtype=int, device=found.device)
-        return wp.indexedarray(found, [places, None]).contiguous()
+        found = self.moment.positions
+        places: Any = wp.array(self.places.astype(np.int32), dtype=int, device=found.device)
+        every: Any = None
+        return wp.indexedarray(found, [places, every]).contiguous()
 
     def whole(self, world: int) -> tuple[Futures, int]:
         """The batch, brought back to the part's moment, and where future number ``world`` is in it."""

@@ -23,8 +23,11 @@ from nuno.solver.large import LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import (
+    FEW_FRAMES,
     FEW_THREADS,
+    FEW_WORLDS,
     MANY_AT_ONCE,
+    MANY_FRAMES,
     MANY_THREADS,
     run_blocks,
     run_blocks_many,
@@ -59,9 +62,6 @@ from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
-TURN_FRAMES = 15
-"""Frames that a world is advanced by before another has its turn, where worlds queue up for a CUDA device: so few that
-blocks end at about the same time, and so many that to read and write a world costs nothing beside them."""
 MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
@@ -308,20 +308,7 @@ class ClothSolver(ParticleSolver):
         states = [self._state] if fine is None else [fine, self._state]
         common = [*states, self._topology, self._size, run, self._shapes]
         if self._cuda:
-            kernel = self._block_kernel(fine is not None)
-            blocks = self.world_count
-            if self._state.helpers and substeps > 1:
-                blocks += self._state.helpers
-                self._state.help.zero_()
-            cores = wp.get_device(self.device).sm_count
-            threads = FEW_THREADS if self.world_count <= cores else MANY_THREADS
-            inputs = [*common, substeps, threads]
-            if kernel is run_blocks_many:
-                blocks = min(blocks, cores * MANY_AT_ONCE)
-                # worlds that find room together have the whole run for their turn
-                inputs.append(substeps if blocks == self.world_count else min(substeps, TURN_FRAMES * run.frame))
-                self._state.help.zero_()
-            wp.launch(kernel, dim=blocks * threads, inputs=inputs, device=self.device, block_dim=threads)
+            self._launch_blocks(self._block_kernel(fine is not None), common, run, substeps)
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)
@@ -338,13 +325,35 @@ class ClothSolver(ParticleSolver):
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
+    def _launch_blocks(self, kernel: Any, common: list[Any], run: Settings, substeps: int) -> None:
+        """Launch a block for each world and each that helps, or as many as there is room for, which take turns."""
+        state, blocks = self._state, self.world_count
+        cores = wp.get_device(self.device).sm_count
+        threads = FEW_THREADS if self.world_count <= cores else MANY_THREADS
+        inputs = [*common, substeps]
+        helped = state.helpers > 0 and substeps > 1
+        if kernel in (run_blocks_shared, run_blocks_many):
+            few = kernel is run_blocks_shared
+            threads, room = (FEW_THREADS, cores) if few else (MANY_THREADS, cores * MANY_AT_ONCE)
+            turn = (FEW_FRAMES if few else MANY_FRAMES) * run.frame
+            in_turn = blocks > room and substeps > turn
+            blocks = room if in_turn else blocks
+            inputs += [threads, turn if in_turn else substeps]
+        else:
+            in_turn = False
+            inputs += [threads]
+        if helped or in_turn:
+            state.help.zero_()
+        blocks += state.helpers if helped else 0
+        wp.launch(kernel, dim=blocks * threads, inputs=inputs, device=self.device, block_dim=threads)
+
     def _block_kernel(self, fine: bool) -> Any:
         """The kernel that has as much of a world in shared memory as fits."""
         n = self.particle_count if self.shared_memory else BLOCK_PARTICLES
         if fine:
             return run_fine_blocks_partly if n <= FINE_PARTICLES else run_fine_blocks
         if n <= WHOLE_PARTICLES:
-            few = self.world_count <= wp.get_device(self.device).sm_count
+            few = self.world_count <= FEW_WORLDS * wp.get_device(self.device).sm_count
             return run_blocks_shared if few else run_blocks_many
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 

@@ -182,9 +182,12 @@ class ParticleSolver:
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
         positions = np.asarray(positions, dtype=np.float64)
+        velocities = np.asarray(velocities)
+        if positions.strides[0] == 0 and velocities.strides[0] == 0:  # of worlds that are all alike one will do
+            positions, velocities = positions[:1], velocities[:1]
         # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
         origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
-        notes = np.zeros((self.world_count, NOTES), dtype=np.float32)
+        notes = np.zeros((len(positions), NOTES), dtype=np.float32)
         notes[:, TRAVEL] = 1.0e9
         speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
         notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2

@@ -24,13 +24,19 @@ from nuno.solver.shared_memory import (
     whole,
 )
 from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
-from nuno.solver.turns import end_turn, next_turn
+from nuno.solver.taking_turns import end_turn, next_turn
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
 for one, and nothing runs while that waits."""
 MANY_AT_ONCE = 3
 """The same of cloth in many worlds: as many as its shared memory has room for."""
+FEW_WORLDS = 1.2
+"""Worlds for each multiprocessor up to which they are few: a block of many threads each that takes turns is sooner done
+with 1.2 worlds than three blocks of fewer threads beside each other are with one each."""
+FEW_FRAMES, MANY_FRAMES = 2, 15
+"""Frames that a world's turn takes where they are few and where they are many: so few that blocks end at about the same
+time, and so many that to read and write a world costs little beside them."""
 FEW_THREADS, MANY_THREADS = 512, 256
 """Threads of a block where every world has a multiprocessor to itself, and where worlds queue up for them: some blocks
 then share one, so that other worlds run while one waits. Both do the same, and so the bits are the same."""
@@ -179,14 +185,35 @@ def advance_blocks_shared(
         outside.pz[i] = t.pz[i]
 
 
+@wp.func
+def advance_in_turns(
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, turn: int, block: int,
+    thread: int, threads: int,
+):  # fmt: skip
+    """The same, ``turn`` substeps at a time, whole frames, of whichever world has its turn; or all of one world."""
+    turns = s.worlds * ((substeps + turn - 1) / turn)
+    k = int(block)
+    if turn < substeps:
+        k = next_turn(s.help, s.worlds, turns)
+    while k < turns:
+        world = k % s.worlds
+        left = substeps - k / s.worlds * turn
+        advance_blocks_shared(s, topo, size, run, shapes, wp.min(turn, left), world, thread, threads)
+        if turn < substeps:
+            end_turn(s.help, world)
+            k = next_turn(s.help, s.worlds, turns)
+        else:
+            k = turns
+
+
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_blocks_shared")
 def run_blocks_shared(
-    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int
+    s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int, turn: int
 ):
     """The same with x, y, z, w and p in shared memory, and what contacts move particles by."""
     tid = wp.tid()
     if tid / threads < s.worlds:
-        advance_blocks_shared(s, topo, size, run, shapes, substeps, tid / threads, tid % threads, threads)
+        advance_in_turns(s, topo, size, run, shapes, substeps, turn, tid / threads, tid % threads, threads)
     else:
         help_out(s, topo, size, run, tid / threads - s.worlds, tid % threads, threads)
 
@@ -195,19 +222,9 @@ def run_blocks_shared(
 def run_blocks_many(
     s: StateFloat, topo: Topology, size: Sizes, run: Settings, shapes: Shapes, substeps: int, threads: int, turn: int
 ):
-    """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor.
-
-    A block advances a world by ``turn`` substeps, whole frames unless that is all, and goes on to the next in turn.
-    """
-    thread = wp.tid() % threads
-    turns = s.worlds * ((substeps + turn - 1) / turn)
-    k = next_turn(s.help, s.worlds, turns)
-    while k < turns:
-        world = k % s.worlds
-        left = substeps - k / s.worlds * turn
-        advance_blocks_shared(s, topo, size, run, shapes, wp.min(turn, left), world, thread, threads)
-        end_turn(s.help, world)
-        k = next_turn(s.help, s.worlds, turns)
+    """The same where worlds queue up: with fewer registers a thread, so that more blocks share a multiprocessor."""
+    tid = wp.tid()
+    advance_in_turns(s, topo, size, run, shapes, substeps, turn, tid / threads, tid % threads, threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.solver.run_fine_blocks")
