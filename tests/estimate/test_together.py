@@ -6,7 +6,7 @@ import pytest
 import nuno
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate import pick
+from nuno.estimate import pick, together
 from nuno.estimate.futures import imagine_picks, solver_of
 from nuno.estimate.hypotheses import SPREAD, Discretisation
 from nuno.estimate.together import alike, imagine_together
@@ -31,15 +31,15 @@ def settings():
 
 
 @pytest.fixture(scope="module")
-def together(settings):
+def both(settings):
     """Both stages, of four candidates."""
     return imagine_together(STAGES, np.array([0, 1, 3, 5]), UV, **settings)
 
 
 @pytest.mark.parametrize("stage,chosen", [(0, [0, 1, 3, 5]), (1, [0, 1, 3, 5]), (1, [1, 5])])
-def test_a_part_is_what_the_stage_imagines_by_itself(together, settings, stage, chosen):
+def test_a_part_is_what_the_stage_imagines_by_itself(both, settings, stage, chosen):
     """Positions, how long it took to rest, and the world that the whole batch goes back to, bit for bit."""
-    part = together.part(STAGES[stage], np.array(chosen))
+    part = both.part(STAGES[stage], np.array(chosen))
     alone = imagine_picks(candidates=UV[chosen], discretisation=STAGES[stage], **settings)
     np.testing.assert_array_equal(part.positions.numpy(), alone.positions.numpy())
     assert part.candidates == alone.candidates and part.finite.shape == alone.finite.shape and part.finite.all()
@@ -53,20 +53,24 @@ def test_a_part_is_what_the_stage_imagines_by_itself(together, settings, stage, 
     np.testing.assert_array_equal(solvers[0].positions()[place], solvers[1].positions()[number])
 
 
-def test_what_is_not_in_the_batch_is_told(together):
+def test_what_is_not_in_the_batch_is_told(both):
     """A candidate beyond it, or another stage."""
-    assert together.part(STAGES[0], np.array([0, 2])) is None
-    assert together.part(FIRST, np.array([0, 1])) is None
+    assert both.part(STAGES[0], np.array([0, 2])) is None
+    assert both.part(FIRST, np.array([0, 1])) is None
 
 
 def test_stages_of_one_mesh_and_step_are_alike():
     """Another mesh, another step and a stage that looks at all candidates are left out."""
     others = (Discretisation(9, 6, SPREAD, best=2), Discretisation(6, 8, SPREAD, best=2), FIRST)
     assert alike((STAGES[0], *others, STAGES[1])) == STAGES
+    assert alike((FIRST, *STAGES)) == (FIRST,)
 
 
 def test_an_estimate_is_the_same(monkeypatch):
-    """Scores, the best future and the world that it becomes, where stages go together and where they do not."""
+    """Scores, the best future and the world that it becomes, where stages go together and where they do not.
+
+    A stage on another mesh comes between two that go together.
+    """
     s, c, pose = 5 / 13, 12 / 13, np.eye(4)  # it looks down by a sine of 5 / 13
     pose[:3] = [[0, -s, c, -0.95], [-1, 0, 0, 0], [0, -c, -s, 1.2]]
     camera = nuno.Camera(160, 120, 125.0, 125.0, 79.5, 59.5, pose)
@@ -75,12 +79,15 @@ def test_an_estimate_is_the_same(monkeypatch):
     before = world.masks(camera, cloth).numpy()
     cloth.locate((0, 0, 0.95)).rotate(1.4, "y", wrt="world")  # hangs as no pick does: no stage is sure
     after = world.masks(camera, cloth).numpy()
-    found = []
+    stages = (FIRST, STAGES[0], Discretisation(9, 6, SPREAD[2:4], best=3), STAGES[1])
+    found, batches = [], []
+    imagine = together.imagine_together
+    monkeypatch.setattr(together, "imagine_together", lambda *a, **k: batches.append(imagine(*a, **k)) or batches[-1])
     for room in (False, True):
         monkeypatch.setattr(pick, "has_room", lambda device, room=room: room)
         result = nuno.estimate_pick(
             None, None, camera=camera, table_height=TOP, table_half_extents=(0.6, 0.6), hand=HAND, before_mask=before,
-            after_mask=after, candidates=(3, 2), discretisations=(FIRST, *STAGES), sure=1.0, device="cpu",
+            after_mask=after, candidates=(3, 2), discretisations=stages, sure=1.0, device="cpu",
             progress=False,
         )  # fmt: skip
         batch = result.futures
@@ -89,3 +96,4 @@ def test_an_estimate_is_the_same(monkeypatch):
         found.append((result.scores, result.masks, guess, world.time, world.find("cloth").vertices))
     for a, b in zip(*found, strict=True):
         np.testing.assert_array_equal(a, b)
+    assert [batch.stages for batch in batches] == [(FIRST,), STAGES, (stages[2],)]

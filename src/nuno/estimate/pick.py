@@ -9,7 +9,6 @@ import logging
 import os
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,7 @@ from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table, table_margin
 from nuno.device import checked_device, found_device
-from nuno.errors import EstimationError, InvalidInputError, SimulationDiverged
+from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
@@ -32,7 +31,7 @@ from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
 from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
-from nuno.estimate.together import Together, alike, has_room, imagine_together
+from nuno.estimate.together import Ahead, has_room
 from nuno.estimate.turns import TURNS, checked_turns
 from nuno.progress import with_bar, with_clock
 from nuno.validation import finite_array, number
@@ -182,20 +181,13 @@ def estimate_pick(
         rectangle=rectangle, grid=grid, table=table, hand=hand_at, rest_height=rest_height, device=device,
         lift_seconds=lift_seconds,
     )  # fmt: skip
-    ahead: Together | None = None
+    ahead = Ahead(uv, **settings) if has_room(device) else None
     for k, discretisation in enumerate(with_bar(discretisations, "imagining", progress, "mesh")):
         clock = time.perf_counter()
         chosen = np.arange(len(uv))
         if ranked is not None and discretisation.best is not None:
             chosen = ranked.plausible(discretisation.best)
-        futures: Futures | None = None
-        if ranked is not None and has_room(device):
-            futures = None if ahead is None else ahead.part(discretisation, chosen)
-            stages = alike(discretisations[k:])
-            if futures is None and len(stages) > 1:
-                with suppress(SimulationDiverged):  # then each stage is by itself
-                    ahead = imagine_together(stages, chosen, uv, **settings)
-                    futures = ahead.part(discretisation, chosen)
+        futures: Futures | None = None if ahead is None else ahead.part(discretisations[k:], chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **settings)
         seconds["imagine"] += time.perf_counter() - clock

@@ -1,20 +1,23 @@
 """Stages of an estimate that are imagined in one batch, before it is known whether and of what each will be asked.
 
-A GPU takes hardly longer for 400 coarse cloths than for 100, which leave most of it idle. So where a stage is not sure,
-those after it with the same mesh and step are imagined with it, of all its candidates, for each looks at the best of
-what the one before looked at. A stage then takes from the batch what it would have imagined itself, to the bit: a world
-is the same in any batch, and the batch is kept at every moment at which a stage may find that its cloths are at rest.
-What no stage asks for was in vain, and what a stage asks for beyond it is imagined by itself.
+A GPU takes hardly longer for 400 coarse cloths than for 100, which leave most of it idle. So where the first stage is
+not sure, those after it with the same mesh and step are imagined together, of all candidates of the first of them, for
+each looks at the best of what the one before looked at. A stage then takes from the batch what it would have imagined
+itself, to the bit: a world is the same in any batch, and the batch is kept at every moment at which a stage may find
+that its cloths are at rest. So the device need not wait either while that is asked. What no stage asks for was in vain,
+and what a stage asks for beyond it is imagined anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.errors import SimulationDiverged
 from nuno.estimate.futures import (
     LIFT_SECONDS,
     LOOK_SECONDS,
@@ -23,15 +26,18 @@ from nuno.estimate.futures import (
     Futures,
     begin_picks,
     mean_speeds,
+    slow_part,
     solver_of,
 )
 from nuno.estimate.hypotheses import Discretisation
-from nuno.run_start import RunStart
 
 if TYPE_CHECKING:
     import warp as wp
 
-    from nuno.world import World
+    from nuno.solver.particle_solver import Kept, ParticleSolver
+
+LOOKS = 5
+"""Moments that a device goes through without being waited for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +46,20 @@ class Moment:
 
     Attributes:
         time: The world's time then [s].
-        state: What the world goes back to.
+        solver: The cloths' solver.
+        state: What it kept.
         positions: (worlds, n) of vec3, the cloths' vertices [m].
-        speeds: (worlds,) float, the cloths' root mean square speeds [m/s].
     """
 
     time: float
-    state: RunStart
+    solver: ParticleSolver
+    state: Kept
     positions: wp.array
-    speeds: np.ndarray
+
+    @cached_property
+    def speeds(self) -> np.ndarray:
+        """(worlds,) float, the cloths' root mean square speeds [m/s]."""
+        return mean_speeds(*self.solver.velocities_apart(self.state))
 
 
 @dataclass
@@ -82,7 +93,7 @@ class Part(Futures):
 
     def whole(self, world: int) -> tuple[Futures, int]:
         """The batch, brought back to the part's moment, and where future number ``world`` is in it."""
-        self.moment.state.go_back()
+        self.moment.solver.put_back(self.moment.state)
         self.world._time = self.moment.time
         return self.batch, int(self.places[world])
 
@@ -113,7 +124,7 @@ class Together:
         columns = np.array([int(np.nonzero(self.candidates == c)[0][0]) for c in chosen])
         places = (hypotheses[:, None] * len(self.candidates) + columns).ravel()
         # as `nuno.estimate.futures.imagine_picks` asks it
-        rests = (m for m in self.moments if float(np.percentile(m.speeds[places], 90)) < REST_SPEED)
+        rests = (m for m in self.moments if slow_part(m.speeds[places]) < REST_SPEED)
         moment = next(rests, self.moments[-1])
         batch = self.batch
         return Part(batch.world, batch.body, batch.origin, len(chosen), stage, batch, moment, places)
@@ -124,9 +135,38 @@ def has_room(device: str) -> bool:
     return device != "cpu"
 
 
+class Ahead:
+    """What was imagined of an estimate's stages, some before they were asked for.
+
+    Args:
+        uv: (all, 2) float, where all candidates are.
+        settings: The other arguments of `nuno.estimate.futures.imagine_picks`, but for the discretisation.
+    """
+
+    def __init__(self, uv: np.ndarray, **settings: Any) -> None:
+        self._uv, self._settings = uv, settings
+        self._batches: list[Together] = []
+
+    def part(self, stages: Sequence[Discretisation], chosen: np.ndarray) -> Part | None:
+        """What the first of ``stages`` finds of the ``chosen`` candidates (m,) int; None where some world diverged.
+
+        If need be they are imagined, and with them what the stages after it may look at.
+        """
+        for batch in self._batches:
+            if (part := batch.part(stages[0], chosen)) is not None:
+                return part
+        try:
+            self._batches.append(imagine_together(alike(stages), chosen, self._uv, **self._settings))
+        except SimulationDiverged:  # maybe in a world that this stage does not ask for
+            return None
+        return self._batches[-1].part(stages[0], chosen)
+
+
 def alike(stages: Sequence[Discretisation]) -> tuple[Discretisation, ...]:
-    """The first stage, and those after it that look at some candidates on the same mesh with the same step."""
+    """The first stage, and where it looks at the best candidates those after it with the same mesh and step."""
     first = stages[0]
+    if first.best is None:
+        return (first,)
     same = (first.cells, first.substeps)
     return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps) == same))
 
@@ -148,17 +188,22 @@ def imagine_together(
     batch = begin_picks(
         candidates=uv[chosen], discretisation=replace(stages[0], spread=spread), lift_seconds=lift_seconds, **settings
     )
-    batch.world.run(lift_seconds, progress=False)
+    world, solver = batch.world, solver_of(batch.body)
+    world.run(lift_seconds, progress=False)
     moments: list[Moment] = []
+    first = 0
+
+    def look(time: float) -> None:
+        moments.append(Moment(time, solver, solver.keep(), solver.positions_on_device()))
+
+    def look_again() -> None:
+        del moments[first:]
+
     # once the fastest is at rest, any part of them is
     while len(moments) * LOOK_SECONDS < SETTLE_SECONDS and not (moments and moments[-1].speeds.max() < REST_SPEED):
-        batch.world.run(LOOK_SECONDS, progress=False)
-        moments.append(_moment(batch))
+        first = len(moments)
+        instants = world.time + LOOK_SECONDS * np.arange(1, LOOKS + 1)
+        end = float(instants[-1])
+        with world._call():
+            world._advance(end - world.time, end, look, instants, look_again)
     return Together(batch, stages, chosen, tuple(moments))
-
-
-def _moment(batch: Futures) -> Moment:
-    world: World = batch.world
-    assert batch.body._dynamics is not None
-    state = RunStart(world, {batch.body: batch.body._dynamics})
-    return Moment(world.time, state, solver_of(batch.body).positions_on_device(), mean_speeds(batch.body))

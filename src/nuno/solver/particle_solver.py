@@ -40,6 +40,8 @@ MU = 15
 """Where a row of the table of static shapes has its friction, and that of the pair."""
 KEPT = ("x", "y", "z", "vx", "vy", "vz", "notes")
 """What a run changes that the next one depends on."""
+Kept = tuple[np.ndarray, list[wp.array], list[wp.array]]
+"""The worlds' origins, the arrays above, and coordinates that are doubles."""
 
 
 class ParticleSolver:
@@ -175,9 +177,10 @@ class ParticleSolver:
         s, n = self._state, self.particle_count
         return np.stack([self._get(a, n) for a in (s.vx, s.vy, s.vz)], axis=-1)
 
-    def velocities_apart(self) -> tuple[np.ndarray, ...]:
-        """The velocities' x, y and z, (worlds, n) float32 each [m/s]."""
-        return tuple(self._get(a, self.particle_count) for a in (self._state.vx, self._state.vy, self._state.vz))
+    def velocities_apart(self, kept: Kept | None = None) -> tuple[np.ndarray, ...]:
+        """The velocities' x, y and z, (worlds, n) float32 each [m/s], as they are or as `keep` kept them."""
+        arrays = [getattr(self._state, name) for name in KEPT] if kept is None else kept[1]
+        return tuple(self._get(arrays[KEPT.index(name)], self.particle_count) for name in ("vx", "vy", "vz"))
 
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
@@ -226,13 +229,13 @@ class ParticleSolver:
         if hasattr(self, "_grips"):
             self.set_grips(self._grips)
 
-    def keep(self) -> tuple[np.ndarray, list[wp.array], list[wp.array]]:
+    def keep(self) -> Kept:
         """What `put_back` takes: the present state, copied on the device, which nobody waits for."""
         own = [wp.clone(getattr(self._state, name)) for name in KEPT]
         fine = [wp.clone(array) for array in self._fine.arrays] if self._fine.count else []
         return self._scalars[:, ORIGIN : ORIGIN + 3].copy(), own, fine
 
-    def put_back(self, kept: tuple[np.ndarray, list[wp.array], list[wp.array]]) -> None:
+    def put_back(self, kept: Kept) -> None:
         """Set the state that `keep` kept, as `load_state` does what `save_state` gave then."""
         for name, array in zip(KEPT, kept[1], strict=True):
             wp.copy(getattr(self._state, name), array)
