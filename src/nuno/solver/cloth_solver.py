@@ -68,9 +68,10 @@ BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and takes a device's blocks together."""
 LARGE = ("grid", "large")
 """Plans in which many blocks work on a world."""
-GRID_MARGIN = 0.45
-"""Margin of the lists of the plan "grid" over the size of a cell: lists are few. With the largest thickness, half a
-cell, it is less than a cell, so that flat cloth still has no candidates."""
+WIDE_MARGIN = 0.45
+"""Margin over the size of a cell of the lists of the plans "grid" and "vector": lists are few, and a world by itself
+waits for no other's candidates. With the largest thickness, half a cell, it is less than a cell, so that flat cloth
+still has no candidates."""
 STRETCHED = 1.2
 """How many times as long as at rest an edge is taken to be at most, where it is asked what may touch it."""
 CPU_SHARES = 5
@@ -298,9 +299,9 @@ class ClothSolver(ParticleSolver):
 
     def _advance(self, run: Settings, substeps: int) -> None:
         fine = self._fine.bring(run)
+        if self.plan in ("grid", "vector"):
+            run.margin = WIDE_MARGIN * self._cell_size
         if self.plan in LARGE:
-            if self.plan == "grid":
-                run.margin = GRID_MARGIN * self._cell_size
             if self._large is None:
                 self._large = self._large_plan()
             self._large.run(run, substeps, fine)
