@@ -6,11 +6,12 @@ import pytest
 import nuno
 
 CELL = 0.025  # [m]
+DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
 
 
-def held_cloth():
+def held_cloth(device):
     """Return a world and a cloth of 16 x 16 cells held at its corners."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     cloth = world.add(nuno.sheet((16 * CELL, 16 * CELL), cells=(16, 16), position=(0.0, 0.0, 0.5), name="cloth"))
     world.attach(cloth, nuno.Cloth(area_density=0.2, thickness=0.003))
     for corner in (0, 16, 272, 288):
@@ -27,10 +28,11 @@ def lowest_gap(body, cloth, radius):
     return float(trimesh.proximity.closest_point(surface, centre[None])[1][0]) - radius - 0.0015
 
 
+@DEVICES
 @pytest.mark.parametrize("cells", [0.1, 0.24, 0.48])
-def test_a_small_ball_rolls_on_a_held_cloth(cells):
+def test_a_small_ball_rolls_on_a_held_cloth(cells, device):
     """Before, balls of up to half a cell fell between the vertices; now it bounces, and rolls on the triangles."""
-    world, cloth = held_cloth()
+    world, cloth = held_cloth(device)
     radius = cells * CELL
     ball = world.add(nuno.sphere(radius, position=(0.4 * CELL, 0.3 * CELL, 0.52 + radius), name="ball"))
     world.attach(ball, nuno.Rigid(mass=0.02))
@@ -43,9 +45,10 @@ def test_a_small_ball_rolls_on_a_held_cloth(cells):
     assert max(gaps[-15:]) < 3e-5
 
 
-def test_a_ball_that_is_thrown_is_caught():
+@DEVICES
+def test_a_ball_that_is_thrown_is_caught(device):
     """At 2 m/s, of a quarter of a cell: the cloth gives way and carries it."""
-    world, cloth = held_cloth()
+    world, cloth = held_cloth(device)
     ball = world.add(nuno.sphere(0.25 * CELL, position=(0.4 * CELL, 0.3 * CELL, 0.7), name="ball"))
     world.attach(ball, nuno.Rigid(mass=0.01))
     for _ in range(60):
@@ -53,9 +56,10 @@ def test_a_ball_that_is_thrown_is_caught():
         assert ball.position[2] > cloth.vertices[:, 2].min()
 
 
-def test_a_thin_rod_lies_on_a_held_cloth():
+@DEVICES
+def test_a_thin_rod_lies_on_a_held_cloth(device):
     """A capsule of a fifth of a cell, between two rows of vertices."""
-    world, cloth = held_cloth()
+    world, cloth = held_cloth(device)
     rod = world.add(nuno.capsule(0.2 * CELL, 0.04, position=(0.5 * CELL, 0.5 * CELL, 0.53), name="rod"))
     rod.rotate(np.pi / 2, (0.0, 1.0, 0.0))
     world.attach(rod, nuno.Rigid(mass=0.02))
@@ -63,9 +67,10 @@ def test_a_thin_rod_lies_on_a_held_cloth():
     assert rod.position[2] > cloth.vertices[:, 2].min()
 
 
-def test_a_heavy_small_ball_lies_on_a_soft_cube():
+@DEVICES
+def test_a_heavy_small_ball_lies_on_a_soft_cube(device):
     """A ball of 0.4 cells and 8,000 kg/m3, which went right through."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.box((1.0, 1.0, 0.1), name="floor", position=(0.0, 0.0, -0.05)))
     cube = world.add(nuno.soft_box((0.1, 0.1, 0.1), cells=(4, 4, 4), position=(0.0, 0.0, 0.05), name="cube"))
     ball = world.add(nuno.sphere(0.01, position=(0.012, 0.013, 0.115), name="ball"))
