@@ -56,10 +56,7 @@ def stresses(topology: SoftTopology, positions: ArrayLike, material: Soft, world
         material: What the body is made of.
         worlds: How many worlds the material's arrays may tell apart.
     """
-    f = deformation_gradients(topology, positions)
-    mu, bulk = moduli(material.resolved(worlds, topology.element_count))
-    if f.ndim == 3:
-        mu, bulk = mu[0], bulk[0]
+    f, mu, bulk = _strained(topology, positions, material, worlds)
     mu, bulk = mu[..., None, None], bulk[..., None, None]
     j = np.linalg.det(f)[..., None, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -75,10 +72,16 @@ def elastic_energy(topology: SoftTopology, positions: ArrayLike, material: Soft,
         material: What the body is made of.
         worlds: How many worlds the material's arrays may tell apart.
     """
-    f = deformation_gradients(topology, positions)
-    mu, bulk = moduli(material.resolved(worlds, topology.element_count))
-    if f.ndim == 3:
-        mu, bulk = mu[0], bulk[0]
+    f, mu, bulk = _strained(topology, positions, material, worlds)
     j = np.linalg.det(f)
     density = 0.5 * mu * ((f**2).sum(axis=(-1, -2)) - 3.0) - mu * (j - 1.0) + 0.5 * bulk * (j - 1.0) ** 2
     return (density * topology.volume * topology.fraction).sum(axis=-1)
+
+
+def _strained(
+    topology: SoftTopology, positions: ArrayLike, material: Soft, worlds: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return deformation gradients (..., m, 3, 3), and mu and bulk moduli (..., m or 1) [Pa]."""
+    f = deformation_gradients(topology, positions)
+    mu, bulk = moduli(material.resolved(worlds, topology.element_count))
+    return (f, mu[0], bulk[0]) if f.ndim == 3 else (f, mu, bulk)
