@@ -1,9 +1,10 @@
 """What a step costs, and how much memory a world takes, against the number of particles, worlds and static shapes.
 
-    python benchmarks/sizes.py [--device cuda:0] [--plot docs/images/sizes.png] [--json sizes.json]
+    python benchmarks/sizes.py [--device cuda:0] [--plot docs/images/sizes.png] [--json sizes.json] [--kinds worlds]
 
-A cloth falls on a table and over a bar, with self-contact; a soft cube lands on the table. Times are medians of
-frames of 1/60 s, kernels already compiled.
+A cloth falls on a table and over a bar, with self-contact, and on the table alone; a soft cube lands on the table. A
+bar slimmer than three cells, as this one is up to 75 x 75 cells, meets the cloth's edges and triangles too. Times are
+medians of frames of 1/60 s, kernels already compiled.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 import nuno
 
 FRAMES = 24
+KINDS = ("cloth particles", "soft particles", "worlds", "static shapes")
 PARTICLES = {"cpu": (8, 16, 32, 64), "cuda": (16, 32, 64, 128, 256)}
 SOFT = {"cpu": (4, 6, 10, 16), "cuda": (4, 6, 10, 16, 24)}
 WORLDS = {"cpu": (1, 4, 16, 64), "cuda": (1, 16, 128, 1024, 8192)}
@@ -30,8 +32,9 @@ def room(device: str) -> nuno.World:
     return world
 
 
-def cloth(world: nuno.World, cells: int) -> nuno.Body:
-    world.add(nuno.capsule(0.02, 0.6, name="bar", position=(0.1, 0.0, 0.03)).rotate(np.pi / 2, "x"))
+def cloth(world: nuno.World, cells: int, bar: bool = True) -> nuno.Body:
+    if bar:
+        world.add(nuno.capsule(0.02, 0.6, name="bar", position=(0.1, 0.0, 0.03)).rotate(np.pi / 2, "x"))
     body = world.add(nuno.sheet((0.5, 0.5), cells=(cells, cells), position=(0.0, 0.0, 0.1)))
     world.attach(body)
     return body
@@ -55,15 +58,24 @@ def frame_seconds(world: nuno.World) -> float:
     return float(np.median(spans))
 
 
+def draped(device: str, cells: int, count: int, bar: bool) -> tuple[float, Any]:
+    """Milliseconds a frame of a cloth, in many worlds or one, and its solver."""
+    world = room(device)
+    body = cloth(world, cells, bar)
+    if count > 1:
+        world = world.imagine(count)
+    ms = 1e3 * frame_seconds(world)
+    return ms, world.find(body.name)._dynamics.solver  # type: ignore[union-attr]
+
+
 def measured(kind: str, device: str) -> list[dict[str, Any]]:
     short = device.split(":")[0]
     rows: list[dict[str, Any]] = []
     if kind == "cloth particles":
         for cells in PARTICLES[short]:
-            world = room(device)
-            body = cloth(world, cells)
-            solver = body._dynamics.solver  # type: ignore[union-attr]
-            row = {"size": (cells + 1) ** 2, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps}
+            flat = draped(device, cells, 1, bar=False)[0]
+            ms, solver = draped(device, cells, 1, bar=True)
+            row = {"size": (cells + 1) ** 2, "ms": ms, "flat_ms": flat, "substeps": solver.substeps}
             rows.append(row | {"bytes": solver.memory_bytes / row["size"]})
     elif kind == "soft particles":
         for cells in SOFT[short]:
@@ -74,12 +86,10 @@ def measured(kind: str, device: str) -> list[dict[str, Any]]:
             rows.append(row | {"bytes": solver.memory_bytes / (5 * cells**3)})
     elif kind == "worlds":
         for count in WORLDS[short]:
-            world = room(device)
-            body = cloth(world, 30)
-            futures = world.imagine(count)
-            ms = 1e3 * frame_seconds(futures)
-            solver = futures.find(body.name)._dynamics.solver  # type: ignore[union-attr]
-            rows.append({"size": count, "ms": ms, "substeps": solver.substeps, "bytes": solver.memory_bytes / count})
+            flat = draped(device, 30, count, bar=False)[0]
+            ms, solver = draped(device, 30, count, bar=True)
+            row = {"size": count, "ms": ms, "flat_ms": flat, "substeps": solver.substeps}
+            rows.append(row | {"bytes": solver.memory_bytes / count})
     else:
         for count in SHAPES:
             world = room(device)
@@ -102,7 +112,10 @@ def plot(results: dict[str, list[dict[str, Any]]], path: str, device: str) -> No
     figure, axes = plt.subplots(1, len(results), figsize=(4 * len(results), 3.4), layout="constrained", sharey=True)
     for axis, (kind, rows) in zip(axes, results.items(), strict=True):
         sizes = [r["size"] for r in rows]
-        axis.loglog(sizes, [r["ms"] for r in rows], "o-", color="tab:blue")
+        axis.loglog(sizes, [r["ms"] for r in rows], "o-", color="tab:blue", label="over a bar")
+        if "flat_ms" in rows[0]:
+            axis.loglog(sizes, [r["flat_ms"] for r in rows], "o--", color="tab:orange", label="on a table")
+            axis.legend()
         axis.axhline(1e3 / 60, color="gray", linewidth=0.8)
         axis.set(xlabel=kind, title=f"{kind}, {device}")
         axis.set_xticks(sizes, [str(size) for size in sizes])
@@ -120,15 +133,18 @@ def main() -> None:
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--plot")
     parser.add_argument("--json")
+    parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
     options = parser.parse_args()
-    kinds = ("cloth particles", "soft particles", "worlds", "static shapes")
     results = {}
-    print(f"| against | size | substeps | ms a frame | bytes a particle, tetrahedron, world | ({options.device})")
-    print("|---|---|---|---|---|")
-    for kind in kinds:
+    head = ("against", "size", "substeps", "ms a frame", "without the bar", "bytes a particle, tetrahedron, world")
+    print(f"| {' | '.join(head)} | ({options.device})")
+    print("|" + "---|" * len(head))
+    for kind in options.kinds:
         results[kind] = measured(kind, options.device)
         for row in results[kind]:
-            print(f"| {kind} | {row['size']} | {row['substeps']} | {row['ms']:.2f} | {row['bytes']:.0f} |", flush=True)
+            flat = f"{row['flat_ms']:.2f}" if "flat_ms" in row else ""
+            cells = (kind, str(row["size"]), str(row["substeps"]), f"{row['ms']:.2f}", flat, f"{row['bytes']:.0f}")
+            print(f"| {' | '.join(cells)} |", flush=True)
     if options.plot:
         plot(results, options.plot, options.device)
     if options.json:
