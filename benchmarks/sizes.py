@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -68,28 +69,28 @@ def draped(device: str, cells: int, count: int, bar: bool) -> tuple[float, Any]:
     return ms, world.find(body.name)._dynamics.solver  # type: ignore[union-attr]
 
 
-def measured(kind: str, device: str) -> list[dict[str, Any]]:
+def measured(kind: str, device: str) -> Iterator[dict[str, Any]]:
+    """One row a size."""
     short = device.split(":")[0]
-    rows: list[dict[str, Any]] = []
     if kind == "cloth particles":
         for cells in PARTICLES[short]:
             flat = draped(device, cells, 1, bar=False)[0]
             ms, solver = draped(device, cells, 1, bar=True)
             row = {"size": (cells + 1) ** 2, "ms": ms, "flat_ms": flat, "substeps": solver.substeps}
-            rows.append(row | {"bytes": solver.memory_bytes / row["size"]})
+            yield row | {"bytes": solver.memory_bytes / row["size"]}
     elif kind == "soft particles":
         for cells in SOFT[short]:
             world = room(device)
             body = cube(world, cells)
             solver = body._dynamics.solver  # type: ignore[union-attr]
             row = {"size": (cells + 1) ** 3, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps}
-            rows.append(row | {"bytes": solver.memory_bytes / (5 * cells**3)})
+            yield row | {"bytes": solver.memory_bytes / (5 * cells**3)}
     elif kind == "worlds":
         for count in WORLDS[short]:
             flat = draped(device, 30, count, bar=False)[0]
             ms, solver = draped(device, 30, count, bar=True)
             row = {"size": count, "ms": ms, "flat_ms": flat, "substeps": solver.substeps}
-            rows.append(row | {"bytes": solver.memory_bytes / count})
+            yield row | {"bytes": solver.memory_bytes / count}
     else:
         for count in SHAPES:
             world = room(device)
@@ -98,8 +99,7 @@ def measured(kind: str, device: str) -> list[dict[str, Any]]:
                 place = rng.uniform((1.0, -5.0, 0.0), (9.0, 5.0, 2.0))
                 world.add(nuno.box(rng.uniform(0.1, 0.4, 3), position=place))
             solver = cloth(world, 30)._dynamics.solver  # type: ignore[union-attr]
-            rows.append({"size": count, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps, "bytes": 0.0})
-    return rows
+            yield {"size": count, "ms": 1e3 * frame_seconds(world), "substeps": solver.substeps, "bytes": 0.0}
 
 
 def plot(results: dict[str, list[dict[str, Any]]], path: str, device: str) -> None:
@@ -135,13 +135,14 @@ def main() -> None:
     parser.add_argument("--json")
     parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
     options = parser.parse_args()
-    results = {}
+    results: dict[str, list[dict[str, Any]]] = {}
     head = ("against", "size", "substeps", "ms a frame", "without the bar", "bytes a particle, tetrahedron, world")
     print(f"| {' | '.join(head)} | ({options.device})")
     print("|" + "---|" * len(head))
     for kind in options.kinds:
-        results[kind] = measured(kind, options.device)
-        for row in results[kind]:
+        results[kind] = []
+        for row in measured(kind, options.device):
+            results[kind].append(row)
             flat = f"{row['flat_ms']:.2f}" if "flat_ms" in row else ""
             cells = (kind, str(row["size"]), str(row["substeps"]), f"{row['ms']:.2f}", flat, f"{row['bytes']:.0f}")
             print(f"| {' | '.join(cells)} |", flush=True)
