@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 import weakref
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -37,9 +36,7 @@ class FrameLock:
                     self._waiting -= 1
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._lock.release()
 
     def acquire(self, timeout: float) -> bool:

@@ -7,7 +7,6 @@ import logging
 import threading
 import time
 from collections import deque
-from types import TracebackType
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
@@ -94,9 +93,7 @@ class RobotServer:
     def __enter__(self) -> RobotServer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
