@@ -13,6 +13,7 @@ from nuno.solver.cloth_solver import ClothSolver
 THICKNESS = 0.004
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too
 ROUNDED = 0.5 * THICKNESS / np.sqrt(2.0)  # half a thickness from a right edge is so far from one of its faces
+DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
 
 
 def surface(body, count=10):
@@ -32,13 +33,14 @@ def limp(**changed):
     return nuno.Cloth(**{"thickness": THICKNESS, "air_drag": 2.0, "bending_rigidity": 1e-6, **changed})
 
 
+@DEVICES
 @pytest.mark.parametrize("cell", [0.01, 0.02, 0.04])
-def test_the_edges_of_a_box_do_not_cut_into_a_limp_cloth(cell):
+def test_the_edges_of_a_box_do_not_cut_into_a_limp_cloth(cell, device):
     """Geometry: every point of the surface stays half a thickness from the edges, not the vertices alone."""
     count = round(0.4 / cell)
     table = nuno.box((0.2, 1.0, 0.2), position=(0, 0, -0.1))
     sheet = nuno.sheet((0.4, 0.4), cells=(count, count), position=(0.3 * cell, 0, 0.5 * THICKNESS))
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(table)
     world.add(sheet)
     world.attach(sheet, limp(friction=1.0))
@@ -54,9 +56,10 @@ def test_the_edges_of_a_box_do_not_cut_into_a_limp_cloth(cell):
     assert np.abs(sheet.vertices - before)[on_top].max() < 5e-4  # and holds by friction, with a half hanging down
 
 
+@DEVICES
 @pytest.mark.parametrize("speed", [0.5, 2.0])
 @pytest.mark.parametrize("kind", ["sphere", "capsule"])
-def test_a_fingertip_smaller_than_a_cell_takes_a_hanging_cloth_along(kind, speed):
+def test_a_fingertip_smaller_than_a_cell_takes_a_hanging_cloth_along(kind, speed, device):
     """Invariant: a tip of 0.4 cells, driven 0.15 m through between four vertices, never has cloth behind it."""
     cell = 0.04
     radius = 0.4 * cell
@@ -66,7 +69,7 @@ def test_a_fingertip_smaller_than_a_cell_takes_a_hanging_cloth_along(kind, speed
     tip = nuno.sphere(radius) if kind == "sphere" else nuno.capsule(radius, length).rotate(0.5 * np.pi, "y")
     start = at - np.array([0.5 * length, 0, 0])
     tip.locate(start)
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(sheet)
     world.add(tip)
     world.attach(sheet, limp())
@@ -85,16 +88,17 @@ def test_a_fingertip_smaller_than_a_cell_takes_a_hanging_cloth_along(kind, speed
     assert (surface(sheet)[beside, 0] > tip.position[0]).all()
 
 
+@DEVICES
 @pytest.mark.parametrize("cell", [0.02, 0.04])
 @pytest.mark.parametrize("place", [(0.3, 0.4), (0.66, 0.33)])
-def test_a_cloth_dropped_on_the_corner_of_a_box_is_not_pierced(cell, place):
+def test_a_cloth_dropped_on_the_corner_of_a_box_is_not_pierced(cell, place, device):
     """Invariant: at 1 m/s onto a corner that points up between its vertices, all of the surface stays outside."""
     cube = nuno.box((0.1, 0.1, 0.1)).rotate(np.arctan(np.sqrt(2.0)), "y").rotate(0.25 * np.pi, "z")
     corners = cube.vertices
     cube.locate(-corners[corners[:, 2].argmax()])
     count = round(0.4 / cell)
     sheet = nuno.sheet((0.4, 0.4), cells=(count, count), position=(place[0] * cell, place[1] * cell, 0.02))
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(sheet)
     world.add(cube)
     world.attach(sheet, nuno.Cloth(thickness=THICKNESS, air_drag=2.0))
@@ -109,12 +113,13 @@ def test_a_cloth_dropped_on_the_corner_of_a_box_is_not_pierced(cell, place):
     assert lowest > 0.5 * THICKNESS / np.sqrt(3.0) - LEFT
 
 
+@DEVICES
 @pytest.mark.parametrize("radius", [0.015, 0.1])
-def test_the_rim_of_a_can_does_not_cut_into_a_cloth(radius):
+def test_the_rim_of_a_can_does_not_cut_into_a_cloth(radius, device):
     """Geometry: the surface stays outside of the rim of a can, slim or wide, whose sides curve less than cells."""
     can = nuno.cylinder(radius, 0.1, position=(0, 0, -0.05))
     sheet = nuno.sheet((0.4, 0.4), cells=(10, 10), position=(0.012, 0.008, 0.5 * THICKNESS))
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(sheet)
     world.add(can)
     world.attach(sheet, limp(friction=1.0))
@@ -127,10 +132,11 @@ def test_the_rim_of_a_can_does_not_cut_into_a_cloth(radius):
         assert beyond[near].min() > ROUNDED - LEFT - 0.04**2 / (8.0 * 0.1)
 
 
-def test_what_a_cloth_over_edges_bears_is_its_weight():
+@DEVICES
+def test_what_a_cloth_over_edges_bears_is_its_weight(device):
     """Balance: the forces of beams that a cloth hangs over, on its edges between vertices, add up to its weight."""
     sheet = nuno.sheet((0.4, 0.4), cells=(10, 10), position=(0.004, 0, 0.017))
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     for x in (-0.08, 0.08):
         world.add(nuno.box((0.03, 1.0, 0.03), name=f"beam {x}", position=(x, 0, 0)))
     world.add(sheet)
@@ -168,11 +174,12 @@ def shifted(count, which, device):
     return world.find("cloth").vertices
 
 
-def test_a_world_of_a_batch_meets_edges_as_alone():
+@DEVICES
+def test_a_world_of_a_batch_meets_edges_as_alone(device):
     """Promise: bit for bit, in 18 worlds: more than the lanes of a vector."""
-    batch = shifted(18, None, "cpu")
+    batch = shifted(18, None, device)
     for k in (0, 1, 16, 17):
-        np.testing.assert_array_equal(batch[k], shifted(18, k, "cpu"))
+        np.testing.assert_array_equal(batch[k], shifted(18, k, device))
 
 
 @pytest.mark.cuda
@@ -203,11 +210,12 @@ def test_all_plans_meet_edges_alike():
         np.testing.assert_array_equal(end, ends[0])
 
 
-def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing():
+@DEVICES
+def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
     """Promise: where no edge is in reach nothing is listed, and the bits are those of a table without end."""
 
     def run(side):
-        world = nuno.World(device="cpu")
+        world = nuno.World(device=device)
         world.add(nuno.box((side, side, 0.04), position=(0, 0, -0.02)))
         world.add(nuno.sheet((0.3, 0.3), cells=(8, 8), name="cloth", position=(0, 0, 0.03)).rotate(0.3, "x"))
         body = world.find("cloth")
