@@ -39,3 +39,17 @@ def test_every_public_name_is_there():
     for name in nuno.__all__:
         assert getattr(nuno, name) is not None
     assert set(nuno.__all__) <= set(dir(nuno))
+
+
+def test_no_public_name_is_taken_by_a_module():
+    """Loading a module sets its name in the package: a name that is loaded on first use must not be that of one."""
+    code = """
+from importlib import import_module
+from types import ModuleType
+import nuno
+for module in set(nuno._LAZY.values()):
+    import_module(module)
+print(*[name for name in nuno.__all__ if isinstance(getattr(nuno, name), ModuleType)])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

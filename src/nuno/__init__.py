@@ -67,7 +67,7 @@ if TYPE_CHECKING:
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
     from nuno.camera.table import Table
     from nuno.contact_points import ContactPoints
-    from nuno.elements import ElementState, elements
+    from nuno.element_state import ElementState, elements
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -279,9 +279,9 @@ _LAZY = {
     "find_layers": "nuno.estimate.layers",
     "read_fold_case": "nuno.estimate.fold_case",
     "replay_fold": "nuno.estimate.fold",
-    "ElementState": "nuno.elements",
+    "ElementState": "nuno.element_state",
     "ContactPoints": "nuno.contact_points",
-    "elements": "nuno.elements",
+    "elements": "nuno.element_state",
     "PickCase": "nuno.estimate.case",
     "PickResult": "nuno.estimate.pick_result",
     "Table": "nuno.camera.table",
