@@ -16,9 +16,6 @@ from nuno.solver.shared_memory import (
     FINE_PARTICLES,
     ROOMY_PARTICLES,
     SHARED_PARTICLES,
-    bring_masses,
-    bring_places,
-    bring_speeds,
     column,
     figures,
     fine_column,
@@ -98,10 +95,16 @@ def run_partly(
     t.y = column(SHARED_PARTICLES)
     t.z = column(2 * SHARED_PARTICLES)
     t.w = column(3 * SHARED_PARTICLES)
-    bring_places(t, outside, n, thread, threads)
-    bring_masses(t, outside, n, thread, threads)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
     advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
-    bring_places(outside, t, n, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
 
 
 @wp.func
@@ -123,12 +126,22 @@ def run_shared(
     t.vx = column(4 * ROOMY_PARTICLES)
     t.vy = column(5 * ROOMY_PARTICLES)
     t.vz = column(6 * ROOMY_PARTICLES)
-    bring_places(t, outside, n, thread, threads)
-    bring_masses(t, outside, n, thread, threads)
-    bring_speeds(t, outside, n, thread, threads)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
+        t.w[i] = outside.w[i]
+        t.vx[i] = outside.vx[i]
+        t.vy[i] = outside.vy[i]
+        t.vz[i] = outside.vz[i]
     advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
-    bring_places(outside, t, n, thread, threads)
-    bring_speeds(outside, t, n, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
+        outside.vx[i] = t.vx[i]
+        outside.vy[i] = t.vy[i]
+        outside.vz[i] = t.vz[i]
 
 
 @wp.func
@@ -146,9 +159,15 @@ def run_fine_partly(
     t.x = fine_column(0)
     t.y = fine_column(FINE_PARTICLES)
     t.z = fine_column(2 * FINE_PARTICLES)
-    bring_places(t, outside, n, thread, threads)
+    for i in range(thread, n, threads):
+        t.x[i] = outside.x[i]
+        t.y[i] = outside.y[i]
+        t.z[i] = outside.z[i]
     advance_block(t, view(floats, tid / threads, n, size), topo, sides, run, shapes, substeps, thread, threads)
-    bring_places(outside, t, n, thread, threads)
+    for i in range(thread, n, threads):
+        outside.x[i] = t.x[i]
+        outside.y[i] = t.y[i]
+        outside.z[i] = t.z[i]
 
 
 def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:

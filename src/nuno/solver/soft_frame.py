@@ -12,6 +12,7 @@ from nuno.contact.renewal import shares_work
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.frame import meet_sharp, near_shapes, near_sharp
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
+from nuno.solver.idle import forget_idle
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
@@ -32,7 +33,7 @@ from nuno.solver.soft_state import (
 )
 from nuno.solver.state import CLOCK, DAMPING, MOTION, PULLS, SHAPES, SPEED, VELOCITIES, Settings, Shapes
 from nuno.solver.vector import corner
-from nuno.solver.wide import by_sixteen
+from nuno.solver.wide import as_lanes, by_sixteen
 
 
 @wp.func
@@ -201,6 +202,7 @@ def advance(
         if run.parts & VELOCITIES != 0:
             reset_speed(t, thread)
             barrier(threads)
+            forget_idle(t, n, thread, threads)
             read_velocities(t, n, run, thread, threads)
             round_places(near, t, n, thread, threads)
             barrier(threads)
@@ -232,6 +234,16 @@ def run_soft_lanes(
 
 
 @wp.func
+def soft_by_sixteen(p: Any, t: Any, wide: WideTetrahedra, m: int):
+    """`by_sixteen`, with what soft bodies alone have."""
+    p = by_sixteen(p, t, wide, m)
+    p.idle_x = as_lanes(t.idle_x, m)
+    p.idle_y = as_lanes(t.idle_y, m)
+    p.idle_z = as_lanes(t.idle_z, m)
+    return p
+
+
+@wp.func
 def advance_wide(
     t: Any, p: Any, near: SoftFloat, nearby: SoftLanes, n: int, wide: WideTetrahedra, sides: Sides, run: Settings,
     shapes: Shapes, substeps: int,
@@ -260,6 +272,7 @@ def advance_wide(
             touch_shapes(p, m, shapes, run.dt, 0, 1)
         if run.parts & VELOCITIES != 0:
             reset_speed(p, 0)
+            forget_idle(p, m, 0, 1)
             read_velocities(p, m, run, 0, 1)
             round_places(nearby, p, m, 0, 1)
             t.notes[SPEED] = largest(p.notes[SPEED])
@@ -273,7 +286,7 @@ def run_soft_wide(
     """One world by one thread, sixteen tetrahedra or particles at a time."""
     n = topo.particles
     t = view(s, wp.tid(), n, size)
-    p = by_sixteen(SoftLanes(), t, wide, (n + LANES - 1) / LANES)
+    p = soft_by_sixteen(SoftLanes(), t, wide, (n + LANES - 1) / LANES)
     advance_wide(t, p, t, p, n, wide, sides, run, shapes, substeps)
 
 
@@ -309,5 +322,5 @@ def run_soft_fine_wide(
     m = (n + LANES - 1) / LANES
     t = view(s, wp.tid(), n, size)
     floats = view(near, wp.tid(), n, size)
-    p = by_sixteen(SoftFineLanes(), t, wide, m)
+    p = soft_by_sixteen(SoftFineLanes(), t, wide, m)
     advance_wide(t, p, floats, by_sixteen(SoftLanes(), floats, wide, m), n, wide, sides, run, shapes, substeps)

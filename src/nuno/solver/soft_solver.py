@@ -29,6 +29,7 @@ from nuno.solver.soft_frame import (
     run_soft_worlds,
 )
 from nuno.solver.soft_state import (
+    IDLE,
     FarSides,
     Sides,
     SoftFine,
@@ -159,6 +160,8 @@ class SoftSolver(ParticleSolver):
         self._damped = bool(np.any(values["damping"] > 0))
         self._reply = viscous_reply(topology, 2.0 * mu * values["damping"], self._inverse_mass)
         self._allocate_particles()
+        for name in IDLE:
+            setattr(state, name, self._empty(self._whole, self._number)[: self.group_count * self.particle_count])
         size.moved = min(4 * topology.vertex_count, QUEUE + ROOM)
         state.gone_to, state.moved = self._empty(1, int), self._empty(size.moved, int)
 

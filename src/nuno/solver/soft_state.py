@@ -12,10 +12,14 @@ CRUMPLED, SEEN = LISTINGS, PICK_REACH
 """Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
 whether one is in this."""
 
+IDLE = ("idle_x", "idle_y", "idle_z")
+"""How far elements that are inside out have moved a particle in the substep without giving it speed [m]."""
+
 
 def _make(name: str, number: type, integer: type, place: type) -> Any:
     """A struct under the names that `nuno.solver.state` has for the arrays that all particles have."""
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box")
+    numbers += IDLE
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=place) for name in PLACES}
@@ -132,6 +136,9 @@ def view(s: Any, group: int, n: int, size: SoftSizes):
     t.vy = window(s.vy, group * n, n)
     t.vz = window(s.vz, group * n, n)
     t.w = window(s.w, group * n, n)
+    t.idle_x = window(s.idle_x, group * n, n)
+    t.idle_y = window(s.idle_y, group * n, n)
+    t.idle_z = window(s.idle_z, group * n, n)
     t.fx = window(s.fx, group * size.forces, size.forces)
     t.fy = window(s.fy, group * size.forces, size.forces)
     t.fz = window(s.fz, group * size.forces, size.forces)

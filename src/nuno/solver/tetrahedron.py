@@ -4,6 +4,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.solver.idle import motion_of, move_idly
 from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
@@ -22,7 +23,7 @@ from nuno.solver.lanes import (  # noqa: F401
     times,
 )
 from nuno.solver.soft_state import CRUMPLED, SEEN
-from nuno.solver.vector import at, put, scaled, spread
+from nuno.solver.vector import scaled, spread
 
 COLUMNS = 8
 """Numbers of an element: with B the inverse rest matrix and v the rest volume, v B B^T as 11, 22, 33, 12, 13, 23; then
@@ -252,18 +253,22 @@ def solve_tetrahedron(
         hb = times(hb, keep)
         hc = times(hc, keep)
         hd = times(hd, keep)
-        # where the forces work on the corners' motion so far, the substep's start moves along
+        # where the forces work on the corners' motion so far, they give it no speed
+        uax, uay, uaz = motion_of(t, a, ax, ay, az)
+        ubx, uby, ubz = motion_of(t, b, bx, by, bz)
+        ucx, ucy, ucz = motion_of(t, c, cx, cy, cz)
+        udx, udy, udz = motion_of(t, d, dx, dy, dz)
         work = (
-            dot(rax, ray, raz, ax - at(t.px, a), ay - at(t.py, a), az - at(t.pz, a))
-            - dot(rbx, rby, rbz, bx - at(t.px, b), by - at(t.py, b), bz - at(t.pz, b))
-            - dot(rcx, rcy, rcz, cx - at(t.px, c), cy - at(t.py, c), cz - at(t.pz, c))
-            - dot(rdx, rdy, rdz, dx - at(t.px, d), dy - at(t.py, d), dz - at(t.pz, d))
+            dot(rax, ray, raz, uax, uay, uaz)
+            - dot(rbx, rby, rbz, ubx, uby, ubz)
+            - dot(rcx, rcy, rcz, ucx, ucy, ucz)
+            - dot(rdx, rdy, rdz, udx, udy, udz)
         )
         idle = choose(bad, choose(work, one, zero), zero)
-        shift_start(t, a, rax, ray, raz, times(ha, idle))
-        shift_start(t, b, rbx, rby, rbz, zero - times(hb, idle))
-        shift_start(t, c, rcx, rcy, rcz, zero - times(hc, idle))
-        shift_start(t, d, rdx, rdy, rdz, zero - times(hd, idle))
+        move_idly(t, a, rax, ray, raz, times(ha, idle))
+        move_idly(t, b, rbx, rby, rbz, zero - times(hb, idle))
+        move_idly(t, c, rcx, rcy, rcz, zero - times(hc, idle))
+        move_idly(t, d, rdx, rdy, rdz, zero - times(hd, idle))
     ax = fused(ha, rax, ax)
     ay = fused(ha, ray, ay)
     az = fused(ha, raz, az)
@@ -327,11 +332,3 @@ def note_crumpled(notes: wp.array(dtype=float), crumpled: lane):
 @wp.func
 def note_crumpled(notes: wp.array(dtype=lane), crumpled: lane):
     notes[SEEN] = most(notes[SEEN], crumpled)
-
-
-@wp.func
-def shift_start(t: Any, i: Any, x: Any, y: Any, z: Any, s: Any):
-    """Move where particle i was at the substep's start by s (x, y, z)."""
-    put(t.px, i, at(t.px, i) + times(s, x))
-    put(t.py, i, at(t.py, i) + times(s, y))
-    put(t.pz, i, at(t.pz, i) + times(s, z))
