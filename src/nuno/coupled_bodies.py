@@ -16,6 +16,7 @@ from nuno.dynamics import ParticleDynamics, touches_itself
 from nuno.grip import Grip
 from nuno.rigid_dynamics import RigidDynamics
 from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
+from nuno.scene.ridges import Ridges, ridges_of
 from nuno.solver.coupling import Coupling
 from nuno.solver.state import THICKNESS
 from nuno.tie import HoldSpec, TieSpec
@@ -32,7 +33,7 @@ PRESSED = 5e5
 hard fingers a cloth that gives nothing is held by whichever few corners and vertices happen to be nearest, by µm; one
 that gives spreads the load: between 2e5 and 1e6 Pa what holds is 2 mu N."""
 RIM_POINTS = 16
-"""Corners that stand for the rim of a cylinder."""
+"""Corners that stand for the rim of a cylinder, at least: as many as leave the skin's thickness between it and them."""
 
 
 class CoupledBodies:
@@ -160,17 +161,18 @@ class CoupledBodies:
 
     def _surface(self, body: Body) -> SurfaceOfRigid:
         own: Any = body._dynamics
-        parts, points, radii = [], [], []
+        parts, points, radii, ridges = [], [], [], []
         for part in own.parts:
             place = (np.zeros(3) if part.position is None else part.position) - own.centre
             turn = quat.IDENTITY if part.quaternion is None else part.quaternion
             kind, mesh, corners, round_by = KINDS[part.kind], None, np.zeros((0, 3)), 0.0
-            radius = float(np.linalg.norm(np.maximum(np.abs(part.low), np.abs(part.high))))
+            radius, rim_points = float(np.linalg.norm(np.maximum(np.abs(part.low), np.abs(part.high)))), 0
             if kind == BOX:
                 signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)
                 corners = signs * part.half
             elif kind == CYLINDER:
-                angle = np.arange(RIM_POINTS) * (2 * np.pi / RIM_POINTS)
+                rim_points = max(RIM_POINTS, int(np.ceil(np.pi * np.sqrt(0.5 * part.half[0] / SKIN))))
+                angle = np.arange(rim_points) * (2 * np.pi / rim_points)
                 rim = np.stack([np.cos(angle) * part.half[0], np.sin(angle) * part.half[0]], axis=-1)
                 corners = np.concatenate([np.insert(rim, 2, z, axis=1) for z in (-part.half[1], part.half[1])])
             elif kind == SOLID_MESH:
@@ -184,7 +186,10 @@ class CoupledBodies:
             parts.append(RigidPart(kind, part.half, place, turn, radius, mesh))
             points.append(place + quat.rotate(turn, corners))
             radii.append(np.full(len(corners), round_by))
-        return SurfaceOfRigid(own.slot, tuple(parts), np.concatenate(points), np.concatenate(radii))
+            ridges.append(ridges_of(part, rim_points).placed(place, turn))
+        return SurfaceOfRigid(
+            own.slot, tuple(parts), np.concatenate(points), np.concatenate(radii), Ridges.joined(ridges)
+        )
 
     def _hull_mesh(self, part: Any) -> Any:
         faces = np.concatenate([np.stack([np.full(len(r) - 2, r[0]), r[1:-1], r[2:]], axis=1) for r in part.loops])

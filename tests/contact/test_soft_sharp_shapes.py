@@ -15,6 +15,7 @@ from nuno.solver.state import ALL_PARTS
 
 SIDE = 0.1
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too
+DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
 
 
 def surface(body, count=10):
@@ -34,9 +35,9 @@ def soft(**changed):
     return nuno.Soft(**{"density": 1000.0, "youngs_modulus": 5e4, "poisson_ratio": 0.3, "friction": 0.5, **changed})
 
 
-def cube_over(shapes, cells, position, material, speed=0.0, gravity=(0.0, 0.0, -9.81)):
+def cube_over(shapes, cells, position, material, speed=0.0, gravity=(0.0, 0.0, -9.81), device="cpu"):
     """Return a world with still shapes and a soft cube over them that goes down at ``speed`` [m/s], and the cube."""
-    world = nuno.World(device="cpu", gravity=gravity)
+    world = nuno.World(device=device, gravity=gravity)
     for shape in shapes:
         world.add(shape)
     cube = world.add(nuno.soft_box((SIDE, SIDE, SIDE), cells=(cells, cells, cells), position=position))
@@ -53,11 +54,12 @@ def rails(friction=0.5):
     return [nuno.box((0.6, 0.004, 0.2), name=name, position=(0, y, -0.1), friction=friction) for name, y in places]
 
 
+@DEVICES
 @pytest.mark.parametrize("cells", [4, 8])
-def test_thin_plates_bear_a_soft_cube_on_their_edges(cells):
+def test_thin_plates_bear_a_soft_cube_on_their_edges(cells, device):
     """Geometry and balance: plates between rows of vertices stay outside of all of the surface, and bear its weight."""
     plates = rails()
-    world, cube = cube_over(plates, cells, (0, 0, 0.5 * SIDE + 0.005), soft(damping=0.02))
+    world, cube = cube_over(plates, cells, (0, 0, 0.5 * SIDE + 0.005), soft(damping=0.02), device=device)
     lowest = 1.0
     for _ in range(60):
         world.run(1.0 / 60.0)
@@ -72,14 +74,15 @@ def test_thin_plates_bear_a_soft_cube_on_their_edges(cells):
     np.testing.assert_allclose(found.forces.sum(axis=0), [0, 0, 1000.0 * SIDE**3 * 9.81], rtol=0.02, atol=0.1)
 
 
+@DEVICES
 @pytest.mark.parametrize("speed", [1.0, 2.0])
 @pytest.mark.parametrize("part", [0.1, 0.4])
-def test_a_ball_smaller_than_a_cell_dents_a_soft_cube(part, speed):
+def test_a_ball_smaller_than_a_cell_dents_a_soft_cube(part, speed, device):
     """Invariant: a ball driven 30 mm into a face between its vertices never has any of the surface inside of it."""
     cell = SIDE / 4
     radius = part * cell
     ball = nuno.sphere(radius, position=(0.4 * cell, 0.3 * cell, SIDE + radius + 0.005))
-    world, cube = cube_over([nuno.plane(), ball], 4, (0, 0, 0.5 * SIDE), soft())
+    world, cube = cube_over([nuno.plane(), ball], 4, (0, 0, 0.5 * SIDE), soft(), device=device)
     start, depth = np.array(ball.position), np.array([0, 0, 0.035])
     world.move(ball, nuno.Path([0.0, 0.035 / speed], [start, start - depth]))
     nearest = 1.0
@@ -89,12 +92,13 @@ def test_a_ball_smaller_than_a_cell_dents_a_soft_cube(part, speed):
     assert nearest > -LEFT
 
 
+@DEVICES
 @pytest.mark.parametrize("turn", [0.0, 0.3])
-def test_a_soft_cube_hangs_over_the_edge_of_a_table(turn):
+def test_a_soft_cube_hangs_over_the_edge_of_a_table(turn, device):
     """Geometry: the edge does not cut into a soft cube, a third of which hangs over it, and friction holds it there."""
     table = nuno.box((0.4, 0.4, 0.1), position=(-0.2, 0, -0.05)).rotate(turn, "z")
     world, cube = cube_over(
-        [table], 4, (-0.02, 0.003, 0.5 * SIDE), soft(youngs_modulus=2e4, damping=0.02, friction=1.0)
+        [table], 4, (-0.02, 0.003, 0.5 * SIDE), soft(youngs_modulus=2e4, damping=0.02, friction=1.0), device=device
     )
     lowest = 1.0
     for _ in range(60):
@@ -106,14 +110,17 @@ def test_a_soft_cube_hangs_over_the_edge_of_a_table(turn):
     assert np.abs(cube.vertices - before).mean() < 1e-4
 
 
+@DEVICES
 @pytest.mark.parametrize("place", [(0.4, 0.3), (0.66, 0.33)])
-def test_a_soft_cube_dropped_on_a_corner_is_not_pierced(place):
+def test_a_soft_cube_dropped_on_a_corner_is_not_pierced(place, device):
     """Invariant: at 0.5 m/s onto a corner that points up between its vertices, all of the surface stays outside."""
     box = nuno.box((0.1, 0.1, 0.1)).rotate(np.arctan(np.sqrt(2.0)), "y").rotate(0.25 * np.pi, "z")
     corners = box.vertices
     box.locate(-corners[corners[:, 2].argmax()])
     cell = SIDE / 4
-    world, cube = cube_over([box], 4, (place[0] * cell, place[1] * cell, 0.5 * SIDE + 0.001), soft(), speed=0.5)
+    world, cube = cube_over(
+        [box], 4, (place[0] * cell, place[1] * cell, 0.5 * SIDE + 0.001), soft(), speed=0.5, device=device
+    )
     lowest = 1.0
     for _ in range(30):
         world.run(1.0 / 120.0)
@@ -141,24 +148,28 @@ def test_a_corner_does_not_pierce_what_it_crushes(youngs_modulus, speed):
     assert lowest > -0.05 * cell
 
 
+@DEVICES
 @pytest.mark.parametrize("radius", [0.015, 0.03])
-def test_the_rim_of_a_can_does_not_cut_into_a_soft_cube(radius):
+def test_the_rim_of_a_can_does_not_cut_into_a_soft_cube(radius, device):
     """Geometry: the surface stays outside of a can that a cube falls on, slimmer than a cell or not."""
     can = nuno.cylinder(radius, 0.1, position=(0, 0, -0.05))
-    world, cube = cube_over([can], 4, (0.01, 0.007, 0.5 * SIDE + 0.001), soft())
+    world, cube = cube_over([can], 4, (0.01, 0.007, 0.5 * SIDE + 0.001), soft(), device=device)
     for _ in range(30):
         world.run(1.0 / 60.0)
         x = surface(cube)
         assert np.maximum(np.hypot(x[:, 0], x[:, 1]) - radius, np.abs(x[:, 2] + 0.05) - 0.05).min() > -LEFT
 
 
+@DEVICES
 @pytest.mark.parametrize("ratio", [0.9, 1.3])
-def test_friction_on_edges_is_that_of_faces(ratio):
+def test_friction_on_edges_is_that_of_faces(ratio, device):
     """Coulomb: on the edges of two tilted rails a cube stays, or slides at g (sin - mu cos)."""
     mu = 0.3
     tilt = np.arctan(ratio * mu)
     gravity = (9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt))
-    world, cube = cube_over(rails(mu), 4, (0, 0, 0.5 * SIDE), soft(damping=0.02, friction=mu), gravity=gravity)
+    world, cube = cube_over(
+        rails(mu), 4, (0, 0, 0.5 * SIDE), soft(damping=0.02, friction=mu), gravity=gravity, device=device
+    )
     world.run(0.4)
     before, speed = cube.vertices, cube.velocities[:, 0].mean()
     world.run(0.2)
@@ -169,9 +180,9 @@ def test_friction_on_edges_is_that_of_faces(ratio):
         assert gained == pytest.approx(0.2 * 9.81 * (np.sin(tilt) - mu * np.cos(tilt)), rel=0.05)
 
 
-def crowded(count, substeps=None):
+def crowded(count, substeps=None, device="cpu"):
     """Return worlds with sharp shapes, still and moving, of all kinds, where a soft slab falls."""
-    world = nuno.World(device="cpu", substeps=substeps)
+    world = nuno.World(device=device, substeps=substeps)
     world.add(nuno.box((0.2, 1.0, 0.2), name="table", position=(0, 0, -0.1)))
     world.add(nuno.sphere(0.008, name="ball", position=(0.07, 0, 0.0)))
     world.add(nuno.cylinder(0.02, 0.1, name="can", position=(0.0, 0.05, 0.0)))
@@ -180,13 +191,14 @@ def crowded(count, substeps=None):
     return world.imagine(count) if count > 1 else world
 
 
+@DEVICES
 @pytest.mark.parametrize("substeps", [16, 30])
-def test_a_world_of_a_batch_meets_edges_as_alone(substeps):
+def test_a_world_of_a_batch_meets_edges_as_alone(substeps, device):
     """Promise: bit for bit, in 18 worlds (more than the lanes of a vector), of which some meet no edge."""
     shift = np.linspace(0.0, 0.6, 18)
 
     def run(which):
-        world = crowded(18 if which is None else 1, substeps)
+        world = crowded(18 if which is None else 1, substeps, device)
         chosen = slice(None) if which is None else which
         world.find("table").locate(np.stack([shift, 0 * shift, -0.1 + 0 * shift], axis=1)[chosen])
         goal = np.stack([0.15 - shift, 0 * shift, 0 * shift], axis=1)

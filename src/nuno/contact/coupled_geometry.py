@@ -10,6 +10,7 @@ import warp as wp
 from nuno.contact.coupled_lists import Elements, body_radius
 from nuno.contact.coupled_rows import (
     EDGE_EDGE,
+    EDGE_RIGID,
     LEAVE_SPEED,
     VERTEX_RIGID,
     VERTEX_TRIANGLE,
@@ -22,6 +23,13 @@ from nuno.solver.rigid_body import RigidState, point_before
 
 SQUEEZE = wp.constant(0.05)
 """Share of the distance by which a cloth is pressed together at most; beyond that it is hard, and nothing comes in."""
+RIM_SHARE = wp.constant(0.5)
+"""Of the contact distance, what an edge keeps of a rigid body's sharp edge. Straight cells of a cloth that is bent, or
+pressed between two bodies, come nearer to rims than the cloth that they stand for: with all of the distance, the rims
+of fingers bear what their faces should."""
+SLANT = wp.constant(0.05)
+"""Sine of the angle between two edges from which on they cross; less, and their ends touch, not they. By as much a
+normal may lean out of those between the two faces at a sharp edge: an edge that lies on a face leaves it in between."""
 
 
 @wp.func
@@ -67,6 +75,54 @@ def part_distance(elements: Elements, part: int, x: wp.vec3):
             ny = normal[1]
             nz = normal[2]
     return gap, wp.quat_rotate(elements.part_turn[part], wp.vec3(nx, ny, nz))
+
+
+@wp.func
+def cross_ridge(elements: Elements, k: int, a: wp.vec3, b: wp.vec3):
+    """How a body's edge from a to b crosses sharp edge k of a rigid one, all in the rigid body's frame.
+
+    Two edges touch along the normal across both, which at a sharp edge is between those of its faces; that tells the
+    side even where one has come in behind the other. An edge that goes away from a face at its rim, or along it, is
+    borne by the face and has its normal: one that leans would bear what slides as if it were rougher. The distance of
+    what is round comes from its axis.
+
+    Returns:
+        Distance [m] and normal, away from the rigid body; parts of the way along both edges; whether they cross.
+    """
+    c = elements.ridge_start[k]
+    e = b - a
+    f = elements.ridge_end[k] - c
+    d = a - c
+    n = wp.cross(e, f)
+    nn = wp.dot(n, n)
+    sine = wp.sqrt(nn / (wp.length_sq(e) * wp.length_sq(f) + 1.0e-30))
+    s = -wp.dot(wp.cross(d, f), n) / (nn + 1.0e-30)
+    t = -wp.dot(wp.cross(d, e), n) / (nn + 1.0e-30)
+    gap = float(1.0e6)
+    crosses = sine > SLANT and wp.min(wp.min(s, 1.0 - s), wp.min(t, 1.0 - t)) > -1.0e-3
+    if crosses:
+        n = n / wp.sqrt(nn)
+        left = elements.ridge_left[k]
+        right = elements.ridge_right[k]
+        radius = elements.ridge_radius[k]
+        out = wp.dot(d, n)
+        if radius == 0.0:
+            out = wp.dot(n, left + right)
+        if out < 0.0:
+            n = -n
+        if radius == 0.0:
+            # how far it leans from each face's normal towards the other's; from the one next to it, by little if at all
+            along = wp.normalize(wp.cross(left, right))
+            from_left = wp.dot(wp.cross(left, n), along)
+            from_right = wp.dot(wp.cross(n, right), along)
+            crosses = from_left > -SLANT and from_right > -SLANT
+            if from_left < 0.0:
+                n = left
+            elif from_right < 0.0:
+                n = right
+        gap = wp.dot(d + e * s, n) - radius
+        crosses = crosses and gap > -elements.ridge_depth[k]
+    return gap, n, s, t, crosses
 
 
 @wp.kernel(enable_backward=False, module="nuno.contact.coupled_geometry")
@@ -119,6 +175,19 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
         gap = signed
         n = wp.quat_rotate(turn, normal)
         rows.point[r] = x - normal * gap
+    elif kind == EDGE_RIGID:
+        i = world * rigid.capacity + rows.slot[r]
+        k_ridge = rows.part[r]
+        turn = rigid.rotation_before[i]
+        a = wp.quat_rotate_inv(turn, particles.p[first + q[0]] - rigid.position_before[i])
+        b = wp.quat_rotate_inv(turn, particles.p[first + q[1]] - rigid.position_before[i])
+        signed, normal, s, t, crosses = cross_ridge(elements, k_ridge, a, b)
+        gap = signed
+        inside = wp.where(crosses, 1.0, 0.0)
+        n = wp.quat_rotate(turn, normal)
+        weights = wp.vec4(1.0 - s, s, 0.0, 0.0)
+        start = elements.ridge_start[k_ridge]
+        rows.point[r] = start + (elements.ridge_end[k_ridge] - start) * t + normal * elements.ridge_radius[k_ridge]
     else:
         i = world * rigid.capacity + rows.slot[r]
         point = elements.point[rows.part[r]]
@@ -141,16 +210,22 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
     if bodies[0] == bodies[1]:
         # the far side of a thin part is inside of it too
         inner = apart
-    if kind != VERTEX_RIGID and gap < -inner:
+    if kind != VERTEX_RIGID and kind != EDGE_RIGID and gap < -inner:
         # far inside a solid body, this is not the face that it came through
         return
     rows.active[world * rows.room + wp.atomic_add(rows.active_count, world, 1)] = r
     rows.normal[r] = n
     rows.weights[r] = weights
-    rows.distance[r] = wp.min(apart, gap + LEAVE_SPEED * dt)
     of = world * elements.bodies
-    rows.soft[r] = (elements.soft[of + bodies[0]] + elements.soft[of + bodies[1]]) / (dt * dt)
-    rows.squeeze[r] = SQUEEZE * apart
+    soft = (elements.soft[of + bodies[0]] + elements.soft[of + bodies[1]]) / (dt * dt)
+    squeeze = SQUEEZE * apart
+    if kind == EDGE_RIGID:
+        # where vertices bear what lies on a face, an edge at its rim takes nothing of it and makes it no harder
+        apart = RIM_SHARE * apart
+        soft = 0.0
+    rows.soft[r] = soft
+    rows.squeeze[r] = squeeze
+    rows.distance[r] = wp.min(apart, gap + LEAVE_SPEED * dt)
     rows.friction[r] = elements.friction[(world * elements.bodies + bodies[0]) * elements.bodies + bodies[1]]
     rows.push[r] = 0.0
     rows.drag[r] = wp.vec3(0.0, 0.0, 0.0)

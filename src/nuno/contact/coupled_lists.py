@@ -6,7 +6,15 @@ elements alone decide, so that it does not matter when a list was made.
 
 import warp as wp
 
-from nuno.contact.coupled_rows import EDGE_EDGE, TRIANGLE_RIGID, VERTEX_RIGID, VERTEX_TRIANGLE, Particles, Rows
+from nuno.contact.coupled_rows import (
+    EDGE_EDGE,
+    EDGE_RIGID,
+    TRIANGLE_RIGID,
+    VERTEX_RIGID,
+    VERTEX_TRIANGLE,
+    Particles,
+    Rows,
+)
 from nuno.solver.rigid_body import RigidState, point_of
 
 
@@ -20,6 +28,7 @@ class Elements:
     edges: int
     parts: int
     points: int
+    ridges: int
     vertex: wp.array(dtype=int)
     vertex_body: wp.array(dtype=int)
     triangle: wp.array(dtype=wp.vec3i)
@@ -41,6 +50,15 @@ class Elements:
     point_radius: wp.array(dtype=float)
     point_slot: wp.array(dtype=int)
     point_body: wp.array(dtype=int)
+    # sharp edges of rigid bodies, and the axes of what is round with its radius, in their bodies' frames
+    ridge_start: wp.array(dtype=wp.vec3)
+    ridge_end: wp.array(dtype=wp.vec3)
+    ridge_left: wp.array(dtype=wp.vec3)  # the outward normals of the faces beside it; zero: round
+    ridge_right: wp.array(dtype=wp.vec3)
+    ridge_radius: wp.array(dtype=float)
+    ridge_depth: wp.array(dtype=float)  # what is deeper behind it than this has come in elsewhere [m]
+    ridge_slot: wp.array(dtype=int)
+    ridge_body: wp.array(dtype=int)
     # tables by world and pair of bodies, and by world and body
     touch: wp.array(dtype=int)
     friction: wp.array(dtype=float)
@@ -261,6 +279,37 @@ def list_point(
                 add_row(rows, world, TRIANGLE_RIGID, corners, slot, k, wp.vec2i(other, body), elements.point[k])
 
 
+@wp.func
+def list_ridge(
+    particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, bvh: wp.uint64, root: int,
+    world: int, k: int, far: float,
+):  # fmt: skip
+    """Edges near sharp edge k of a rigid body, or near what is round about its axis."""
+    slot = elements.ridge_slot[k]
+    body = elements.ridge_body[k]
+    i = world * rigid.capacity + slot
+    first = world * particles.count
+    a = point_of(rigid, i, elements.ridge_start[k])
+    b = point_of(rigid, i, elements.ridge_end[k])
+    around = far + elements.ridge_radius[k]
+    reach = wp.vec3(around, around, around)
+    query = wp.bvh_query_aabb(bvh, wp.min(a, b) - reach, wp.max(a, b) + reach, root)
+    hit = int(0)
+    while wp.bvh_query_next(query, hit):
+        t = hit - world * elements.triangles
+        other = elements.triangle_body[t]
+        if may_touch(elements, world, body, other):
+            edges = elements.triangle_edges[t]
+            for c in range(3):
+                if edges[c] >= 0:
+                    f = elements.edge[edges[c]]
+                    c0 = place(particles, first + f[0])
+                    s = wp.closest_point_edge_edge(a, b, c0, place(particles, first + f[1]), 1.0e-9)
+                    if s[2] < around:
+                        corners = wp.vec4i(f[0], f[1], -1, -1)
+                        add_row(rows, world, EDGE_RIGID, corners, slot, k, wp.vec2i(other, body), wp.vec3())
+
+
 @wp.kernel(enable_backward=False, module="nuno.contact.coupled_lists")
 def list_rows(
     particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, bvh: wp.uint64,
@@ -289,5 +338,10 @@ def list_rows(
         for k in range(thread, elements.points, threads):
             start = rows.count[world]
             list_point(particles, rigid, elements, rows, bvh, root, world, k, far)
+            if threads == 1:
+                sort_rows(rows, world, start)
+        for k in range(thread, elements.ridges, threads):
+            start = rows.count[world]
+            list_ridge(particles, rigid, elements, rows, bvh, root, world, k, far)
             if threads == 1:
                 sort_rows(rows, world, start)

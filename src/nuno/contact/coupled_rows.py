@@ -85,7 +85,7 @@ class Rows:
     active_count: wp.array(dtype=int)
 
 
-VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID = 0, 1, 2, 3
+VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID, EDGE_RIGID = 0, 1, 2, 3, 4
 
 
 @wp.func

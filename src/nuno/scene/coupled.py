@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.coupled_lists import Elements
+from nuno.scene.ridges import Ridges
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +65,14 @@ class SurfaceOfRigid:
         parts: What it is made of.
         points: (k, 3) float [m], its corners and the middles of what is round, in the frame of the centre of mass.
         radii: (k,) float [m], how far it reaches about each of these.
+        ridges: Its sharp edges and the axes of what is round, in the same frame.
     """
 
     slot: int
     parts: tuple[RigidPart, ...]
     points: np.ndarray
     radii: np.ndarray
+    ridges: Ridges
 
 
 def make_elements(
@@ -137,6 +140,7 @@ def make_elements(
     made.point_radius = put(joined([surface.radii for surface in rigid]), float)
     made.point_slot = put(joined([np.full(len(p[2]), p[0]) for p in points]), int)
     made.point_body = put(joined([np.full(len(p[2]), p[1]) for p in points]), int)
+    _put_ridges(made, rigid, len(particles), put)
     made.vertices, made.triangles, made.edges = made.vertex.shape[0], made.triangle.shape[0], made.edge.shape[0]
     made.parts, made.points = made.part_slot.shape[0], made.point.shape[0]
     made.touch = put(touch.astype(int).ravel(), int)
@@ -155,6 +159,21 @@ def make_elements(
     made.low = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     made.high = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     return made
+
+
+def _put_ridges(
+    made: Elements, rigid: Sequence[SurfaceOfRigid], before: int, put: Callable[[Any, Any], wp.array]
+) -> None:
+    """Set the tables of sharp edges; ``before`` bodies are not rigid."""
+    lines = Ridges.joined([surface.ridges for surface in rigid]) if rigid else None
+    for name in ("start", "end", "left", "right"):
+        setattr(made, f"ridge_{name}", put(np.zeros((0, 3)) if lines is None else getattr(lines, name), wp.vec3))
+    for name in ("radius", "depth"):
+        setattr(made, f"ridge_{name}", put(np.zeros(0) if lines is None else getattr(lines, name), float))
+    counts = [len(surface.ridges.radius) for surface in rigid]
+    made.ridges = sum(counts)
+    made.ridge_slot = put(np.repeat([surface.slot for surface in rigid], counts), int)
+    made.ridge_body = put(np.repeat(before + np.arange(len(rigid)), counts), int)
 
 
 def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

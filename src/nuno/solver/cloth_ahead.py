@@ -29,45 +29,45 @@ class Element:
 @wp.func
 def read_line(table: Topology, k: int, last: int):
     """Line bend k, or an empty one from ``last`` on."""
-    e = Element()
+    element = Element()
     if k < last:
         q = table.line[k]
-        e.a = q[0]
-        e.b = q[1]
-        e.c = q[2]
-        e.scale = table.line_scale[k]
-        e.soft = table.line_soft[k]
-    return e
+        element.a = q[0]
+        element.b = q[1]
+        element.c = q[2]
+        element.scale = table.line_scale[k]
+        element.soft = table.line_soft[k]
+    return element
 
 
 @wp.func
 def read_twist(table: Topology, k: int, last: int):
     """Cell twist k, or an empty one from ``last`` on."""
-    e = Element()
+    element = Element()
     if k < last:
         q = table.twist[k]
-        e.a = q[0]
-        e.b = q[1]
-        e.c = q[2]
-        e.d = q[3]
-        e.scale = table.twist_scale[k]
-        e.soft = table.twist_soft[k]
-    return e
+        element.a = q[0]
+        element.b = q[1]
+        element.c = q[2]
+        element.d = q[3]
+        element.scale = table.twist_scale[k]
+        element.soft = table.twist_soft[k]
+    return element
 
 
 @wp.func
 def read_cell(table: Topology, k: int, last: int):
     """Cell shear k, or an empty one from ``last`` on."""
-    e = Element()
+    element = Element()
     if k < last:
         q = table.cell[k]
-        e.a = q[0]
-        e.b = q[1]
-        e.c = q[2]
-        e.d = q[3]
-        e.scale = table.cell_scale[k]
-        e.soft = table.cell_soft[k]
-    return e
+        element.a = q[0]
+        element.b = q[1]
+        element.c = q[2]
+        element.d = q[3]
+        element.scale = table.cell_scale[k]
+        element.soft = table.cell_soft[k]
+    return element
 
 
 @wp.func
@@ -90,9 +90,9 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, thread
             if first + thread < last:
                 bend_line(t, now.a, now.b, now.c, alpha, run.damped, damping)
             for k in range(first + thread + threads, last, threads):
-                e = read_line(table, k, last)
-                alpha = t.bend_soft[e.soft] * (e.scale * rate)
-                bend_line(t, e.a, e.b, e.c, alpha, run.damped, damping)
+                element = read_line(table, k, last)
+                alpha = t.bend_soft[element.soft] * (element.scale * rate)
+                bend_line(t, element.a, element.b, element.c, alpha, run.damped, damping)
             soft = t.bend_soft[ready.soft]
             first = start
             last = stop
@@ -119,9 +119,9 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
             if first + thread < last:
                 bend_twist(t, now.a, now.b, now.c, now.d, alpha, run.damped, damping)
             for k in range(first + thread + threads, last, threads):
-                e = read_twist(table, k, last)
-                alpha = t.bend_soft[e.soft] * (e.scale * rate)
-                bend_twist(t, e.a, e.b, e.c, e.d, alpha, run.damped, damping)
+                element = read_twist(table, k, last)
+                alpha = t.bend_soft[element.soft] * (element.scale * rate)
+                bend_twist(t, element.a, element.b, element.c, element.d, alpha, run.damped, damping)
             soft = t.bend_soft[ready.soft]
             first = start
             last = stop
@@ -147,8 +147,9 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
             if first + thread < last:
                 shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha)
             for k in range(first + thread + threads, last, threads):
-                e = read_cell(table, k, last)
-                shear_cell(t, e.a, e.b, e.c, e.d, e.scale, t.shear_soft[e.soft] * (e.scale * 4.0 * rate))
+                element = read_cell(table, k, last)
+                alpha = t.shear_soft[element.soft] * (element.scale * 4.0 * rate)
+                shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha)
             soft = t.shear_soft[ready.soft]
             first = start
             last = stop

@@ -211,9 +211,8 @@ def at(x: wp.array(dtype=fine), i: int):
     return x[i]
 
 
-@wp.func
-def at(x: wp.array(dtype=fine_lane), i: int):
-    return x[i]
+@wp.func_native("return x.data[i];")
+def at(x: wp.array(dtype=fine_lane), i: int) -> fine_lane: ...
 
 
 @wp.func_native(_gather(_ELEMENT, "x.data[i[l]]"))
@@ -225,9 +224,8 @@ def put(x: wp.array(dtype=fine), i: int, value: fine):
     x[i] = value
 
 
-@wp.func
-def put(x: wp.array(dtype=fine_lane), i: int, value: fine_lane):
-    x[i] = value
+@wp.func_native("x.data[i] = value;")
+def put(x: wp.array(dtype=fine_lane), i: int, value: fine_lane): ...
 
 
 @wp.func_native(_scatter(_ELEMENT, "x.data[i[l]]"))
@@ -239,9 +237,8 @@ def gather(x: wp.array(dtype=fine), i: int):
     return x[i]
 
 
-@wp.func
-def gather(x: wp.array(dtype=fine_lane), i: int):
-    return x[i]
+@wp.func_native("return x.data[i];")
+def gather(x: wp.array(dtype=fine_lane), i: int) -> fine_lane: ...
 
 
 @wp.func_native(_gather(_OWN, "x.data[i[l]][l]"))

@@ -1,5 +1,7 @@
 """The memory that the threads of a CUDA block share, which answers many times sooner than the device's."""
 
+from typing import Any
+
 import warp as wp
 
 SHARED_FLOATS = 11500
@@ -94,3 +96,28 @@ return {};
 def program(first: int) -> wp.array(dtype=int):  # type: ignore[valid-type]
     """What a block does step by step in the block's own memory, four numbers a step, from number ``first`` on."""
     ...
+
+
+@wp.func
+def bring_places(to: Any, of: Any, n: int, thread: int, threads: int):
+    """Copy x, y and z of ``n`` particles from one state of a world to another, by all threads of a block."""
+    for i in range(thread, n, threads):
+        to.x[i] = of.x[i]
+        to.y[i] = of.y[i]
+        to.z[i] = of.z[i]
+
+
+@wp.func
+def bring_speeds(to: Any, of: Any, n: int, thread: int, threads: int):
+    """The same of velocities."""
+    for i in range(thread, n, threads):
+        to.vx[i] = of.vx[i]
+        to.vy[i] = of.vy[i]
+        to.vz[i] = of.vz[i]
+
+
+@wp.func
+def bring_masses(to: Any, of: Any, n: int, thread: int, threads: int):
+    """The same of inverse masses."""
+    for i in range(thread, n, threads):
+        to.w[i] = of.w[i]

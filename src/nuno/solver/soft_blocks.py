@@ -16,6 +16,9 @@ from nuno.solver.shared_memory import (
     FINE_PARTICLES,
     ROOMY_PARTICLES,
     SHARED_PARTICLES,
+    bring_masses,
+    bring_places,
+    bring_speeds,
     column,
     figures,
     fine_column,
@@ -95,16 +98,10 @@ def run_partly(
     t.y = column(SHARED_PARTICLES)
     t.z = column(2 * SHARED_PARTICLES)
     t.w = column(3 * SHARED_PARTICLES)
-    for i in range(thread, n, threads):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
-        t.w[i] = outside.w[i]
+    bring_places(t, outside, n, thread, threads)
+    bring_masses(t, outside, n, thread, threads)
     advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
-    for i in range(thread, n, threads):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
+    bring_places(outside, t, n, thread, threads)
 
 
 @wp.func
@@ -126,22 +123,12 @@ def run_shared(
     t.vx = column(4 * ROOMY_PARTICLES)
     t.vy = column(5 * ROOMY_PARTICLES)
     t.vz = column(6 * ROOMY_PARTICLES)
-    for i in range(thread, n, threads):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
-        t.w[i] = outside.w[i]
-        t.vx[i] = outside.vx[i]
-        t.vy[i] = outside.vy[i]
-        t.vz[i] = outside.vz[i]
+    bring_places(t, outside, n, thread, threads)
+    bring_masses(t, outside, n, thread, threads)
+    bring_speeds(t, outside, n, thread, threads)
     advance_block(t, t, topo, sides, run, shapes, substeps, thread, threads)
-    for i in range(thread, n, threads):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
-        outside.vx[i] = t.vx[i]
-        outside.vy[i] = t.vy[i]
-        outside.vz[i] = t.vz[i]
+    bring_places(outside, t, n, thread, threads)
+    bring_speeds(outside, t, n, thread, threads)
 
 
 @wp.func
@@ -159,15 +146,9 @@ def run_fine_partly(
     t.x = fine_column(0)
     t.y = fine_column(FINE_PARTICLES)
     t.z = fine_column(2 * FINE_PARTICLES)
-    for i in range(thread, n, threads):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
+    bring_places(t, outside, n, thread, threads)
     advance_block(t, view(floats, tid / threads, n, size), topo, sides, run, shapes, substeps, thread, threads)
-    for i in range(thread, n, threads):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
+    bring_places(outside, t, n, thread, threads)
 
 
 def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:

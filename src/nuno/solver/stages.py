@@ -119,16 +119,16 @@ class Element:
 @wp.func
 def read(work: Work, world: int, kind: int, k: int, last: int):
     """Element k of the table, or an empty one from ``last`` on."""
-    e = Element()
+    element = Element()
     if is_sorted(kind) and k < last:
         q = work.corner[k]
-        e.a = q[0]
-        e.b = q[1]
-        e.c = q[2]
-        e.d = q[3]
-        e.scale = work.scale[k]
-        e.soft = work.soft[world * work.scale.shape[0] + k]
-    return e
+        element.a = q[0]
+        element.b = q[1]
+        element.c = q[2]
+        element.d = q[3]
+        element.scale = work.scale[k]
+        element.soft = work.soft[world * work.scale.shape[0] + k]
+    return element
 
 
 @wp.func
