@@ -23,6 +23,7 @@ HAND_RADIUS = 0.014  # [m]
 REST_HEIGHT = 0.0025  # [m]
 CELL = 0.0165  # [m] about; estimators use 0.02 and more
 SUBSTEPS = 45
+SIDEWAYS = (0.0, 0.1)  # [m] how far from above the picked point the hand ends
 
 
 @dataclass
@@ -83,16 +84,26 @@ def hand_pixels(camera: Camera, hand: np.ndarray) -> np.ndarray:
     return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= radius**2
 
 
-def generate(scenes: int, picks: int, seed: int, device: str) -> list[Case]:
-    """Make ``scenes`` x ``picks`` cases; the same seed makes the same cases on one device."""
+def generate(
+    scenes: int, picks: int, seed: int, device: str, sideways: tuple[float, float] = SIDEWAYS
+) -> list[Case]:
+    """Make ``scenes`` x ``picks`` cases; the same seed makes the same cases on one device.
+
+    Args:
+        scenes: Number of scenes.
+        picks: Picks of each.
+        seed: Of everything that is drawn at random.
+        device: Where to simulate.
+        sideways: How far sideways the hand goes at least and at most [m].
+    """
     rng = np.random.default_rng(seed)
     cases: list[Case] = []
     while len(cases) < scenes * picks:
-        cases += _scene(rng, picks, device)
+        cases += _scene(rng, picks, device, sideways)
     return cases
 
 
-def _scene(rng: np.random.Generator, picks: int, device: str) -> list[Case]:
+def _scene(rng: np.random.Generator, picks: int, device: str, sideways: tuple[float, float]) -> list[Case]:
     table = Table(
         rng.uniform(0.70, 0.76), (rng.uniform(0.36, 0.48), rng.uniform(0.56, 0.66)), (rng.uniform(0.08, 0.13), 0.0)
     )
@@ -117,7 +128,7 @@ def _scene(rng: np.random.Generator, picks: int, device: str) -> list[Case]:
     )  # fmt: skip
     ij = rng.integers(0, 6, (picks, 2))
     start = rectangle.grid_points(6, 6)[ij[:, 0], ij[:, 1]]
-    angle, reach = rng.uniform(0, 2 * np.pi, picks), rng.uniform(0, 0.1, picks)
+    angle, reach = rng.uniform(0, 2 * np.pi, picks), rng.uniform(*sideways, picks)
     lift = np.stack([reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.3, 0.5, picks)], axis=1)
     hand = start + lift
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=SUBSTEPS)

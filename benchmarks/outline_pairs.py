@@ -4,7 +4,8 @@ Needs PyTorch (``pip install torch``) beside Nuno. A scene is one cloth on one t
 seen by a camera of its own. To every hand picks of all 36 grid points are imagined, on an estimator's mesh and with
 guesses of its own, from a rectangle that is measured a little wrong; and 18 real ones are made, on another mesh, with
 another step and material, and with noise on the edge. All 36 are equally likely to be the true one, whatever the
-hand: so nothing can be learned of how far hands go. What is written is, for each real silhouette, a picture of it,
+hand: so nothing can be learned of how far hands go. Half of the cameras stand as in the cases, half anywhere around
+the table, so that one cloth is seen from many sides. What is written is, for each real silhouette, a picture of it,
 pictures of the guesses at the eight best candidates, each at its best turn, and the hand-made log likelihoods of all.
 """
 
@@ -26,7 +27,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.futures import LIFT_SECONDS, REST_SPEED, rest_speed, solver_of, table_world
 from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_counts, spread
-from nuno.estimate.learned import WIDTH
+from nuno.estimate.learned import WIDTH, described
 from nuno.estimate.outline_net import SIZE
 from nuno.estimate.ranking import CONTOUR_WEIGHT, OVERLAP_WEIGHT
 from nuno.estimate.turns import TURNS, log_prior
@@ -38,9 +39,11 @@ FIRST = (FIRM[1], FIRM[8], LOOSE[3], LOOSE[6])
 OTHERS = tuple(h for h in FIRM + LOOSE + SHEARING if h not in FIRST)
 FINE = spread(3000.0, 1200.0)
 GRID = np.array([divmod(k, 6) for k in range(36)]) / 5
-BEST, NEAR, FAR = 8, 12, 6
-"""Candidates of which pictures are kept; real picks of those nearest to the hand, and of others drawn at random."""
+BEST, NEAR, FAR = 8, 11, 5
+"""Candidates of which pictures are kept; real picks of those nearest to the hand, and of others drawn at random: with
+eight hands not more of these than an H200 has processors."""
 TURNED, TURN_SPREAD = 0.4, np.radians(14)  # share of the scenes whose real cloths are turned about the hand, [rad]
+AROUND = 0.5  # share of the cameras that stand anywhere around the table
 
 
 def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> ClothRectangle:
@@ -114,13 +117,19 @@ def scene(rng: np.random.Generator, count: int, device: str, generator: Any) -> 
         hand = begin[rng.integers(36)] + (reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.28, 0.52))
         eye = np.array([rng.uniform(-1.0, -0.78), rng.uniform(-0.14, 0.14), table.height + rng.uniform(0.48, 0.75)])
         target = np.array([0.1, 0.0, table.height + 0.12]) + rng.normal(0, 0.02, 3)
+        about = rng.uniform(0, 2 * np.pi) if rng.uniform() < AROUND else 0.0
+        turn = np.array([[np.cos(about), -np.sin(about), 0], [np.sin(about), np.cos(about), 0], [0, 0, 1]])
+        middle = np.array([0.1, 0.0, 0.0])
+        eye, target = (middle + turn @ (point - middle) for point in (eye, target))
         camera = looking_at(eye, target, rng.uniform(400, 600))
         pixels = camera.project(true.corners)
         if pixels.min() > 8 and (pixels < (631, 471)).all():
             hands.append(hand)
             cameras.append(camera)
     imagined = []
-    for cells, substeps, spread_ in guesses(rng):
+    spreads = guesses(rng)
+    kinds = np.concatenate([described(spread_, cells) for cells, _, spread_ in spreads]).astype(np.float16)
+    for cells, substeps, spread_ in spreads:
         each = {
             name: np.tile(np.repeat([getattr(h, name) for h in spread_], 36), count)
             for name in (
@@ -157,7 +166,13 @@ def scene(rng: np.random.Generator, count: int, device: str, generator: Any) -> 
         good = found.pop("good") & real[2][k * n : (k + 1) * n]
         for q in np.nonzero(good)[0]:
             example = {name: value[q] for name, value in found.items()}
-            examples.append(example | {"true": int(picks[k][q]), "weight": weights[k].astype(np.float16)})
+            true_at = int(picks[k][q])
+            sideways = np.float16(np.linalg.norm(begin[true_at, :2] - hands[k][:2]))
+            examples.append(
+                example | {
+                    "true": true_at, "weight": weights[k].astype(np.float16), "sideways": sideways, "guess": kinds,
+                }
+            )  # fmt: skip
     return examples
 
 

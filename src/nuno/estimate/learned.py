@@ -13,6 +13,7 @@ equally likely when it was trained.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +22,13 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table
 from nuno.estimate.futures import Futures
+from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.outline_net import SIZE, log_ratios
 from nuno.estimate.pick_sight import masks_of_turned
 from nuno.estimate.ranking import Comparison
 
-HAND_MADE_SHARE = 0.85
-LEARNED_SHARE = 0.35
+HAND_MADE_SHARE = 0.7
+LEARNED_SHARE = 1.0
 FIRST_BEST = 12
 """Where a stage looks at more candidates, the network looks at its best ones; it was trained on the best eight."""
 WIDTH = 224
@@ -132,9 +134,27 @@ def correction(outline: Outline, futures: Futures, comparison: Comparison, table
             futures, guess * looked.shape[1] + candidate, angles, outline.camera, table, hand
         )  # fmt: skip
         pair = [values[turn, guess, candidate] for values in (comparison.chamfer, comparison.iou)]
-        scalars = np.column_stack([np.log1p(pair[0]), pair[1], np.abs(angles), np.tile(outline.place, (len(guess), 1))])
+        of_guess = described(futures.discretisation.spread, futures.discretisation.cells)[guess]
+        place = np.tile(outline.place, (len(guess), 1))
+        scalars = np.column_stack([np.log1p(pair[0]), pair[1], np.abs(angles), place, of_guess])
         added[guess, candidate] += LEARNED_SHARE * log_ratios(outline.picture, outline.cut(masks), scalars)
     return np.asarray(added)
+
+
+def described(spread: Sequence[Hypothesis], cells: int) -> np.ndarray:
+    """(n, 5) float, guesses as the network is told of them: rigidity, friction, stretch, shear, mesh; about -1 to 1.
+
+    Args:
+        spread: The guesses.
+        cells: Cells along the longer side of their mesh.
+    """
+    return np.array([
+        (
+            np.log(h.bending_rigidity) / 2 + 4.5, h.friction, np.log(h.stretch_stiffness) - 6.0,
+            np.log(h.shear_stiffness) / 2 - 2.0, cells / 20 - 1.0,
+        )
+        for h in spread
+    ])  # fmt: skip
 
 
 def log_of_sum(logs: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 SIZE = 64
 """[px] Sides of the pictures it looks at."""
-SCALARS = 7
+SCALARS = 12
 LEVELS = 15
 """Pictures were kept in steps of 1/15 for training."""
 STRIDES = (2, 2, 2, 1, 2)
