@@ -84,9 +84,7 @@ def hand_pixels(camera: Camera, hand: np.ndarray) -> np.ndarray:
     return (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= radius**2
 
 
-def generate(
-    scenes: int, picks: int, seed: int, device: str, sideways: tuple[float, float] = SIDEWAYS
-) -> list[Case]:
+def generate(scenes: int, picks: int, seed: int, device: str, sideways: tuple[float, float] = SIDEWAYS) -> list[Case]:
     """Make ``scenes`` x ``picks`` cases; the same seed makes the same cases on one device.
 
     Args:

@@ -83,7 +83,7 @@ def unpacked(pictures: Any) -> Any:
 
 
 def moved(real: Any, imagined: Any, place: Any) -> tuple[Any, Any, Any]:
-    """Pictures (n, SIZE, SIZE) and (n, k, SIZE, SIZE) that are mirrored, moved and resized, and places (n, 4) to match."""
+    """Mirror, move and resize pictures (n, SIZE, SIZE) and (n, k, SIZE, SIZE), and change places (n, 4) to match."""
     n, device = len(real), real.device
     mirror = torch.where(torch.rand(n, device=device) < 0.5, -1.0, 1.0)
     scale = 1.0 + SCALED * (2 * torch.rand(n, device=device) - 1)
@@ -163,10 +163,12 @@ def check(net: Net, data: dict[str, Any], rows: Any) -> None:
         )  # fmt: skip
 
 
-def train(net: Net, data: dict[str, Any], rows: Any, choosing: Any, checking: Any, epochs: float, seconds: float) -> Net:
+def train(
+    net: Net, data: dict[str, Any], rows: Any, choosing: Any, checking: Any, epochs: float, seconds: float
+) -> Net:
     """AdamW, one cycle, by epochs or by the clock; the mean weights of the epoch that is best of those who choose."""
     started, steps, at, epoch = time.perf_counter(), max(1, int(epochs * len(rows) / AT_ONCE)), len(rows), 0
-    optimiser = torch.optim.AdamW(net.parameters(), lr=PEAK, weight_decay=0.05, betas=(0.9, 0.98))
+    optimiser = torch.optim.AdamW(net.parameters(), lr=peak, weight_decay=0.05, betas=(0.9, 0.98))
     mean, best, kept = copy.deepcopy(net), -math.inf, copy.deepcopy(net)
     losses: list[Any] = []
     for step in range(steps + 1):
@@ -188,7 +190,7 @@ def train(net: Net, data: dict[str, Any], rows: Any, choosing: Any, checking: An
                 break
             order, at = rows[torch.randperm(len(rows), device=rows.device)], 0
         part, at = order[at : at + AT_ONCE], at + AT_ONCE
-        optimiser.param_groups[0]["lr"] = PEAK * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * done))
+        optimiser.param_groups[0]["lr"] = peak * min(1.0, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * done))
         net.train()
         logits = evidence(net, data, part) + data["weight"][part].float()
         loss = functional.cross_entropy(logits, data["true"][part].long())
@@ -242,6 +244,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=float, default=20.0)
     parser.add_argument("--seconds", type=float, default=1e9, help="shorter, where it is earlier")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--begin", type=Path, help="a .pt of an earlier run to begin from, at half the learning rate")
     parser.add_argument("--device", default="cuda:0")
     options = parser.parse_args()
     torch.manual_seed(options.seed)
@@ -253,11 +256,13 @@ def main() -> None:
         f"{len(rows)} examples, {len(choosing)} for choosing, {len(checking)} for checking, "
         f"{time.perf_counter() - started:.0f} s", flush=True,
     )  # fmt: skip
-    net = Net().to(options.device)
-    net = train(net, data, rows, choosing, checking, options.epochs, options.seconds)
+    net = (Net() if options.begin is None else begun(options.begin)).to(options.device)
+    peak = PEAK if options.begin is None else PEAK / 2
+    net = train(net, data, rows, choosing, checking, options.epochs, options.seconds, peak)
     for held in (choosing, checking):
         if len(held):
             check(net, data, held)
+    torch.save(net.state_dict(), options.out.with_suffix(".pt"))
     write(net, options.out)
 
 

@@ -187,6 +187,8 @@ def check_failure(said, error, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        (["--sideways", "far"], "--sideways"),
+        (["--sideways", "0"], "sideways"),
         (["--candidates", "six"], "--candidates"),
         (["--candidates", "6"], "--candidates"),
         (["--candidates", "6x-1"], "--candidates"),

@@ -25,6 +25,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pick.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the two images that it names")
     pick.add_argument("--out", required=True, metavar="DIR", help="where result.json and result.png go")
     pick.add_argument("--candidates", default="6x6", metavar="NxM", help="grid: N along the longer side (default 6x6)")
+    pick.add_argument(
+        "--sideways", metavar="SHARE", default="0.5",
+        help="how far sideways hands go that lift a cloth, as a share of how high; none: any way (default 0.5)",
+    )  # fmt: skip
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
@@ -68,13 +72,19 @@ def _pick(options: argparse.Namespace) -> int:
     parts = options.candidates.lower().split("x")
     if len(parts) != 2 or not all(part.isdecimal() for part in parts):
         raise InvalidInputError(f"--candidates must be two numbers such as 6x6, got {options.candidates!r}")
+    try:
+        sideways = None if options.sideways.lower() == "none" else float(options.sideways)
+    except ValueError:
+        raise InvalidInputError(f"--sideways must be a number or none, got {options.sideways!r}") from None
     _check_out(options.out)
     from nuno.estimate.case import read_case
 
     case = read_case(options.case)
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
-    result = case.estimate(candidates=grid, device=options.device, progress=options.progress)
+    result = case.estimate(
+        candidates=grid, sideways=sideways, device=options.device, progress=options.progress
+    )  # fmt: skip
     result.save(options.out)
     i, j = result.best
     sys.stdout.write(

@@ -10,8 +10,16 @@ from nuno.camera.table import Table
 from nuno.estimate import learned
 from nuno.estimate.futures import Futures
 from nuno.estimate.hypotheses import Discretisation, Hypothesis
-from nuno.estimate.learned import FIRST_BEST, HAND_MADE_SHARE, LEARNED_SHARE, correction, log_of_sum, outline_of
-from nuno.estimate.outline_net import SIZE
+from nuno.estimate.learned import (
+    FIRST_BEST,
+    HAND_MADE_SHARE,
+    LEARNED_SHARE,
+    correction,
+    described,
+    log_of_sum,
+    outline_of,
+)  # fmt: skip
+from nuno.estimate.outline_net import SCALARS, SIZE
 from nuno.estimate.ranking import Comparison, rank
 from nuno.estimate.turns import log_prior
 
@@ -89,7 +97,12 @@ def test_the_best_candidates_are_looked_at(count, monkeypatch):
         return np.zeros((len(worlds), camera.height, camera.width), dtype=bool)
 
     monkeypatch.setattr(learned, "masks_of_turned", masks_of_turned)
-    monkeypatch.setattr(learned, "log_ratios", lambda real, imagined, scalars: 2.0 + np.arange(len(imagined)))
+
+    def log_ratios(real, imagined, scalars):
+        asked.update(scalars=scalars)
+        return 2.0 + np.arange(len(imagined))
+
+    monkeypatch.setattr(learned, "log_ratios", log_ratios)
     spread = (Hypothesis(1e-4), Hypothesis(1e-3))
     futures = Futures(None, None, None, count, Discretisation(10, 10, spread))
     seen = compared(count)
@@ -98,6 +111,10 @@ def test_the_best_candidates_are_looked_at(count, monkeypatch):
     expected = [(g, c) for g in range(2) for c in range(best) if seen.finite[g, c]]
     np.testing.assert_array_equal(asked["worlds"], [g * count + c for g, c in expected])
     np.testing.assert_allclose(asked["turns"], np.radians(-10.0))
+    told = described(spread, 10)
+    assert told.shape == (2, 5) and told[0, 0] < told[1, 0]  # limp and stiff
+    np.testing.assert_array_equal(asked["scalars"][:, -5:], told[[g for g, _ in expected]])
+    assert asked["scalars"].shape == (len(expected), SCALARS)
     error = 5 * np.log1p(seen.chamfer) + 10 * 0.2 - log_prior(seen.turns)[:, None, None]
     by_hand = np.log(np.exp(-error).sum(axis=0))
     wanted = np.where(seen.finite, (HAND_MADE_SHARE - 1) * by_hand, 0.0)

@@ -11,6 +11,7 @@ from nuno import ImageError, InvalidInputError
 from nuno.camera import raster
 from nuno.camera.table import Table
 from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.lift_prior import log_prior_of_lift
 from nuno.estimate.pick_sight import draw_futures, masks_of_turned
 from nuno.estimate.ranking import SHARE
 from nuno.estimate.turns import turn
@@ -36,6 +37,11 @@ def make_camera():
 
 @pytest.fixture(scope="module")
 def seen():
+    """What is seen of a lift by 0.4 m, 5 cm sideways."""
+    return lifted(UV, (0.04, -0.03, 0.4))
+
+
+def lifted(uv, way):
     """The masks before and after, the hand, what the label rule says of the picked point, and the mask after a turn."""
     camera = make_camera()
     world = nuno.World(device="cpu", substeps=18)
@@ -44,9 +50,9 @@ def seen():
     corners = cloth.vertices[[0, 15, 175, 160]]  # u, v = (0, 0), (1, 0), (1, 1), (0, 1)
     before = world.masks(camera, cloth).numpy()
     world.attach(cloth, nuno.Cloth(bending_rigidity=3e-4, area_density=0.3, thickness=2 * REST_HEIGHT))
-    point = cloth.at(*UV)
+    point = cloth.at(*uv)
     start = point.positions(cloth.vertices, cloth.faces)[0]
-    hand = start + np.array((0.04, -0.03, 0.4))
+    hand = start + np.array(way)
     world.grip(cloth, point, to=nuno.Path([0.0, 1.5], [start, hand], interpolation="minimum_jerk"))
     world.run(3.5)
     after = world.masks(camera, cloth).numpy()
@@ -56,7 +62,7 @@ def seen():
     # C00 is the corner nearest to pixel (0, 0); the sheet's x is the longer side, so u runs from or to C00
     first = int(np.linalg.norm(camera.project(corners), axis=1).argmin())
     from_end = ((0, 1, 1, 0)[first], (0, 0, 1, 1)[first])
-    u, v = (1 - a if end else a for a, end in zip(UV, from_end, strict=True))
+    u, v = (1 - a if end else a for a, end in zip(uv, from_end, strict=True))
     true = (round(u * 5), round(v * 5))
     return {"before_mask": before, "after_mask": after, "hand": hand}, true, (u, v), corners[first], turned
 
@@ -79,6 +85,36 @@ def test_what_was_learned_is_asked_unless_left_out(result, seen):
     assert without.best == seen[1]
     assert np.abs(without.scores - result.scores).max() > 0.1
     np.testing.assert_allclose(without.eq1, result.eq1, atol=1e-12)  # same futures, of which it changes nothing
+
+
+def test_the_prior_of_the_lift_is_added_unless_left_out(seen):
+    """Bit for bit: without it the scores are the evidence alone, and so they are with a prior that is flat."""
+    points = np.array(((0.0, 0.0), (0.21, 0.4), (1.0, 0.5), (0.7, 0.9)))  # no grid
+    given = options(seen, candidates=points)
+    alone, flat, with_it = (nuno.estimate_pick(None, None, **given, sideways=s) for s in (None, 1e12, 0.5))
+    np.testing.assert_array_equal(flat.scores, alone.scores)
+    prior = log_prior_of_lift(alone.rectangle, points, seen[0]["hand"], 0.5)
+    assert np.ptp(prior) > 0.5
+    np.testing.assert_array_equal(with_it.scores, alone.scores + prior)
+    np.testing.assert_array_equal(nuno.estimate_pick(None, None, **given).scores, with_it.scores)
+    likely = np.exp(with_it.scores - with_it.scores.max())
+    np.testing.assert_allclose(with_it.probabilities, likely / likely.sum(), rtol=1e-12)
+    for score in ("chamfer", "eq1"):
+        one, other = (nuno.estimate_pick(None, None, **given, score=score, sideways=s) for s in (None, 0.5))
+        np.testing.assert_array_equal(one.scores, other.scores)
+
+
+def test_a_lift_far_sideways_is_still_found():
+    """A corner that was carried 0.4 m along the cloth's side and 0.35 m up: the silhouette tells.
+
+    The prior holds the point that is under the hand now for tens of times as likely.
+    """
+    seen = lifted((0.0, 0.0), (0.4 * np.cos(YAW), 0.4 * np.sin(YAW), 0.35))
+    result = nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE]))
+    prior = log_prior_of_lift(result.rectangle, result.labels / 5, seen[0]["hand"], 0.5)
+    true = result.labels.tolist().index(list(seen[1]))
+    assert prior[true] < prior.max() - np.log(20.0)
+    assert result.best == seen[1] and result.confidence > 0.8
 
 
 def test_the_picked_point_is_found(result, seen):
@@ -294,6 +330,9 @@ BAD = {
     "an unknown score": (dict(score="best"), InvalidInputError, "chamfer"),
     "no mesh": (dict(discretisations=[]), InvalidInputError, "discretisation"),
     "no turn of 0": (dict(turns=(0.1,)), InvalidInputError, "turns"),
+    "a lift straight up": (dict(sideways=0.0), InvalidInputError, "sideways"),
+    "a lift of nan": (dict(sideways=np.nan), InvalidInputError, "sideways"),
+    "a lift of a word": (dict(sideways="far"), InvalidInputError, "sideways"),
     "sure beyond all doubt": (dict(sure=1.5), InvalidInputError, "sure"),
     "no such device": (dict(device="gpu"), InvalidInputError, "device"),
     "a camera without entries": (dict(camera={}), InvalidInputError, "width"),

@@ -23,6 +23,20 @@ def test_the_evidence_is_the_mean_over_the_guesses_that_looked():
     np.testing.assert_allclose(np.exp(rank([first, second], "evidence", 3).scores), expected, rtol=1e-12)
 
 
+def test_a_prior_multiplies_the_evidence_alone():
+    """Twice as likely before is twice the evidence; other scores, and eq. (1), do not ask for it."""
+    comparisons = [looked_at([0, 1, 2], [[0.0, 1.0, 3.0], [1.0, 1.0, 3.0]])]
+    prior = np.log((1.0, 2.0, 0.5))
+    plain = rank(comparisons, "evidence", 3)
+    for score in ("evidence", "silhouette"):
+        found = rank(comparisons, score, 3, prior)
+        np.testing.assert_array_equal(found.scores, plain.scores + prior)
+        np.testing.assert_array_equal(found.eq1, plain.eq1)
+    for score in ("chamfer", "iou", "eq1"):
+        one, other = rank(comparisons, score, 3, prior), rank(comparisons, score, 3)
+        np.testing.assert_array_equal(one.scores, other.scores)
+
+
 def test_probabilities_are_shares_of_the_evidence():
     """They add up to 1 and are in proportion to the mean likelihoods; one without a finite future gets 0."""
     scores = np.log([0.5, 0.25, 1.25, 0.0 + 1e-300]) - 4000.0  # far below what exp can hold

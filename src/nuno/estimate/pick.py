@@ -27,6 +27,7 @@ from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.kernels import compile_ahead
 from nuno.estimate.learned import Outline, correction, outline_of
+from nuno.estimate.lift_prior import SIDEWAYS, log_prior_of_lift
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
@@ -68,6 +69,7 @@ def estimate_pick(
     sure: float = SURE,
     turns: Sequence[float] = TURNS,
     learned: bool = True,
+    sideways: float | None = SIDEWAYS,
     score: str = "evidence",
     device: str = "auto",
     progress: bool | None = None,
@@ -108,6 +110,10 @@ def estimate_pick(
             "chamfer", "iou" and "eq1" look at 0 only.
         learned: Whether a network that was trained on imagined picks has a say in the likelihood of silhouettes
             (`nuno.estimate.learned`); "chamfer", "iou" and "eq1" are without it.
+        sideways: How far sideways the hand went, as a share of how high it went, which half of all lifts are taken to
+            stay below: points about under the hand are likelier before the image after is seen
+            (`nuno.estimate.lift_prior`). None takes all candidates as alike: right where the hand was led to the side
+            on purpose. "chamfer", "iou" and "eq1" are without it.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -135,6 +141,8 @@ def estimate_pick(
     number("rest_height", rest_height, above=0.0)
     number("lift_seconds", lift_seconds, above=0.0)
     number("sure", sure, above=0.0, high=1.0)
+    if sideways is not None:
+        number("sideways", sideways, above=0.0)
     if score not in RANKINGS:
         raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
     if not discretisations or discretisations[0].best is not None:
@@ -176,6 +184,7 @@ def estimate_pick(
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
     ranked: Ranked | None = None
+    before_seen = None if sideways is None else log_prior_of_lift(rectangle, uv, hand_at, sideways)
     outline: Outline | None = None
     settings: dict[str, Any] = dict(
         rectangle=rectangle, grid=grid, table=table, hand=hand_at, rest_height=rest_height, device=device,
@@ -211,7 +220,7 @@ def estimate_pick(
                 comparison = replace(comparison, correction=added)
         comparisons.append(comparison)
         batches.append(futures)
-        ranked = rank(comparisons, score, len(uv))
+        ranked = rank(comparisons, score, len(uv), before_seen)
         seconds["compare"] += time.perf_counter() - clock
         if ranked.settled(sure):
             break

@@ -38,8 +38,9 @@ class PickResult:
         labels: (k, 2) the candidates: (i, j) of a grid, or the (u, v) that were given.
         order: (k,) int, candidates from best to worst.
         scores: (k,) float by candidate, higher is better.
-        score_name: What the scores are: "log_evidence" (of silhouettes), "log_evidence_with_pattern",
-            "negative_chamfer_px" (minus the symmetric mean contour distance in pixels of the image), "iou", "eq1".
+        score_name: What the scores are: "log_evidence" (of silhouettes) or "log_evidence_with_pattern", both with the
+            prior of the lift unless ``sideways`` was None, "negative_chamfer_px" (minus the symmetric mean contour
+            distance in pixels of the image), "iou", "eq1".
         eq1: (k,) float by candidate, the similarity of the paper's eq. (1), of futures that are not turned.
         rectangle: The cloth as it lay before.
         camera: The camera.

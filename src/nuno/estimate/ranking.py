@@ -8,7 +8,8 @@ heavy-tailed error in pixels: being off by twice as much costs about the same an
 independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
 (docs/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
-(`nuno.estimate.learned`).
+(`nuno.estimate.learned`). How far sideways the hand would have gone from a candidate is its prior
+(`nuno.estimate.lift_prior`), by which its evidence is multiplied.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ class Ranked:
     """Scores of the candidates.
 
     Attributes:
-        name: What the scores are: "log_evidence" (of silhouettes), "log_evidence_with_pattern", "negative_chamfer_px",
-            "iou" or "eq1".
+        name: What the scores are: "log_evidence" (of silhouettes), "log_evidence_with_pattern", both with the
+            candidate's prior where there is one, "negative_chamfer_px", "iou" or "eq1".
         scores: (k,) float, higher is better; -inf where no future stayed finite.
         eq1: (k,) float, the paper's similarity, without a turn: the best guess of each mesh, averaged over meshes.
     """
@@ -115,16 +116,20 @@ class Ranked:
         return sure < 1.0 and likely is not None and bool(likely.max() >= sure)
 
 
-def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
+def rank(
+    comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None = None
+) -> Ranked:
     """Combine the comparisons of all meshes.
 
-    The evidence of a candidate is the mean likelihood over all guesses that looked at it. The other scores take the
-    best guess of each mesh and average over the meshes that looked at the candidate.
+    The evidence of a candidate is the mean likelihood over all guesses that looked at it, times its prior where there
+    is one. The other scores take the best guess of each mesh and average over the meshes that looked at the candidate.
 
     Args:
         comparisons: One for each mesh.
         score: One of `RANKINGS`.
         count: Number of candidates.
+        log_prior_of_candidates: (count,) float, how likely each is before any image is seen
+            (`nuno.estimate.lift_prior`), up to a constant; None is alike. Evidence alone asks for it.
     """
     looked, similar = np.zeros(count), np.zeros(count)
     total, guesses = np.zeros(count), np.zeros(count)
@@ -144,7 +149,10 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
         if score in EVIDENCE:
             looks = score == "evidence" and any(c.pattern is not None for c in comparisons)
             name = "log_evidence_with_pattern" if looks else "log_evidence"
-            return Ranked(name, np.log(total / guesses) - offset, similar / looked)
+            scores = np.log(total / guesses) - offset
+            if log_prior_of_candidates is not None:
+                scores = scores + log_prior_of_candidates
+            return Ranked(name, scores, similar / looked)
         mean = errors / looked
         if score == "chamfer":
             return Ranked("negative_chamfer_px", -mean, similar / looked)
@@ -152,7 +160,7 @@ def rank(comparisons: Sequence[Comparison], score: str, count: int) -> Ranked:
 
 
 def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:
-    """How likely each candidate is by its log evidence, all being alike before: (k,) float that add up to 1.
+    """How likely each candidate is by its log evidence, which its prior is in: (k,) float that add up to 1.
 
     Args:
         name: What the scores are, see `Ranked`: None is returned where they are no evidence.

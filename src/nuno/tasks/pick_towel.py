@@ -242,7 +242,8 @@ class TowelPicker:
         """Look at the towel in the hand, and tell at which point it is held.
 
         Args:
-            options: Of ``estimate_pick``.
+            options: Of ``estimate_pick``. Whatever the point, the hand was led to one place, so nothing follows from
+                how far sideways it went: ``sideways`` is None unless given.
 
         Raises:
             EstimationError: nothing has been picked, the bead on the hand is not seen, or nothing explains the image.
@@ -258,7 +259,7 @@ class TowelPicker:
             table_half_extents=self.table.half_extents, table_centre=self.table.centre,
             table_thickness=self.table.thickness, hand=held, rest_height=self.rest_height, rectangle=rectangle,
             before_mask=self._mask, hidden=after.own[left], lift_seconds=LIFT_SECONDS, device=self.world.device,
-            **options,
+            **{"sideways": None, **options},
         )  # fmt: skip
         by_joints = self.robot.frame_pose(self._hand).to_world([PINCH])[0]
         i, j = result.best

@@ -1,0 +1,37 @@
+"""How far sideways a hand goes that lifts a cloth, before any image of it is seen.
+
+Who picks a cloth up to hold it lifts it: up, and somewhat to a side. So a point of the cloth that is under the hand now
+is a likelier pick than one from which the hand would have gone sideways only. How far sideways hands go in proportion
+to how high they go is not known; the density per area of table, (1 + (d / s)^2)^-2 with d the way sideways and
+s half of the way up, is broad and has a heavy tail (that of Student's t with two degrees of freedom in the plane): half
+of all hands end farther away than s, a fifth farther than 2 s, a tenth farther than 3 s. It was fitted to nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.rectangle import ClothRectangle
+
+SIDEWAYS = 0.5
+"""Of the way up: half of all hands are taken to go no farther sideways."""
+LOWEST = 0.2
+"""[m] A hand that is not as high counts as if it were: who drags a cloth over the table does not lift it."""
+
+
+def log_prior_of_lift(rectangle: ClothRectangle, uv: ArrayLike, hand: ArrayLike, sideways: float) -> np.ndarray:
+    """(k,) float, logarithms of how likely a hand that picked each candidate ends where it did, 0 straight above it.
+
+    Args:
+        rectangle: The cloth before.
+        uv: (k, 2) float, the candidates as fractions of the sides from corner C00.
+        hand: (3,) where the picked point is now [m].
+        sideways: s as a share of the height of the lift, above 0.
+    """
+    uv, hand = np.asarray(uv, dtype=float), np.asarray(hand, dtype=float)
+    along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
+    begin = rectangle.corners[0] + uv[:, :1] * along + uv[:, 1:] * across
+    away = np.linalg.norm(hand[:2] - begin[:, :2], axis=1)
+    up = np.maximum(hand[2] - begin[:, 2], LOWEST)
+    return np.asarray(-2.0 * np.log1p((away / (sideways * up)) ** 2))
