@@ -163,8 +163,23 @@ def check(net: Net, data: dict[str, Any], rows: Any) -> None:
         )  # fmt: skip
 
 
+def begun(path: Path, scalars: int = SCALARS) -> Net:
+    """A network with the weights that an earlier run kept, which may have been told less: (pair, place) alone, say."""
+    net, old = Net(scalars), torch.load(path, weights_only=True)
+    new = net.state_dict()
+    for name, value in old.items():
+        if new[name].shape == value.shape:
+            new[name] = value
+        elif name == "mix.weight":  # what it was not told counts for nothing at first
+            new[name] = functional.pad(value, (0, new[name].shape[1] - value.shape[1]))
+        else:
+            new[name][: len(value)] = value
+    net.load_state_dict(new)
+    return net
+
+
 def train(
-    net: Net, data: dict[str, Any], rows: Any, choosing: Any, checking: Any, epochs: float, seconds: float
+    net: Net, data: dict[str, Any], rows: Any, choosing: Any, checking: Any, epochs: float, seconds: float, peak: float
 ) -> Net:
     """AdamW, one cycle, by epochs or by the clock; the mean weights of the epoch that is best of those who choose."""
     started, steps, at, epoch = time.perf_counter(), max(1, int(epochs * len(rows) / AT_ONCE)), len(rows), 0
