@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from nuno.__main__ import _without_lines, main
-from nuno.estimate.case import read_case
+from nuno.errors import EstimationError
+from nuno.estimate.case import PickCase, read_case
 
 CASE = Path(__file__).parents[1] / "examples" / "pick-case"
 TRUE = [0, 0]  # where the bundled cloth was picked, in the simulation that its images were rendered from
@@ -182,6 +183,22 @@ def check_failure(said, error, words):
     """Check that nothing but one named error was said."""
     assert said.out == "" and "Traceback" not in said.err
     assert said.err.startswith(f"nuno: {error}: ") and words in said.err, said.err
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"), [([], 0.5), (["--sideways", "0.25"], 0.25), (["--sideways", "None"], None)]
+)
+def test_how_far_sideways_is_passed_on(given, expected, tmp_path, monkeypatch):
+    """As the estimate takes it: 0.5 unless given, none for any way."""
+    asked = {}
+
+    def estimate(case, **options):
+        asked.update(options)
+        raise EstimationError("enough")
+
+    monkeypatch.setattr(PickCase, "estimate", estimate)
+    assert pick(CASE, tmp_path / "out", *given) == 1
+    assert asked["sideways"] == expected
 
 
 @pytest.mark.parametrize(
