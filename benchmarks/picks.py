@@ -18,13 +18,14 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from generated_cases import generate
+from generated_cases import SIDEWAYS, generate
 from tqdm import tqdm
 
 from nuno import NunoError, World, box, estimate_pick, plane, read_case, sheet
 from nuno.camera.camera import Camera
 from nuno.camera.image import read_image
 from nuno.camera.table import Table
+from nuno.estimate import lift_prior
 from nuno.estimate.futures import Futures, solver_of
 from nuno.estimate.hypotheses import Discretisation, Hypothesis
 from nuno.estimate.pick_sight import score_futures
@@ -62,30 +63,33 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def cases(folder: Path, device: str) -> list[dict[str, Any]]:
+def cases(folder: Path, device: str, sideways: float | None) -> list[dict[str, Any]]:
     """Every case folder with a truth.json, through its images."""
     rows = []
     for path in sorted(p for p in folder.iterdir() if (p / "truth.json").is_file()):
         true = json.loads((path / "truth.json").read_text())["true_ij"]
         named = json.loads((path / "input.json").read_text()).get("image_before")
-        result = read_case(path).estimate(device=device, progress=False) if named else from_masks(path, device)
+        options = {"device": device, "progress": False, "sideways": sideways}
+        result = read_case(path).estimate(**options) if named else from_masks(path, options)
         rows.append(row(path.name, result, tuple(true)))
         print(rows[-1], flush=True)
     return rows
 
 
-def from_masks(path: Path, device: str) -> Any:
+def from_masks(path: Path, options: dict[str, Any]) -> Any:
     """The estimate of a case without images, from its mask_before.png and mask_after.png."""
     data = json.loads((path / "input.json").read_text())
     before, after = (read_image(path / name)[..., 0] > 127 for name in ("mask_before.png", "mask_after.png"))
     return estimate_pick(
         None, None, camera=data["camera"], table_height=data["table_height_m"], hand=data["hand_position_m"],
         table_half_extents=data["table_half_extents_xy_m"], table_centre=data["table_centre_xy_m"],
-        before_mask=before, after_mask=after, device=device, progress=False,
+        before_mask=before, after_mask=after, **options,
     )  # fmt: skip
 
 
-def generated(count: int, seed: int, device: str, limit: float) -> list[dict[str, Any]]:
+def generated(
+    count: int, seed: int, device: str, limit: float, away: tuple[float, float], sideways: float | None
+) -> list[dict[str, Any]]:
     """Generated cases, through masks whose edges are displaced by 2 px noise; stops after ``limit`` seconds."""
     rows: list[dict[str, Any]] = []
     started = time.perf_counter()
@@ -93,7 +97,7 @@ def generated(count: int, seed: int, device: str, limit: float) -> list[dict[str
     bar = tqdm(total=count, disable=None)
     while len(rows) < count and time.perf_counter() - started < limit:
         if not made:
-            made, seed = generate(1, 2, seed, device), seed + 1
+            made, seed = generate(1, 2, seed, device, away), seed + 1
             continue
         case = made.pop(0)
         try:
@@ -101,6 +105,7 @@ def generated(count: int, seed: int, device: str, limit: float) -> list[dict[str
                 None, None, camera=case.camera, table_height=case.table.height, hand=case.hand,
                 table_half_extents=case.table.half_extents, table_centre=case.table.centre,
                 before_mask=case.mask_before, after_mask=case.mask_after, device=device, progress=False,
+                sideways=sideways,
             )  # fmt: skip
         except NunoError as error:  # no answer is a wrong answer
             rows.append({"case": f"seed {seed - 1}", "true": list(case.true_ij), "error": str(error), "steps": 5})
@@ -199,6 +204,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=REPORTED_SEED)
     parser.add_argument("--limit", type=float, default=1e9, help="stop generated cases after so many seconds")
+    parser.add_argument(
+        "--away", type=float, nargs=2, default=SIDEWAYS, help="[m] how far sideways the hands of generated cases go"
+    )
+    parser.add_argument(
+        "--no-prior", action="store_true", help="estimate without the prior of the lift (estimate_pick(sideways=None))"
+    )
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--many", type=int, default=0, help="also time so many worlds at once")
@@ -206,13 +217,16 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     wp.config.log_level = wp.LOG_ERROR
-    report: dict[str, Any] = {"device": options.device}
+    sideways = None if options.no_prior else lift_prior.SIDEWAYS
+    report: dict[str, Any] = {"device": options.device, "sideways": sideways}
     for part in options.parts:
         if part == "cases":
-            rows = cases(options.cases, options.device)
+            rows = cases(options.cases, options.device, sideways)
             report[part] = {"rows": rows, **summary(rows)}
         elif part == "generated":
-            rows = generated(options.count, options.seed, options.device, options.limit)
+            rows = generated(
+                options.count, options.seed, options.device, options.limit, tuple(options.away), sideways
+            )  # fmt: skip
             report[part] = {"rows": rows, **summary(rows)}
         elif part == "speed":
             report[part] = speed(options.device, options.repeats, options.many)

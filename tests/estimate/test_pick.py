@@ -96,6 +96,7 @@ def test_the_prior_of_the_lift_is_added_unless_left_out(seen):
     prior = log_prior_of_lift(alone.rectangle, points, seen[0]["hand"], 0.5)
     assert np.ptp(prior) > 0.5
     np.testing.assert_array_equal(with_it.scores, alone.scores + prior)
+    assert alone.to_dict()["sideways"] is None and with_it.to_dict()["sideways"] == 0.5
     np.testing.assert_array_equal(nuno.estimate_pick(None, None, **given).scores, with_it.scores)
     likely = np.exp(with_it.scores - with_it.scores.max())
     np.testing.assert_allclose(with_it.probabilities, likely / likely.sum(), rtol=1e-12)

@@ -4,11 +4,11 @@ Folding is a matter of chance, and a contour distance does not know which differ
 and which tell of another pick. A network (`nuno.estimate.outline_net`) does to some degree: it was trained on
 silhouettes of Nuno's own engine alone, one picked cloth seen and others imagined on other meshes, with other steps
 and materials, to give the true candidate the most probability. What it says of a pair, r, is added to the hand-made
-log likelihood h of a guess (`nuno.estimate.ranking`): 0.85 h + 0.35 r. Both shares were chosen on scenes that it was
-not trained on; it is too sure of itself, so its share is small (docs/accuracy.md).
+log likelihood h of a guess (`nuno.estimate.ranking`): 0.7 h + r. Both shares were chosen on scenes that it was not
+trained on (docs/accuracy.md).
 
-It sees the two silhouettes alone, not where the cloth lay nor where the hand went: picks of all candidates were
-equally likely when it was trained.
+It sees the two silhouettes and is told which guess the imagined one is of, not where the cloth lay nor where the hand
+went: picks of all candidates were equally likely when it was trained.
 """
 
 from __future__ import annotations

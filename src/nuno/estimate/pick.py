@@ -238,7 +238,7 @@ def estimate_pick(
         eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds,
         futures=best_batch, best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
         real=seen.silhouette, image_before=image_before, image_after=image_after, mask_before=mask_before,
-        mask_after=seen.mask, seen_warnings=seen.warnings,
+        mask_after=seen.mask, seen_warnings=seen.warnings, sideways=sideways if score in EVIDENCE else None,
     )  # fmt: skip
     for warning in result.warnings:
         log.warning("%s", warning)

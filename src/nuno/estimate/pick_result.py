@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 WORST = -1.0e9
 
 LOW_CONFIDENCE = 0.8
-"""Below this an answer carries a warning: above it about 1 of 20 is wrong (docs/accuracy.md)."""
+"""Below this an answer carries a warning: above it about 1 of 100 was wrong, below 1 of 3 (docs/accuracy.md)."""
 
 
 @dataclass(eq=False)
@@ -53,6 +53,7 @@ class PickResult:
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
         seen_warnings: What was odd about how it was seen.
+        sideways: Of the prior of the lift that is in scores of evidence (`nuno.estimate.lift_prior`); None is no prior.
     """
 
     labels: np.ndarray
@@ -75,6 +76,7 @@ class PickResult:
     mask_before: np.ndarray | None = field(default=None, repr=False)
     mask_after: np.ndarray | None = field(default=None, repr=False)
     seen_warnings: tuple[str, ...] = ()
+    sideways: float | None = None
 
     def __repr__(self) -> str:
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
@@ -164,6 +166,7 @@ class PickResult:
             "eq1": [float(self.eq1[k]) for k in self.order],
             "probabilities": None if likely is None else [float(likely[k]) for k in self.order],
             "confidence": self.confidence,
+            "sideways": self.sideways,
             "turn_rad": self.turn,
             "warnings": self.warnings,
             "cloth": {
