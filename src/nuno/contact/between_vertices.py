@@ -159,7 +159,9 @@ def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int
     on, _point = sharp_features(
         h.kind, ax + lx * 0.5, ay + ly * 0.5, az + lz * 0.5, hx, hy, hz, h.sa, h.sb, h.sc, h.broad
     )  # fmt: skip
-    sleep(t, entry, gone, on)
+    tiny = -fill(like, 1.0e-12)
+    part = zero
+    near = on
     fa = zero
     da = zero
     fb = zero
@@ -169,8 +171,12 @@ def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int
         da = times(nx, lx) + times(ny, ly) + times(nz, lz)
         fb, nx, ny, nz = distance_solid(h.kind, ax + lx, ay + ly, az + lz, h.sa, h.sb, h.sc)
         db = times(nx, lx) + times(ny, ly) + times(nz, lz)
+        part = over(fb - db - fa, least(da - db, tiny))
+        # nowhere is it nearer than at the lower end or, if both slopes fall inwards, where the ends' tangents cross
+        near = least(near, h.reach - least(least(fa, fb), choose(least(-da, db), fa + times(da, part), fa)))
         # over a face both ends see the same slope, which one may lose within the substep
-        on = least(-da, db) + h.reach - h.radius
+        on = least(least(-da, db) + h.reach - h.radius, near)
+    sleep(t, entry, gone, near)
     at = zero
     x = zero
     y = zero
@@ -181,66 +187,61 @@ def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int
     nz = zero
     more = int(0)
     if anywhere(on):
-        tiny = -fill(like, 1.0e-12)
-        part = over(fb - db - fa, least(da - db, tiny))
-        # it is nowhere nearer than where the two ends' tangents cross
-        on = least(on, h.reach - (fa + times(da, part)))
-        if anywhere(on):
-            steps = int(STEPS)  # a variable, or Warp would unroll the loop
-            if h.kind == BOX:
-                steps = 1
-                part = past_box_edge(ax, ay, az, lx, ly, lz, part, h.sa, h.sb, h.sc)
-                part = most(zero, least(one, part))
-                # over two edges with a face between, it lies on both: on one at a time it would rock
-                left = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, zero, h.sa, h.sb, h.sc)))
-                right = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, one, h.sa, h.sb, h.sc)))
-                other = choose(left + right - part - part, right, left)
-                apart = size_of(other - part) - over(h.radius * 2.0, root(square_of(lx, ly, lz)) - tiny)
-                if anywhere(least(on, apart)):
-                    more = 1
-                if turn > 0:
-                    part = other
-                    on = least(on, apart)
-            elif h.kind == SPHERE:
-                steps = 1
-                part = over(times(ax, lx) + times(ay, ly) + times(az, lz), tiny - square_of(lx, ly, lz))
-            low = zero
-            high = one
-            for _k in range(steps):
-                at = most(low, least(high, part))
-                gap, nx, ny, nz = distance_solid(
-                    h.kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), h.sa, h.sb, h.sc
-                )
-                slope = times(nx, lx) + times(ny, ly) + times(nz, lz)
-                low = choose(slope, low, at)
-                fa = choose(slope, fa, gap)
-                da = choose(slope, da, slope)
-                high = choose(slope, at, high)
-                fb = choose(slope, gap, fb)
-                db = choose(slope, slope, db)
-                part = over(fb - times(db, high) - fa + times(da, low), least(da - db, tiny))
-            x = ax + times(at, lx)
-            y = ay + times(at, ly)
-            z = az + times(at, lz)
-            if (h.kind == BOX or h.kind == CYLINDER) and anywhere(fill(like, ROUGH) - gap):
-                gap, nx, ny, nz = across_edge(
-                    h.kind, x, y, z, lx, ly, lz, gap, nx, ny, nz, h.sa, h.sb, h.sc, 0.5 * cell
-                )  # fmt: skip
-            # across the edge: what of the normal is along it, all of it where the edge stands across the shape,
-            # parts nothing
-            slope = over(times(nx, lx) + times(ny, ly) + times(nz, lz), square_of(lx, ly, lz) - tiny)
-            nx = nx - times(slope, lx)
-            ny = ny - times(slope, ly)
-            nz = nz - times(slope, lz)
-            size = root(square_of(nx, ny, nz) + fill(like, 1.0e-20))
-            nx = over(nx, size)
-            ny = over(ny, size)
-            nz = over(nz, size)
-            gap = over(gap - h.radius, most(size, fill(like, SLANT)))
-            gap = gap - least(gap, zero) * PATIENCE
-            on = least(least(on, size - fill(like, SLANT)), least(at, one - at))
-            if turn > 0 and more == 0:
-                on = -one
+        steps = int(STEPS)  # a variable, or Warp would unroll the loop
+        if h.kind == BOX:
+            steps = 1
+            part = past_box_edge(ax, ay, az, lx, ly, lz, part, h.sa, h.sb, h.sc)
+            part = most(zero, least(one, part))
+            # over two edges with a face between, it lies on both: on one at a time it would rock
+            left = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, zero, h.sa, h.sb, h.sc)))
+            right = most(zero, least(one, past_box_edge(ax, ay, az, lx, ly, lz, one, h.sa, h.sb, h.sc)))
+            other = choose(left + right - part - part, right, left)
+            apart = size_of(other - part) - over(h.radius * 2.0, root(square_of(lx, ly, lz)) - tiny)
+            if anywhere(least(on, apart)):
+                more = 1
+            if turn > 0:
+                part = other
+                on = least(on, apart)
+        elif h.kind == SPHERE:
+            steps = 1
+            part = over(times(ax, lx) + times(ay, ly) + times(az, lz), tiny - square_of(lx, ly, lz))
+        low = zero
+        high = one
+        for _k in range(steps):
+            at = most(low, least(high, part))
+            gap, nx, ny, nz = distance_solid(
+                h.kind, ax + times(at, lx), ay + times(at, ly), az + times(at, lz), h.sa, h.sb, h.sc
+            )
+            slope = times(nx, lx) + times(ny, ly) + times(nz, lz)
+            low = choose(slope, low, at)
+            fa = choose(slope, fa, gap)
+            da = choose(slope, da, slope)
+            high = choose(slope, at, high)
+            fb = choose(slope, gap, fb)
+            db = choose(slope, slope, db)
+            part = over(fb - times(db, high) - fa + times(da, low), least(da - db, tiny))
+        x = ax + times(at, lx)
+        y = ay + times(at, ly)
+        z = az + times(at, lz)
+        if (h.kind == BOX or h.kind == CYLINDER) and anywhere(fill(like, ROUGH) - gap):
+            gap, nx, ny, nz = across_edge(
+                h.kind, x, y, z, lx, ly, lz, gap, nx, ny, nz, h.sa, h.sb, h.sc, 0.5 * cell
+            )  # fmt: skip
+        # across the edge: what of the normal is along it, all of it where the edge stands across the shape,
+        # parts nothing
+        slope = over(times(nx, lx) + times(ny, ly) + times(nz, lz), square_of(lx, ly, lz) - tiny)
+        nx = nx - times(slope, lx)
+        ny = ny - times(slope, ly)
+        nz = nz - times(slope, lz)
+        size = root(square_of(nx, ny, nz) + fill(like, 1.0e-20))
+        nx = over(nx, size)
+        ny = over(ny, size)
+        nz = over(nz, size)
+        gap = over(gap - h.radius, most(size, fill(like, SLANT)))
+        gap = gap - least(gap, zero) * PATIENCE
+        on = least(least(on, size - fill(like, SLANT)), least(at, one - at))
+        if turn > 0 and more == 0:
+            on = -one
     return on, more, at, x, y, z, nx, ny, nz, gap
 
 

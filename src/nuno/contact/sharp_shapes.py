@@ -107,9 +107,12 @@ def sharp_features(
             point = least(rim, slim)
         else:
             beyond = most(z - sb, fill(x, 0.0))
-            apart = root(times(rho, rho) + times(beyond, beyond)) - root(times(wide, wide) + times(hz, hz)) - sa
+            size = root(times(wide, wide) + times(hz, hz))
+            apart = root(times(rho, rho) + times(beyond, beyond)) - size - sa
+            # the outermost point is on the half ball of one end, which may stand through by half a cell
+            stands = most(sa, fill(x, broad * (0.5 / ROUND)) - sa)
+            point = least(slim, size + stands - root(times(rho, rho) + times(z - sb, z - sb)))
             along = slim
-            point = slim
     return least(along, -apart), least(point, -apart)
 
 
