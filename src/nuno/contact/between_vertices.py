@@ -13,7 +13,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.distances import BOX, CYLINDER, SPHERE, distance_solid
+from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SPHERE, distance_solid
 from nuno.contact.sharp_pushes import PATIENCE, SLANT, square_of
 from nuno.contact.sharp_shapes import WAKE, sharp_features
 from nuno.solver.lanes import (  # noqa: F401
@@ -63,6 +63,19 @@ def past_box_edge(ax: Any, ay: Any, az: Any, lx: Any, ly: Any, lz: Any, part: An
     uy = ay - choose(y, b, -b)
     uz = az - choose(z, c, -c)
     return -over(times(ux, vx) + times(uy, vy) + times(uz, vz), square_of(vx, vy, vz) + fill(ax, 1.0e-20))
+
+
+@wp.func
+def past_axis(ax: Any, ay: Any, az: Any, lx: Any, ly: Any, lz: Any, half: Any):
+    """The part of a way l from a point on that is nearest to a ball's middle, or to a capsule's axis along z."""
+    tiny = -fill(ax, 1.0e-12)
+    across = times(ax, lx) + times(ay, ly)
+    flat = times(lx, lx) + times(ly, ly)
+    part = over(across, tiny - flat)
+    z = az + times(part, lz)
+    # beyond the axis it is nearest to its end
+    end = az - choose(z, half, -half)
+    return choose(size_of(z) - half, over(across + times(end, lz), tiny - (flat + times(lz, lz))), part)
 
 
 @wp.func
@@ -202,9 +215,9 @@ def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int
             if turn > 0:
                 part = other
                 on = least(on, apart)
-        elif h.kind == SPHERE:
+        elif h.kind == SPHERE or h.kind == CAPSULE:
             steps = 1
-            part = over(times(ax, lx) + times(ay, ly) + times(az, lz), tiny - square_of(lx, ly, lz))
+            part = past_axis(ax, ay, az, lx, ly, lz, h.sb)
         low = zero
         high = one
         for _k in range(steps):
