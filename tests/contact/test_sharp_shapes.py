@@ -227,3 +227,26 @@ def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
     np.testing.assert_array_equal(near.vertices, far.vertices)
     assert near._dynamics.solver._state.sharp.numpy()[0] == 0
     assert run(0.36)._dynamics.solver._state.sharp.numpy()[0] == 1
+
+
+def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():
+    """Promise: what is farther than a substep's reach sleeps, and triangles do away from the bar's ends."""
+    world = nuno.World()
+    world.add(nuno.capsule(0.02, 0.6, position=(0.0, 0.0, 0.05)).rotate(0.5 * np.pi, "x"))
+    cloth = world.add(nuno.sheet((0.4, 0.4), cells=(20, 20), position=(0.0, 0.0, 0.08)))
+    world.attach(cloth, nuno.Cloth(thickness=THICKNESS))
+    world.run(0.3)
+    solver = cloth._dynamics.solver
+    surface, state = solver._surface, solver._state
+    starts, counts, wake = surface.sharp_colour.numpy(), state.sharp.numpy()[1:], state.sharp_wake.numpy()
+    places = np.concatenate([np.arange(a, a + k) for a, k in zip(starts[:-1], counts, strict=False)])
+    listed = state.sharp_list.numpy()[places]
+    awake = np.maximum(listed, -1 - listed)[wake[2 + places] <= wake[0]]
+    sides = surface.side.numpy()
+    assert 0 < len(awake) < 0.5 * len(places)
+    assert awake.max() < len(sides)
+    ends = cloth.vertices[sides[awake]]
+    away = np.linalg.norm((ends - (0.0, 0.0, 0.05))[:, :, [0, 2]], axis=2).min(axis=1) - 0.02
+    # the ends of a cell's diagonal whose middle is in reach of the bar are higher by its half squared over two radii
+    reach = 0.5 * THICKNESS + 3.0 / 60.0 / solver.substeps
+    assert away.max() < reach + 0.5 * 0.02**2 / (2.0 * 0.02)

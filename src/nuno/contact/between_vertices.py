@@ -1,10 +1,11 @@
 """A cloth's edges and triangles against what is sharp or small: edges and corners of boxes, rims, small balls.
 
 A convex shape's distance along a straight edge is convex. Where it falls from both ends inwards, its lowest point is
-between them, and found by the tangents at two points on either side: they cross under it. Inside of a triangle it is
-the shape's outermost point against the triangle's plane that touches. Point and normal are those where the substep
-began, when nothing crossed, and the whole motion of the substep, relative to the shape, counts against them, so that
-what was pressed through within the substep is put back (`nuno.contact.sharp_pushes`).
+between them, and found by the tangents at two points on either side: they cross under it; at balls and capsules there
+is a formula. Inside of a triangle it is the shape's outermost point against the triangle's plane that touches. Point
+and normal are those where the substep began, when nothing crossed, and the whole motion of the substep, relative to
+the shape, counts against them, so that what was pressed through within the substep is put back
+(`nuno.contact.sharp_pushes`).
 
 All that is found here is of the substep's start, and so does not depend on which element is pushed first.
 """
@@ -34,8 +35,8 @@ from nuno.solver.lanes import (  # noqa: F401
 )
 
 STEPS = wp.constant(6)
-"""Tangents looked at between two ends: the distance of a 40 mm edge from a ball of 4 mm, or from the edge of a box, is
-then found within 0.006 mm, of twenty thousand that were tried."""
+"""Tangents looked at between two ends: the distance of a 40 mm edge from what is round by 4 mm, or from the edge of a
+box, is then found within 0.006 mm, of twenty thousand that were tried."""
 
 ROUGH = wp.constant(1.0e-5)
 """[m] What is nearer to an edge than this does not say by where it is which way is out: rounding moves it."""
