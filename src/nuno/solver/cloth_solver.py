@@ -297,10 +297,15 @@ class ClothSolver(ParticleSolver):
         wp.copy(self._state.notes, self._put(notes))
         return longer
 
-    def _advance(self, run: Settings, substeps: int) -> None:
-        fine = self._fine.bring(run)
+    def settings(self, time: float, dt: float, frame: int) -> Settings:
+        """As of all particles, with lists as wide as the plan wants them."""
+        run = super().settings(time, dt, frame)
         if self.plan in ("grid", "vector"):
             run.margin = WIDE_MARGIN * self._cell_size
+        return run
+
+    def _advance(self, run: Settings, substeps: int) -> None:
+        fine = self._fine.bring(run)
         if self.plan in LARGE:
             if self._large is None:
                 self._large = self._large_plan()
