@@ -174,8 +174,7 @@ class ParticleSolver:
 
     def velocities(self) -> np.ndarray:
         """(worlds, n, 3) float32, a copy [m/s]."""
-        s, n = self._state, self.particle_count
-        return np.stack([self._get(a, n) for a in (s.vx, s.vy, s.vz)], axis=-1)
+        return np.stack(self.velocities_apart(), axis=-1)
 
     def velocities_apart(self, kept: Kept | None = None) -> tuple[np.ndarray, ...]:
         """The velocities' x, y and z, (worlds, n) float32 each [m/s], as they are or as `keep` kept them."""
@@ -194,12 +193,9 @@ class ParticleSolver:
         notes[:, TRAVEL] = 1.0e9
         speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
         notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
-        self.load_state(
-            dict(
-                local=(positions - origin[:, None]).astype(np.float32), origin=origin.astype(np.float32),
-                velocities=np.asarray(velocities, dtype=np.float32), notes=notes,
-            )
-        )  # fmt: skip
+        local = (positions - origin[:, None]).astype(np.float32)
+        origin, velocities = origin.astype(np.float32), velocities.astype(np.float32)
+        self.load_state(dict(local=local, origin=origin, velocities=velocities, notes=notes))
 
     def save_state(self) -> dict[str, np.ndarray]:
         """All that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
