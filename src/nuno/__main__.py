@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
+from nuno.estimate.lift_prior import SIDEWAYS
 
 ANSWERED, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -26,8 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pick.add_argument("--out", required=True, metavar="DIR", help="where result.json and result.png go")
     pick.add_argument("--candidates", default="6x6", metavar="NxM", help="grid: N along the longer side (default 6x6)")
     pick.add_argument(
-        "--sideways", metavar="SHARE", default="0.5",
-        help="how far sideways hands go that lift a cloth, as a share of how high; none: any way (default 0.5)",
+        "--sideways", metavar="SHARE", default=str(SIDEWAYS),
+        help=f"how far sideways hands go that lift a cloth, as a share of how high; none: any way (default {SIDEWAYS})",
     )  # fmt: skip
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
@@ -82,9 +83,7 @@ def _pick(options: argparse.Namespace) -> int:
     case = read_case(options.case)
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
-    result = case.estimate(
-        candidates=grid, sideways=sideways, device=options.device, progress=options.progress
-    )  # fmt: skip
+    result = case.estimate(candidates=grid, sideways=sideways, device=options.device, progress=options.progress)
     result.save(options.out)
     i, j = result.best
     sys.stdout.write(

@@ -9,10 +9,13 @@ of all hands end farther away than s, a fifth farther than 2 s, a tenth farther 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.camera.rectangle import ClothRectangle
+if TYPE_CHECKING:
+    from nuno.camera.rectangle import ClothRectangle
 
 SIDEWAYS = 0.5
 """Of the way up: half of all hands are taken to go no farther sideways."""
