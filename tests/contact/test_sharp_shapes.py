@@ -6,6 +6,7 @@ import warp as wp
 
 import nuno
 from nuno import quaternion as quat
+from nuno.contact.sharp_queue import ROOM
 from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
 from nuno.solver.cloth_solver import ClothSolver
@@ -229,6 +230,16 @@ def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
     assert run(0.36)._dynamics.solver._state.sharp.numpy()[0] == 1
 
 
+def awake_at_sharp_shapes(body):
+    """Return the elements that a cloth's last substep looked at (k,): its edges, and then its triangles."""
+    solver = body._dynamics.solver
+    starts = solver._surface.sharp_colour.numpy()
+    counts, wake = solver._state.sharp.numpy()[1:], solver._state.sharp_wake.numpy()
+    places = np.concatenate([np.arange(a, a + k) for a, k in zip(starts[:-1], counts, strict=False)])
+    listed = solver._state.sharp_list.numpy()[places]
+    return np.maximum(listed, -1 - listed)[wake[2 + places] <= wake[0]], len(places)
+
+
 def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():
     """Promise: what is farther than a substep's reach sleeps, and triangles do away from the bar's ends."""
     world = nuno.World()
@@ -236,17 +247,29 @@ def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():
     cloth = world.add(nuno.sheet((0.4, 0.4), cells=(20, 20), position=(0.0, 0.0, 0.08)))
     world.attach(cloth, nuno.Cloth(thickness=THICKNESS))
     world.run(0.3)
-    solver = cloth._dynamics.solver
-    surface, state = solver._surface, solver._state
-    starts, counts, wake = surface.sharp_colour.numpy(), state.sharp.numpy()[1:], state.sharp_wake.numpy()
-    places = np.concatenate([np.arange(a, a + k) for a, k in zip(starts[:-1], counts, strict=False)])
-    listed = state.sharp_list.numpy()[places]
-    awake = np.maximum(listed, -1 - listed)[wake[2 + places] <= wake[0]]
-    sides = surface.side.numpy()
-    assert 0 < len(awake) < 0.5 * len(places)
+    awake, listed = awake_at_sharp_shapes(cloth)
+    sides = cloth._dynamics.solver._surface.side.numpy()
+    assert 0 < len(awake) < 0.5 * listed
     assert awake.max() < len(sides)
     ends = cloth.vertices[sides[awake]]
     away = np.linalg.norm((ends - (0.0, 0.0, 0.05))[:, :, [0, 2]], axis=2).min(axis=1) - 0.02
     # the ends of a cell's diagonal whose middle is in reach of the bar are higher by its half squared over two radii
-    reach = 0.5 * THICKNESS + 3.0 / 60.0 / solver.substeps
+    reach = 0.5 * THICKNESS + 3.0 / 60.0 / cloth._dynamics.solver.substeps
     assert away.max() < reach + 0.5 * 0.02**2 / (2.0 * 0.02)
+
+
+@DEVICES
+def test_more_edges_may_touch_than_there_is_room_for_in_a_queue(device):
+    """Geometry: the cloth's edges stay half a thickness from all of four bars, more than are queued at once on CUDA."""
+    world = nuno.World(device=device)
+    places = np.array([-0.18, -0.06, 0.06, 0.18])
+    for x in places:
+        world.add(nuno.capsule(0.02, 0.6, position=(x, 0.0, 0.05)).rotate(0.5 * np.pi, "x"))
+    cloth = world.add(nuno.sheet((0.5, 0.5), cells=(70, 70), position=(0.0, 0.0, 0.08)))
+    world.attach(cloth, nuno.Cloth(thickness=0.003))
+    world.run(0.2)
+    assert len(awake_at_sharp_shapes(cloth)[0]) > ROOM
+    points = surface(cloth, 4)
+    away = np.hypot(points[:, 0, None] - places, points[:, 2, None] - 0.05).min(axis=1) - 0.02
+    assert away.min() > 0.0015 - LEFT
+    assert away.min() < 0.0015 + LEFT

@@ -5,9 +5,10 @@ them, by themselves. Of the elements that are listed for a frame few may be near
 without a look at them: an element sleeps until anything may have come as near as it was away. Of those that are awake
 again few are pushed.
 
-So the threads of a block first queue what is awake. Two threads take an element, for at two edges of a box it has two
-points; all find those at once, and only then do they push, one colour after the other. Where more are awake than that,
-they come a colour at a time, with the same bits. On the CPU a thread takes one after the other.
+So the threads of a block first queue what is awake (`nuno.contact.sharp_queue`). Then a thread takes an element, at a
+box two do, for at two of its edges an element has two points; all find those at once, as they do not depend on pushes,
+and only then do they push, one colour after the other. What is more than the queue has room for comes a colour at a
+time, with the same bits. On the CPU a thread takes one after the other.
 """
 
 from typing import Any
@@ -15,24 +16,15 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.between_vertices import meet_edge, meet_triangle
-from nuno.contact.distances import FAR
+from nuno.contact.distances import BOX, FAR
 from nuno.contact.renewal import shares_work
 from nuno.contact.sharp_pose import sharp_pose
 from nuno.contact.sharp_pushes import push_apart
+from nuno.contact.sharp_queue import COLOUR, MOST_COLOURS, QUEUE, forget_queue, queue_awake, room_of
 from nuno.contact.sharp_shapes import GONE, SOONEST, WAKE
 from nuno.solver.lanes import add, anywhere, barrier, fill, largest, mul, root, sub  # noqa: F401
 from nuno.solver.state import SPEED, Settings, Shapes
-from nuno.solver.warps import WARP, lowest
-
-QUEUE = wp.constant(3)
-"""Where in a state's `moved`, which is zero meanwhile, the queue begins: places in the list, and colours. Before it are
-how many these are, and the sets of colours that have first and second points to be pushed."""
-COLOUR = wp.constant(1 << 24)
-"""By which a colour is multiplied in the queue."""
-MOST_COLOURS = wp.constant(31)
-"""Colours that fit the bits of a number."""
-ROOM = wp.constant(128)
-"""Elements that are queued at most."""
+from nuno.solver.warps import WARP, anyone, lowest, union_of_warp
 
 
 @wp.func
@@ -42,47 +34,41 @@ def travel(t: Any, run: Settings, haste: float):
 
 
 @wp.func
-def wake_up(t: Any, topo: Any, gone: float, room: int, thread: int, threads: int):
+def wake_up(t: Any, topo: Any, gone: float, thread: int, threads: int):
     """Wake what may be near again of the listed elements; the others get a number below zero.
 
-    Where threads share the work a warp takes a colour, for of each colour few are listed, and the first ``room`` are
-    queued.
-
     Returns:
-        How many are awake, and if none is, how far anything must have gone before the first wakes [m].
+        How many are awake of those that the thread looked at, and, if none is, when the first wakes [m].
     """
-    share = wp.min(threads, WARP)
     awake = int(0)
     soon = float(FAR)
-    for c in range(thread / share, topo.sharp_colour.shape[0] - 1, threads / share):
+    for c in range(topo.sharp_colour.shape[0] - 1):
         first = topo.sharp_colour[c]
-        for k in range(first + thread % share, first + t.sharp[1 + c], share):
+        for k in range(first + thread, first + t.sharp[1 + c], threads):
             element = t.sharp_list[k]
             element = wp.max(element, -1 - element)
             wake = t.sharp_wake[WAKE + k]
             if gone >= wake:
                 t.sharp_wake[WAKE + k] = FAR
-                if shares_work(threads):
-                    place = wp.atomic_add(t.moved, 0, 1)
-                    if place < room:
-                        t.moved[QUEUE + place] = c * COLOUR + k
                 awake += 1
             else:
                 element = -1 - element
                 soon = wp.min(soon, wake)
             t.sharp_list[k] = element
-    if shares_work(threads):
-        barrier(threads)
-        awake = t.moved[0]
-    if awake == 0 and shares_work(threads):
-        if thread == 0:
-            t.sharp_wake[SOONEST] = FAR
-        barrier(threads)
-        if soon < FAR:
-            wp.atomic_min(t.sharp_wake, SOONEST, soon)
-        barrier(threads)
-        soon = t.sharp_wake[SOONEST]
     return awake, soon
+
+
+@wp.func
+def first_to_wake(t: Any, soon: float, thread: int, threads: int):
+    """The least of what all threads have."""
+    barrier(threads)
+    if thread == 0:
+        t.sharp_wake[SOONEST] = FAR
+    barrier(threads)
+    if soon < FAR:
+        wp.atomic_min(t.sharp_wake, SOONEST, soon)
+    barrier(threads)
+    return t.sharp_wake[SOONEST]
 
 
 @wp.func
@@ -95,16 +81,21 @@ def touch_listed(
     one = fill(like, 1.0)
     h = sharp_pose(like, t, run, shapes, s)
     edges = topo.side.shape[0]
-    together = wp.max(threads / 2, 1)
-    mine = thread / 2
+    colours = topo.sharp_colour.shape[0] - 1
+    # of a box's edges each has two points
+    points = int(1)
+    if h.kind == BOX and shares_work(threads):
+        points = 2
+    together = threads / points
+    mine = thread / points
     c = int(0)
     start = int(0)
-    while c < topo.sharp_colour.shape[0] - 1:
+    while c < colours:
         entry = int(-1)
         colour = int(c)
         if queued > 0:
-            if mine < queued:
-                place = t.moved[QUEUE + mine]
+            if start + mine < queued:
+                place = t.moved[QUEUE + start + mine]
                 entry = place % COLOUR
                 colour = place / COLOUR
         elif start + mine < t.sharp[1 + c]:
@@ -112,7 +103,10 @@ def touch_listed(
         element = int(-1)
         if entry >= 0:
             element = t.sharp_list[entry]
-        turn = thread % 2
+            if queued > 0:
+                # its sign tells of another time
+                element = wp.max(element, -1 - element)
+        turn = thread % points
         more = int(1)
         while more > 0:
             more = 0
@@ -148,10 +142,15 @@ def touch_listed(
             if shares_work(threads):
                 more = 0
                 first = 1 << wp.min(c, MOST_COLOURS)
-                second = int(first)
+                second = wp.where(points > 1, first, 0)
                 if queued > 0:
-                    if anywhere(on):
-                        wp.atomic_or(t.moved, 1 + turn, 1 << colour)
+                    for point in range(points):
+                        bits = int(0)
+                        if turn == point and anywhere(on):
+                            bits = 1 << colour
+                        bits = union_of_warp(bits)
+                        if thread % WARP == 0 and bits != 0:
+                            wp.atomic_or(t.moved, 1 + point, bits)
                     barrier(threads)
                     second = t.moved[2]
                     first = t.moved[1] | second
@@ -174,7 +173,7 @@ def touch_listed(
                 turn = 1
         start += together
         if queued > 0:
-            c = topo.sharp_colour.shape[0]
+            c = wp.where(start < queued, 0, colours)
         elif start >= t.sharp[1 + c]:
             c += 1
             start = 0
@@ -196,25 +195,31 @@ def touch_awake(t: Any, topo: Any, run: Settings, shapes: Shapes, gone: float, t
     Returns:
         How far these must have gone before anything is awake again [m].
     """
+    queued = int(0)
+    awake = int(0)
+    soon = float(FAR)
     room = int(0)
-    if topo.sharp_colour.shape[0] - 1 <= MOST_COLOURS:
-        room = wp.min(wp.min(ROOM, threads / 2), 4 * topo.particles - QUEUE)
-    awake, soon = wake_up(t, topo, gone, room, thread, threads)
+    if shares_work(threads):
+        room = room_of(topo)
+    if room > 0:
+        awake, soon = queue_awake(t, topo, gone, room, thread, threads)
+        queued = awake
+    if queued > room:
+        forget_queue(t, topo, 0, thread, threads)
+        queued = 0
+    if room == 0 or awake > room:
+        awake, soon = wake_up(t, topo, gone, thread, threads)
+        if shares_work(threads):
+            awake = int(anyone(awake > 0))
     if awake > 0:
         soon = gone
-        queued = int(awake)
-        if awake > room:
-            queued = 0
         for k in range(t.sharp[0]):
             s = t.sharp[topo.sharp_colour.shape[0] + k]
             touch_listed(t, topo, run, shapes, s, gone, queued, thread, threads)
-        if shares_work(threads):
-            # once all have read how many there were
-            barrier(threads)
-            for k in range(thread, wp.min(awake, room), threads):
-                t.moved[QUEUE + k] = 0
-            if thread == 0:
-                t.moved[0] = 0
+        if queued > 0:
+            forget_queue(t, topo, queued, thread, threads)
+    elif shares_work(threads):
+        soon = first_to_wake(t, soon, thread, threads)
     return soon
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.sharp_queue import QUEUE, ROOM
 from nuno.contact.sharp_shapes import ROUND
-from nuno.contact.sharp_turns import QUEUE, ROOM
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
 from nuno.solver.fine_places import FinePlaces

@@ -95,6 +95,46 @@ def vote(yes: bool) -> int:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+for (int k = 16; k > 0; k /= 2) value += __shfl_xor_sync(0xffffffffu, value, k);
+#endif
+return value;
+""")
+def sum_of_warp(value: int) -> int:
+    """The sum of the 32 threads' values."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+for (int k = 16; k > 0; k /= 2) bits |= __shfl_xor_sync(0xffffffffu, bits, k);
+#endif
+return bits;
+""")
+def union_of_warp(bits: int) -> int:
+    """All that is in a set of one of the 32 threads."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return __popc(bits);
+#else
+return __builtin_popcount(bits);
+#endif
+""")
+def size_of_set(bits: int) -> int:
+    """How many numbers are in a set."""
+    ...
+
+
+@wp.func
+def below_in(bits: int, lane: int):
+    """How many numbers below one, from 0 to 31, are in a set."""
+    return size_of_set(bits & ((1 << lane) - 1))
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
 return __ffs(bits) - 1;
 #else
 return __builtin_ctz(bits);
