@@ -100,15 +100,28 @@ def test_the_cloth_bears_the_force_of_the_fingers(device, at_once, monkeypatch):
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_cloth_gives_little_and_then_no_more(device):
     """Pressed together by Hooke's law, 5e5 Pa across the thickness, to 95 % of its 4 mm, which then are hard."""
-    gaps = []
-    for force in (5.0, 200.0):
-        world, _, fingers, _ = pinched(0.6, 0.1, lift=0.0, duration=1.0, force=force, device=device)
-        world.run(1.0)
-        gaps.append(fingers[1].position[1] - fingers[0].position[1] - 0.02)
-    # each half gives to 9 vertices and 4 corners, each of them as the half thickness of a cell of 1 cm^2
+
+    def gap(fingers):
+        """Return what is left between the fingers [m]."""
+        return fingers[1].position[1] - fingers[0].position[1] - 0.02
+
+    world, cloth, fingers, _ = pinched(0.6, 0.1, lift=0.0, duration=1.0, force=5.0, device=device)
+    world.run(0.8)
+    given, pushes = [], []
+    for _ in range(12):  # the fingers tremble by a hair
+        world.step()
+        given.append(0.004 - gap(fingers))
+        contacts = world.contacts(cloth)
+        inside = np.abs(contacts.points - (0.0, 0.0, 0.66)).max(axis=1) < 0.0125  # not at the rim
+        pushes.append(np.abs(contacts.forces[inside, 1]))
+        assert len(pushes[-1]) == 2 * 9
+    # a vertex gives to either finger as the half thickness of a cell of 1 cm^2
     softness = 0.002 / (5e5 * 0.01**2)  # [m/N]
-    # they share the force within a quarter of the mean
-    assert gaps[0] == pytest.approx(0.004 - 2.0 * softness * 5.0 / 13.0, abs=0.25 * 2.0 * softness * 5.0 / 13.0)
+    assert np.mean(given) == pytest.approx(2.0 * softness * np.mean(pushes), rel=0.02)
+    # the force is shared by 9 vertices and 4 corners, where both edges that meet there may cross an edge of the cloth
+    assert 2.0 * softness * 5.0 / 21.0 < np.mean(given) < 2.0 * softness * 5.0 / 13.0
+    world, _, fingers, _ = pinched(0.6, 0.1, lift=0.0, duration=1.0, force=200.0, device=device)
+    world.run(1.0)
     # 24 passes leave 0.04 mm at this force, also where nothing gives; 1 um is for rounding, where passes all at once
     # leave none
-    assert 0.0038 - 0.06e-3 < gaps[1] < 0.0038 + 1e-6
+    assert 0.0038 - 0.06e-3 < gap(fingers) < 0.0038 + 1e-6
