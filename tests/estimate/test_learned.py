@@ -16,7 +16,6 @@ from nuno.estimate.learned import (
     LEARNED_SHARE,
     correction,
     described,
-    log_of_sum,
     outline_of,
 )  # fmt: skip
 from nuno.estimate.outline_net import SCALARS, SIZE
@@ -133,9 +132,3 @@ def test_what_is_added_counts_in_the_evidence_alone():
     np.testing.assert_allclose(after.scores - before.scores, (0.0, np.log(2.0), 0.0), atol=1e-12)
     np.testing.assert_array_equal(after.eq1, before.eq1)
     np.testing.assert_array_equal(rank([changed], "chamfer", 3).scores, rank([seen], "chamfer", 3).scores)
-
-
-def test_the_logarithm_of_a_sum():
-    """Of e^-1000 + e^-1000 and of nothing: exp alone would underflow."""
-    logs = np.array([[-1000.0, -np.inf], [-1000.0, -np.inf]])
-    np.testing.assert_allclose(log_of_sum(logs), (np.log(2.0) - 1000.0, -np.inf))

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import correlate2d
+from scipy.special import logsumexp
 
-from nuno.estimate.learned import HAND_MADE_SHARE, LEARNED_SHARE, log_of_sum
+from nuno.estimate.learned import HAND_MADE_SHARE, LEARNED_SHARE
 from nuno.estimate.outline_net import LEVELS, SCALARS, SIZE, _convolved, log_ratios, weights
 
 TYPICAL = (np.log(8.0), 0.8, 0.0, 0.0, -0.4, 0.5, 1.0, 0.0, 0.5, 0.5, 0.3, 0.0)
@@ -74,8 +75,8 @@ def mean_log_probability(learned=LEARNED_SHARE, by_hand=HAND_MADE_SHARE, order=s
         scalars = np.concatenate(told, axis=-1).reshape(-1, SCALARS).astype(float)
         logs = by_hand * data["likelihood"][k].astype(float)
         logs[data["candidates"][k]] += learned * log_ratios(unpacked(data["real"][k]), pairs, scalars).reshape(shape)
-        of_candidates = log_of_sum(logs.T)
-        found.append(of_candidates[true] - log_of_sum(of_candidates[:, None]))
+        of_candidates = logsumexp(logs.T, axis=0)
+        found.append(of_candidates[true] - logsumexp(of_candidates))
     return float(np.mean(found))
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import logsumexp
 
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table
@@ -119,12 +120,12 @@ def correction(outline: Outline, futures: Futures, comparison: Comparison, table
         hand: (3,) the held point [m].
     """
     error = comparison.error("silhouette")
-    by_hand = log_of_sum(-error)
+    by_hand = logsumexp(-error, axis=0)
     finite = np.isfinite(by_hand)
     added = np.where(finite, (HAND_MADE_SHARE - 1.0) * np.where(finite, by_hand, 0.0), 0.0)
     looked = finite.copy()
     if looked.shape[1] > FIRST_BEST:
-        worse = np.argsort(-log_of_sum(by_hand), kind="stable")[FIRST_BEST:]
+        worse = np.argsort(-logsumexp(by_hand, axis=0), kind="stable")[FIRST_BEST:]
         looked[:, worse] = False
     guess, candidate = np.nonzero(looked)
     if len(guess):
@@ -155,10 +156,3 @@ def described(spread: Sequence[Hypothesis], cells: int) -> np.ndarray:
         )
         for h in spread
     ])  # fmt: skip
-
-
-def log_of_sum(logs: np.ndarray) -> np.ndarray:
-    """Logarithm of the sum over the first axis of what has these logarithms; -inf where all are."""
-    best = logs.max(axis=0)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.exp(logs - np.where(np.isfinite(best), best, 0.0)).sum(axis=0)) + best)

@@ -335,19 +335,17 @@ class ClothSolver(ParticleSolver):
         """Launch a block for each world and each that helps, or as many as there is room for, which take turns."""
         state, blocks = self._state, self.world_count
         cores = wp.get_device(self.device).sm_count
-        threads = FEW_THREADS if self.world_count <= cores else MANY_THREADS
-        inputs = [*common, substeps]
-        helped = state.helpers > 0 and substeps > 1
-        if kernel in (run_blocks_shared, run_blocks_many):
-            few = kernel is run_blocks_shared
-            threads, room = (FEW_THREADS, cores) if few else (MANY_THREADS, cores * MANY_AT_ONCE)
+        turns = kernel in (run_blocks_shared, run_blocks_many)
+        few = kernel is run_blocks_shared if turns else blocks <= cores
+        threads = FEW_THREADS if few else MANY_THREADS
+        inputs = [*common, substeps, threads]
+        helped, in_turn = state.helpers > 0 and substeps > 1, False
+        if turns:
+            room = cores if few else cores * MANY_AT_ONCE
             turn = (FEW_FRAMES if few else MANY_FRAMES) * run.frame
             in_turn = blocks > room and substeps > turn
             blocks = room if in_turn else blocks
-            inputs += [threads, turn if in_turn else substeps]
-        else:
-            in_turn = False
-            inputs += [threads]
+            inputs.append(turn if in_turn else substeps)
         if helped or in_turn:
             state.help.zero_()
         blocks += state.helpers if helped else 0
