@@ -8,7 +8,7 @@ import nuno
 from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
 from nuno.solver.cloth_solver import ClothSolver
-from nuno.solver.grid import teams_of
+from nuno.solver.grid_plan import teams_of
 
 SIDE = 70  # cells: more particles than one block takes
 
@@ -48,11 +48,11 @@ def folded(plan="auto"):
 def test_multiprocessors_are_shared_out_among_worlds():
     """Invariant: none is taken twice, and few worlds go at once; a wait for as many as there are is no gain."""
     for worlds in range(1, 400):
-        teams, blocks = teams_of(worlds, 132)
+        teams, blocks = teams_of(worlds, 132, 7.0)
         assert 1 <= teams <= worlds and blocks >= 1 and teams * blocks <= 132
         assert worlds > 66 or teams == worlds
-    assert teams_of(1, 132) == (1, 132) and teams_of(132, 132) == (132, 1) and teams_of(5, 1) == (1, 1)
-    assert teams_of(140, 132)[1] > 1  # two turns of 70 would leave half of them idle
+    assert teams_of(1, 132, 7.0) == (1, 132) and teams_of(132, 132, 7.0) == (132, 1) and teams_of(5, 1, 7.0) == (1, 1)
+    assert teams_of(140, 132, 7.0)[1] > 1  # two turns of 70 would leave half of them idle
 
 
 @pytest.mark.cuda

@@ -57,18 +57,19 @@ def outcome(made, seconds=0.25):
 
 
 @pytest.mark.parametrize("body", [BODY, HOLED], ids=["whole", "holed"])
-def test_scalar_vector_and_lanes_give_the_same_bits(body):
-    """Promise: one source, three layouts, no bit of difference, alone or beside others; some is inside out."""
+def test_all_plans_give_the_same_bits(body):
+    """Promise: one source, four plans, no bit of difference, alone or beside others; some is inside out."""
     made = solver("fused", body=body)
     first = made.positions()[0][body.tets]
     assert (np.linalg.det(np.swapaxes(first[:, 1:] - first[:, :1], 1, 2)) < 0).any()
     expected = outcome(made)
-    np.testing.assert_array_equal(outcome(solver("vector", body=body)), expected)
+    for plan in ("vector", "grid"):
+        np.testing.assert_array_equal(outcome(solver(plan, body=body)), expected)
     for worlds in (3, 18):
         np.testing.assert_array_equal(outcome(solver("auto", worlds, different=True, body=body)), expected)
 
 
-@pytest.mark.parametrize("plan", ["fused", "vector"])
+@pytest.mark.parametrize("plan", ["fused", "vector", "grid"])
 def test_steps_by_parts_are_the_run(plan):
     """Promise: who steps the parts of each substep of a frame from outside gets the bits of the run."""
     whole, parts = solver(plan), solver(plan)
@@ -155,6 +156,31 @@ def test_shared_memory_changes_no_bit(cells, worlds):
         found.append(outcome(made))
     np.testing.assert_array_equal(found[0], found[1])
     assert np.isfinite(found[0]).all()
+
+
+@pytest.mark.cuda
+@pytest.mark.parametrize("substeps", [16, 30])
+@pytest.mark.parametrize("worlds", [1, 5, 140])
+def test_teams_of_multiprocessors_change_no_bit(worlds, substeps):
+    """Promise: how many multiprocessors share a world is of no account, with floats (16 substeps) and doubles."""
+    body = SoftTopology.of(*box_tetrahedra((0.36,) * 3, (12,) * 3))
+    found = []
+    for plan in ("fused", "grid"):
+        made = solver(plan, worlds, device="cuda:0", body=body)
+        made.substeps = substeps
+        made.run(0.0, 0.15)
+        found.append((made.local_positions(), made.velocities()))
+    np.testing.assert_array_equal(found[0], found[1])
+    assert np.isfinite(found[0]).all()
+
+
+@pytest.mark.cuda
+def test_a_large_body_takes_all_multiprocessors():
+    """Promise: one world is not left to one of them, a world each of many is."""
+    body = SoftTopology.of(*box_tetrahedra((0.4,) * 3, (16,) * 3))
+    assert solver("auto", device="cuda:0", body=body).plan == "grid"
+    assert solver("auto", 300, device="cuda:0", body=body).plan == "fused"
+    assert solver("auto", device="cuda:0").plan == "fused"
 
 
 @pytest.mark.cuda

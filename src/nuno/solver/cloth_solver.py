@@ -16,10 +16,11 @@ from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.fine_places import FinePlaces
 from nuno.solver.frame import run_fine_lanes, run_fine_worlds, run_lanes, run_worlds
-from nuno.solver.grid import GridPlan, cores_of, teams_of
+from nuno.solver.grid import run_fine_grid, run_grid
+from nuno.solver.grid_plan import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES
-from nuno.solver.large import LargePlan
+from nuno.solver.large import THREADS, LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.shared import (
@@ -67,6 +68,9 @@ MOST_HELPERS = 7
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and takes a device's blocks together."""
 LARGE = ("grid", "large")
+SHARED_OUT = 7.0
+"""Of the plan "grid", see `nuno.solver.grid_plan.teams_of`; 6,561 vertices on an H200, 1 to 132 blocks; 23 for
+16,641."""
 """Plans in which many blocks work on a world."""
 WIDE_MARGIN = 0.45
 """Margin over the size of a cell of the lists of the plans "grid" and "vector": lists are few, and a world by itself
@@ -366,7 +370,7 @@ class ClothSolver(ParticleSolver):
 
     def _large_plan(self) -> LargePlan | GridPlan:
         grid = self.plan == "grid"
-        teams, blocks = teams_of(self.world_count if grid else 1, cores_of(self.device))
+        teams, blocks = teams_of(self.world_count if grid else 1, cores_of(self.device), SHARED_OUT)
         stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES)
         if self._shared is None:
             work = make_work(self.topology, self._soft, stages, self.device)
@@ -374,4 +378,10 @@ class ClothSolver(ParticleSolver):
         work, lists = self._shared
         parts = (self._state, self._topology, self._size, self._shapes)
         launches = LargePlan(*parts, self.device, self.world_count, work, stages.first, lists)
-        return GridPlan(launches, *parts, self.device, teams, work, lists) if grid else launches
+        if not grid:
+            return launches
+        before, speeds = (self._topology, self._size), wp.zeros(2 * self.world_count, dtype=float, device=self.device)
+        after = (self._shapes, work, lists, speeds)
+        kernels = run_grid, run_fine_grid
+        blocks = work.step.shape[0] // (4 * work.steps)
+        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, launches.run)

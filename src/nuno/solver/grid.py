@@ -1,15 +1,11 @@
-"""The CUDA plan for scenes that take the whole device: all its blocks go through a frame together, in one launch.
+"""A cloth's frame by a team of blocks, for `nuno.solver.grid_plan.GridPlan`.
 
-Each world has a team of blocks, which takes more worlds in turn where there are many. The phases are those of
-`nuno.solver.large`, but blocks wait for each other inside of the launch (`nuno.solver.team`), which takes half as
-long as beginning another, and lists that still hold cost nothing. Every block keeps the figures that all threads read
-in shared memory, its own copy. Where the device has no room for all blocks at once, the launches of
-`nuno.solver.large` take over.
+The phases are those of `nuno.solver.large`, but blocks wait for each other inside of the launch, and lists that still
+hold cost nothing. Every block keeps the figures that all threads read in shared memory, its own copy.
 """
 
 from __future__ import annotations
 
-import logging
 from typing import Any
 
 import warp as wp
@@ -22,25 +18,19 @@ from nuno.contact.team_listing import Lists, renew_by_team
 from nuno.solver.grips import forget_loads, pull_points
 from nuno.solver.integrate import reset_speed, tick
 from nuno.solver.lanes import barrier
-from nuno.solver.large import THREADS, LargePlan, come_to_rest
+from nuno.solver.large import THREADS, come_to_rest
 from nuno.solver.shared_memory import MOST_STEPS, figures, program
 from nuno.solver.stages import Work, go_through, grips_on, steps_of
-from nuno.solver.state import ALL_PARTS, SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
-from nuno.solver.team import ARRIVED, COUNT, VERDICT, Team, begin_to_meet, call_roll, counts_of, meet, team_of
+from nuno.solver.state import SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
+from nuno.solver.team import Team, begin_to_meet, call_roll, meet, team_of
 from nuno.solver.warps import in_warps
-
-SHARED = 7.0
-"""A substep by b blocks takes as long as 1 + 7 / b: waits and what a single thread does, and what is shared out (6,561
-vertices on an H200, 1 to 132 blocks; 23 for 16,641)."""
-
-log = logging.getLogger(__name__)
 
 for _name in ("run_grid", "run_fine_grid"):
     wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True  # as in the plans for a block
 
 
 @wp.func
-def near_shapes(t: StateFloat, topo: Topology, run: Settings, shapes: Shapes, team: Team):
+def near_shapes(t: Any, topo: Any, run: Settings, shapes: Shapes, team: Team):
     """Choose the shapes that matter for the next frame, and what sharp ones may touch between vertices."""
     n = topo.particles
     reset_box(t, team.turn)
@@ -198,71 +188,3 @@ def run_fine_grid(
     if call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
         run_teams(s, floats, topo, size, run, shapes, work, lists, speeds, first, substeps, teams, team)
-
-
-class GridPlan:
-    """A launch a frame of as many blocks as there are multiprocessors.
-
-    Args:
-        launches: The plan that does what a launch of this one cannot: parts of a substep, and all where not all blocks
-            find room on the device.
-        state: `StateFloat` of all worlds.
-        topology: The cloth's elements.
-        size: Numbers a world in each array.
-        shapes: Static shapes.
-        device: "cuda:0" ..., or "cpu", where one thread does everything.
-        teams: How many worlds are gone through at once, each by a team of blocks.
-        work: The elements' `Work`, whose shares say how many blocks a team has.
-        lists: Room for listing pairs, from `nuno.contact.team_listing.make_lists`.
-    """
-
-    def __init__(
-        self, launches: LargePlan, state: Any, topology: Any, size: Any, shapes: Any, device: str, teams: int,
-        work: Any, lists: Any,
-    ) -> None:  # fmt: skip
-        self._launches, self._device, self._teams = launches, device, teams
-        self._inputs = [state, topology, size, shapes, work, lists]
-        self._blocks = work.step.shape[0] // (4 * work.steps)
-        self._threads = THREADS if device.startswith("cuda") else 1
-        self._speeds = wp.zeros(2 * state.worlds, dtype=float, device=device)
-        self._crowded = False
-
-    def run(self, run: Any, substeps: int, fine: Any = None) -> None:
-        """Advance by ``substeps`` substeps under the settings ``run``, coordinates as doubles if there is ``fine``."""
-        if run.parts != ALL_PARTS or self._crowded:
-            self._launches.run(run, substeps, fine)
-            return
-        frames = range(0, substeps, run.frame)
-        gate = wp.zeros(len(frames) * counts_of(self._teams), dtype=int, device=self._device)
-        state, topology, size, shapes, work, lists = self._inputs
-        for call, first in enumerate(frames):
-            inputs = [state] if fine is None else [fine, state]
-            inputs += [topology, size, run, shapes, work, lists, self._speeds, gate, call]
-            inputs += [min(run.frame, substeps - first), self._teams, self._blocks, self._threads]
-            dim = self._teams * self._blocks * self._threads
-            kernel = run_grid if fine is None else run_fine_grid
-            wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
-        verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._teams, COUNT)[:, VERDICT, 0]
-        if (verdicts != 1).any():
-            self._crowded = True
-            log.warning("a CUDA device is too busy for a launch of %d blocks: smaller ones go on", self._blocks)
-            run.first = int((verdicts == 1).sum()) * run.frame
-            self._launches.run(run, substeps - run.first, fine)
-
-
-def teams_of(worlds: int, cores: int) -> tuple[int, int]:
-    """Return how many worlds are gone through at once, and the blocks of each: so many multiprocessors, shared out.
-
-    Where worlds are more than can be at once, teams take several in turn; it may be quicker to do so earlier.
-    """
-
-    def cost(teams: int) -> float:
-        return -(-worlds // teams) * (1.0 + SHARED / (cores // teams))
-
-    teams = min(range(1, min(worlds, cores) + 1), key=cost)
-    return teams, cores // teams
-
-
-def cores_of(device: str) -> int:
-    """Return a device's multiprocessors; 1 on the CPU."""
-    return int(wp.get_device(device).sm_count) if device.startswith("cuda") else 1

@@ -1,4 +1,4 @@
-"""The stars by the threads of a CUDA block: each thread reads which its next one is while it works on one.
+"""The stars by the threads of one CUDA block or several: each reads which its next one is while it works on one.
 
 A colour of a body that fits a block has about as many stars as the block has threads, and all wait for each other
 before the next colour. Read only then, a star's vertices would come from far away in every colour anew.
@@ -8,10 +8,10 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import barrier
 from nuno.solver.soft_stars import damp_star, solve_star, stiffness
 from nuno.solver.soft_state import Tetrahedra
 from nuno.solver.state import DAMPING, Settings
+from nuno.solver.team import wait_for
 
 
 @wp.func_native("""
@@ -48,8 +48,8 @@ def read_star(table: Tetrahedra, k: int):
 
 
 @wp.func
-def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
-    """One pass over the tetrahedra's elasticity, as `nuno.solver.soft_frame.elastic`."""
+def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int, those: Any):
+    """One pass over the tetrahedra's elasticity, as `nuno.solver.soft_frame.elastic`, by ``those`` threads together."""
     square = run.dt * run.dt
     limit = wp.min(table.speed * run.dt, 0.5 * table.height)
     mu, bulk = stiffness(t, square)
@@ -73,12 +73,12 @@ def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads
             k += threads
         first = last
         last = stop
-        barrier(threads)
+        wait_for(those)
 
 
 @wp.func
-def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
-    """One pass over the tetrahedra's viscosity, as `nuno.solver.soft_frame.viscous`."""
+def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int, those: Any):
+    """One pass over the tetrahedra's viscosity, as `nuno.solver.soft_frame.viscous`, by ``those`` threads together."""
     time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
     eta = t.mu[0] * time
     colours = table.colour.shape[0] - 1
@@ -99,4 +99,4 @@ def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, thread: int, threads
             k += threads
         first = last
         last = stop
-        barrier(threads)
+        wait_for(those)

@@ -103,7 +103,7 @@ def viscous(t: SoftFine, table: Tetrahedra, run: Settings, thread: int, threads:
 def viscous_alone(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
     """`viscous` of one world: by threads that share it, or by one."""
     if shares_work(threads):
-        viscous_ahead(t, table, run, thread, threads)
+        viscous_ahead(t, table, run, thread, threads, threads)
     else:
         for c in range(table.colour.shape[0] - 1):
             damp_stars(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)
@@ -131,7 +131,7 @@ def elastic(t: SoftFine, table: Tetrahedra, run: Settings, thread: int, threads:
 def elastic_alone(t: Any, table: Tetrahedra, run: Settings, thread: int, threads: int):
     """`elastic` of one world: by threads that share it, or by one."""
     if shares_work(threads):
-        elastic_ahead(t, table, run, thread, threads)
+        elastic_ahead(t, table, run, thread, threads, threads)
     else:
         for c in range(table.colour.shape[0] - 1):
             solve_stars(t, table, run, table.colour[c], table.colour[c + 1], 0, 1)

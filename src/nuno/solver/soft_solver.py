@@ -14,6 +14,7 @@ from nuno.contact.sharp_shapes import ROUND
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
 from nuno.solver.fine_places import FinePlaces
+from nuno.solver.grid_plan import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
@@ -28,6 +29,7 @@ from nuno.solver.soft_frame import (
     run_soft_wide,
     run_soft_worlds,
 )
+from nuno.solver.soft_grid import THREADS, TOLD, run_soft_fine_grid, run_soft_grid
 from nuno.solver.soft_state import (
     IDLE,
     FarSides,
@@ -55,6 +57,10 @@ MOST_REPLY, MOST_BETWEEN = 0.7, 4
 average; smooth motions are then damped at 0.85 to 0.95 of the stated rate, and at 0.95 to 0.99 at half the reply."""
 STRETCHED = 2.0
 """How many times as long as at rest an edge is taken to be at most, where it is asked what may touch it."""
+ALONE = 2200.0
+"""Particles for which a block takes as long as a team's blocks wait for each other (an H200; 1,331 to 35,937)."""
+SLOWER = 1.2
+"""A team is taken where it should be quicker by so much: many are slowed by memory, which that does not know of."""
 DIGITS = 22
 """Binary digits in which rest shapes that count as one agree: float32 has 24."""
 LOOSENING = 0.1
@@ -75,15 +81,16 @@ class SoftSolver(ParticleSolver):
         substeps: Substeps a frame; None takes `soft_substeps`.
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
         self_contact: Kept, but without effect: see the limitations.
-        plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world) or "vector" (one world on
-            the CPU by sixteen elements at a time).
+        plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
+            the CPU by sixteen elements at a time) or "grid" (all blocks of a CUDA device together), all with the same
+            bits on a device.
 
     A vertex touches shapes where it is, without a thickness, and so do the surface's edges and triangles sharp ones.
     Inner vertices are tested too: in a cube of ten cells a side that is 2 % of a substep.
 
     Limitations: one pass a substep, so that what is stiffer than the substeps carry comes out softer than stated; a
     soft body does not touch itself; linear tetrahedra are too stiff in bending, and near a Poisson ratio of 0.5, where
-    a crumpled body may stay crumpled; on CUDA a world is one block, however large.
+    a crumpled body may stay crumpled.
     """
 
     def __init__(
@@ -101,15 +108,19 @@ class SoftSolver(ParticleSolver):
         self_contact: bool = False,
         plan: str = "auto",
     ) -> None:
-        self._prepare(positions, device, gravity, frame_rate)
+        self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
         self.topology, self._cell_size = topology, topology.cell_size
         values = material.resolved(self.world_count, topology.element_count)
         self._speed = wave_speed(values)
         self.substeps = int(substeps) if substeps else soft_substeps(topology, 1.0 / frame_rate, self._speed)
         self.self_contact = self_contact
         self.shared_memory = True
-        one = "vector" if not self._cuda and self.world_count == 1 else "fused"
-        self.plan = one if plan == "auto" else plan
+        if plan == "auto":
+            plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
+            if self._cuda and self._team_pays():
+                plan = "grid"
+        self.plan = plan
+        self._grid: GridPlan | None = None
         self._wide: WideTetrahedra | None = None
         self._build(values, friction)
         self._start(positions, velocities)
@@ -217,6 +228,15 @@ class SoftSolver(ParticleSolver):
 
     def _advance(self, run: Settings, substeps: int) -> None:
         fine = self._fine.bring(run)
+        if self.plan == "grid":
+            if self._grid is None:
+                self._grid = self._grid_plan()
+            self._grid.run(run, substeps, fine)
+        else:
+            self._launch_worlds(run, substeps, fine)
+
+    def _launch_worlds(self, run: Settings, substeps: int, fine: Any) -> None:
+        """As all plans but "grid" do it: worlds by themselves, or sixteen at once on the CPU."""
         states = [self._state] if fine is None else [fine, self._state]
         if self._cuda:
             name, threads = self._block_kernel(fine is not None)
@@ -244,6 +264,23 @@ class SoftSolver(ParticleSolver):
                 wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
+
+    def _team_pays(self) -> bool:
+        """Whether worlds by teams of multiprocessors are quicker than by one each."""
+        cores, alone = cores_of(self.device), self.particle_count / ALONE
+        teams, blocks = teams_of(self.world_count, cores, alone)
+        by_teams = -(-self.world_count // teams) * (1.0 + alone / blocks)
+        return SLOWER * by_teams < -(-self.world_count // cores) * alone
+
+    def _grid_plan(self) -> GridPlan:
+        teams, blocks = teams_of(self.world_count, cores_of(self.device), self.particle_count / ALONE)
+        told = wp.zeros(TOLD * self.world_count, dtype=float, device=self.device)
+        before, after = (self._topology, self._surface, self._size), (self._shapes, told)
+        kernels = run_soft_grid, run_soft_fine_grid
+        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, self._launch_worlds)
+
+    def _forget_launches(self) -> None:
+        self._grid = None
 
     def _block_kernel(self, fine: bool) -> tuple[str, int]:
         """The kernel that has as much of a world in shared memory and registers as fits, and its threads."""

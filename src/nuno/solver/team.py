@@ -9,6 +9,8 @@ without the others, for the device is shared by turns as a whole or by room that
 
 import warp as wp
 
+from nuno.solver.lanes import barrier
+
 PATIENCE = 200_000_000
 """[ns] How long the blocks wait for all to answer."""
 COUNT = 32
@@ -92,6 +94,17 @@ def begin_to_meet(team: Team):
 def meet(team: Team):
     """Wait for all threads of the team; what they wrote is there then."""
     meet_blocks(team.gate, team.place, team.blocks)
+
+
+@wp.func
+def wait_for(those: int):
+    """Wait for all threads of the block, so many, or for all of a team."""
+    barrier(those)
+
+
+@wp.func
+def wait_for(those: Team):
+    meet(those)
 
 
 @wp.func_native("""
