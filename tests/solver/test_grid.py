@@ -95,3 +95,21 @@ def test_blocks_that_find_no_room_leave_the_work_to_launches():
         made.run(1.0 / 60.0, 5.0 / 60.0)
     assert busy._large._crowded
     np.testing.assert_array_equal(busy.local_positions(), launches.local_positions())
+
+
+@pytest.mark.cuda
+def test_a_cloth_that_meets_a_box_has_the_same_bits_in_any_batch():
+    """Promise: substeps by parts too, whether a world is a team's of few or a block's of many."""
+    world = nuno.World(device="cuda:0", substeps=30)
+    world.add(nuno.plane())
+    cloth = world.add(nuno.sheet((0.4, 0.4), cells=(47, 47), position=(0.0, 0.0, 0.02)))
+    box = world.add(nuno.box((0.1, 0.1, 0.04), position=(0.0, 0.0, 0.05)))
+    world.attach(cloth)
+    world.attach(box, nuno.Rigid(density=300.0))
+    many = world.imagine(140)
+    for each, plan in ((world, "grid"), (many, "fused")):
+        each.run(0.1)
+        assert each.find(cloth.name)._dynamics.solver.plan == plan
+    assert len(world.contacts(box).points) > 0
+    for found in many.find(cloth.name).vertices[[0, 139]]:
+        np.testing.assert_array_equal(found, cloth.vertices)

@@ -298,6 +298,20 @@ def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
 
 
 @pytest.mark.cuda
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_worlds_by_teams_have_the_bits_of_worlds_by_blocks(kind):
+    """Promise: same bits in any batch of a cloth that is a team's where worlds are few, and a block's where many."""
+    found = []
+    for worlds, plan in ((1, "grid"), (5, "grid"), (140, "fused")):
+        made = solver(kind, "auto", worlds, device="cuda:0", self_contact=True, cells=(47, 43), substeps=FINE)
+        assert made.plan == plan
+        found.append(outcome(made))
+        assert made.pair_counts.sum(axis=1).min() > 0
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[0], found[2])
+
+
+@pytest.mark.cuda
 @pytest.mark.parametrize("cells", [CELLS, (44, 33)], ids=["all", "a part"])
 def test_shared_memory_changes_no_bit(cells):
     """Promise: where the positions lie while they are worked on is of no account, whether all or some of it fits."""

@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.bending import bend_line, bend_twist
-from nuno.solver.lanes import barrier
+from nuno.solver.lanes import barrier, product
 from nuno.solver.membrane import shear_cell
 from nuno.solver.state import DAMPING, Settings, Topology
 
@@ -83,7 +83,7 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, thread
         soft = t.bend_soft[ready.soft]
         for c in range(colours):
             now = ready
-            alpha = soft * (now.scale * rate)
+            alpha = product(soft, now.scale * rate)
             start = last
             stop = table.line_colour[wp.min(c + 2, colours)]
             ready = read_line(table, start + thread, stop)
@@ -91,7 +91,7 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, thread
                 bend_line(t, now.a, now.b, now.c, alpha, run.damped, damping)
             for k in range(first + thread + threads, last, threads):
                 element = read_line(table, k, last)
-                alpha = t.bend_soft[element.soft] * (element.scale * rate)
+                alpha = product(t.bend_soft[element.soft], element.scale * rate)
                 bend_line(t, element.a, element.b, element.c, alpha, run.damped, damping)
             soft = t.bend_soft[ready.soft]
             first = start
@@ -112,7 +112,7 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
         soft = t.bend_soft[ready.soft]
         for c in range(colours):
             now = ready
-            alpha = soft * (now.scale * rate)
+            alpha = product(soft, now.scale * rate)
             start = last
             stop = table.twist_colour[wp.min(c + 2, colours)]
             ready = read_twist(table, start + thread, stop)
@@ -120,7 +120,7 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
                 bend_twist(t, now.a, now.b, now.c, now.d, alpha, run.damped, damping)
             for k in range(first + thread + threads, last, threads):
                 element = read_twist(table, k, last)
-                alpha = t.bend_soft[element.soft] * (element.scale * rate)
+                alpha = product(t.bend_soft[element.soft], element.scale * rate)
                 bend_twist(t, element.a, element.b, element.c, element.d, alpha, run.damped, damping)
             soft = t.bend_soft[ready.soft]
             first = start
@@ -140,7 +140,7 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
         soft = t.shear_soft[ready.soft]
         for c in range(colours):
             now = ready
-            alpha = soft * (now.scale * 4.0 * rate)
+            alpha = product(soft, now.scale * 4.0 * rate)
             start = last
             stop = table.cell_colour[wp.min(c + 2, colours)]
             ready = read_cell(table, start + thread, stop)
@@ -148,7 +148,7 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
                 shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha)
             for k in range(first + thread + threads, last, threads):
                 element = read_cell(table, k, last)
-                alpha = t.shear_soft[element.soft] * (element.scale * 4.0 * rate)
+                alpha = product(t.shear_soft[element.soft], element.scale * 4.0 * rate)
                 shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha)
             soft = t.shear_soft[ready.soft]
             first = start

@@ -14,7 +14,7 @@ from nuno.contact.world_room import listing_room
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
-from nuno.solver.fine_places import FinePlaces
+from nuno.solver.fine_places import FINE_RATE, FinePlaces
 from nuno.solver.frame import run_fine_lanes, run_fine_worlds, run_lanes, run_worlds
 from nuno.solver.grid import run_fine_grid, run_grid
 from nuno.solver.grid_plan import GridPlan, cores_of, teams_of
@@ -67,11 +67,13 @@ MOST_HELPERS = 7
 """Blocks that help one world list its pairs, at most."""
 BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and takes a device's blocks together."""
+TEAM_PARTICLES = 1024
+"""Particles of a smaller world for each block of a team that takes less time than one block alone (an H200)."""
 LARGE = ("grid", "large")
+"""Plans in which many blocks work on a world."""
 SHARED_OUT = 7.0
 """Of the plan "grid", see `nuno.solver.grid_plan.teams_of`; 6,561 vertices on an H200, 1 to 132 blocks; 23 for
 16,641."""
-"""Plans in which many blocks work on a world."""
 WIDE_MARGIN = 0.45
 """Margin over the size of a cell of the lists of the plans "grid" and "vector": lists are few, and a world by itself
 waits for no other's candidates. With the largest thickness, half a cell, it is less than a cell, so that flat cloth
@@ -131,7 +133,7 @@ class ClothSolver(ParticleSolver):
         self.shared_memory = True
         if plan == "auto":
             plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
-            if self._cuda and self.particle_count > BLOCK_PARTICLES:
+            if self._cuda and (self.particle_count > BLOCK_PARTICLES or self._team_pays()):
                 plan = "grid"
         self.plan = plan
         self._large: LargePlan | GridPlan | None = None
@@ -185,12 +187,12 @@ class ClothSolver(ParticleSolver):
         size.blocks = 6 * (blocks.count + -(-blocks.count // GROUP))
         size.listed = 3 * n + 8 if self.self_contact else 1
         size.near_blocks = 1
-        if self.plan in LARGE:
-            size.blocks = bounds_room(blocks.count)
-        elif self._cuda and self.self_contact:
+        if self._cuda and self.self_contact and (self.plan not in LARGE or self._fits_block):
             # and boxes of what each block moved; pairs of blocks: all, or of many 128 each
             size.blocks += 6 * blocks.count
             size.near_blocks = 1 + min(blocks.count * (blocks.count + 1) // 2, 128 * blocks.count)
+        if self.plan in LARGE:
+            size.blocks = max(size.blocks, bounds_room(blocks.count))
         elements = len(blocks.face), len(blocks.edge)
         # spheres of all elements, or on the CPU the room in which one world after the other is listed
         alone = not self._cuda and self.plan not in LARGE
@@ -310,15 +312,13 @@ class ClothSolver(ParticleSolver):
 
     def _advance(self, run: Settings, substeps: int) -> None:
         fine = self._fine.bring(run)
+        states = [self._state] if fine is None else [fine, self._state]
         if self.plan in LARGE:
             if self._large is None:
                 self._large = self._large_plan()
             self._large.run(run, substeps, fine)
-            return
-        states = [self._state] if fine is None else [fine, self._state]
-        common = [*states, self._topology, self._size, run, self._shapes]
-        if self._cuda:
-            self._launch_blocks(self._block_kernel(fine is not None), common, run, substeps)
+        elif self._cuda:
+            self._launch_blocks(run, substeps, fine)
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)
@@ -335,14 +335,16 @@ class ClothSolver(ParticleSolver):
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
-    def _launch_blocks(self, kernel: Any, common: list[Any], run: Settings, substeps: int) -> None:
+    def _launch_blocks(self, run: Settings, substeps: int, fine: Any) -> None:
         """Launch a block for each world and each that helps, or as many as there is room for, which take turns."""
         state, blocks = self._state, self.world_count
+        kernel = self._block_kernel(fine is not None)
+        states = [state] if fine is None else [fine, state]
         cores = wp.get_device(self.device).sm_count
         turns = kernel in (run_blocks_shared, run_blocks_many)
         few = kernel is run_blocks_shared if turns else blocks <= cores
         threads = FEW_THREADS if few else MANY_THREADS
-        inputs = [*common, substeps, threads]
+        inputs = [*states, self._topology, self._size, run, self._shapes, substeps, threads]
         helped, in_turn = state.helpers > 0 and substeps > 1, False
         if turns:
             room = cores if few else cores * MANY_AT_ONCE
@@ -365,6 +367,17 @@ class ClothSolver(ParticleSolver):
             return run_blocks_shared if few else run_blocks_many
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 
+    def _team_pays(self) -> bool:
+        """Whether a world beyond a block's memory is quicker by a team; with doubles the bits are the same."""
+        share = cores_of(self.device) // self.world_count
+        fine = self.frame_rate * self.substeps >= FINE_RATE
+        return fine and FINE_PARTICLES < self.particle_count <= TEAM_PARTICLES * share
+
+    @property
+    def _fits_block(self) -> bool:
+        """Whether a block does what a team cannot: parts of a substep, and all where a device is too busy."""
+        return self._cuda and self.particle_count <= BLOCK_PARTICLES
+
     def _forget_launches(self) -> None:
         self._large = None
 
@@ -380,8 +393,9 @@ class ClothSolver(ParticleSolver):
         launches = LargePlan(*parts, self.device, self.world_count, work, stages.first, lists)
         if not grid:
             return launches
+        otherwise = self._launch_blocks if self._fits_block else launches.run
         before, speeds = (self._topology, self._size), wp.zeros(2 * self.world_count, dtype=float, device=self.device)
         after = (self._shapes, work, lists, speeds)
         kernels = run_grid, run_fine_grid
         blocks = work.step.shape[0] // (4 * work.steps)
-        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, launches.run)
+        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, otherwise)

@@ -106,6 +106,21 @@ def over(a: lane, b: lane) -> lane: ...
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+return __fmul_rn(a, b);
+#else
+return a * b;
+#endif
+""")
+def product(a: float, b: float) -> float:
+    """The product, rounded by itself: CUDA's compiler does not make it part of a sum that it comes into.
+
+    It would do so in some plans and not in others, which then had other bits.
+    """
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
 return fmaf(a, b, c);
 #else
 return __builtin_fmaf(a, b, c);

@@ -19,7 +19,7 @@ from nuno.solver.compliances import Compliances
 from nuno.solver.frame import bend_patches, strain_triangles
 from nuno.solver.grips import hold_vertices
 from nuno.solver.integrate import predict
-from nuno.solver.lanes import barrier, window
+from nuno.solver.lanes import barrier, product, window
 from nuno.solver.membrane import shear_cell
 from nuno.solver.state import DAMPING, Settings, Topology
 from nuno.solver.team import Team, meet
@@ -135,11 +135,11 @@ def read(work: Work, world: int, kind: int, k: int, last: int):
 def solve(t: Any, run: Settings, kind: int, e: Element, rate: float, damping: float):
     """One bend or shear, as in `nuno.solver.frame`."""
     if kind == TWISTS:
-        bend_twist(t, e.a, e.b, e.c, e.d, e.soft * (e.scale * rate), run.damped, damping)
+        bend_twist(t, e.a, e.b, e.c, e.d, product(e.soft, e.scale * rate), run.damped, damping)
     elif kind == LINES:
-        bend_line(t, e.a, e.b, e.c, e.soft * (e.scale * rate), run.damped, damping)
+        bend_line(t, e.a, e.b, e.c, product(e.soft, e.scale * rate), run.damped, damping)
     else:
-        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, e.soft * (e.scale * 4.0 * rate))
+        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate))
 
 
 @wp.func
