@@ -212,6 +212,24 @@ def test_cuda_gives_the_same_bits_every_time_and_in_a_batch():
 
 
 @pytest.mark.cuda
+def test_teams_of_multiprocessors_change_no_bit():
+    """Promise: a world of more parts than a block has threads is a team's, with the bits of a block."""
+    runs = []
+    for crowded in (False, True):
+        random = np.random.default_rng(5)
+        solver = on_floor(device="cuda:0")
+        lattice = np.stack(np.meshgrid(*(0.12 * np.arange(k) for k in (8, 6, 7))), axis=-1).reshape(-1, 3)
+        lattice += random.uniform((-0.008, -0.008, 0.052), (0.008, 0.008, 0.068), lattice.shape)
+        slots = [drop(solver, CUBE, place) for place in lattice]
+        solver._crowded = crowded
+        assert (solver._team_blocks() > 1) is not crowded
+        solver.run(0.0, 0.6)
+        assert solver.contact_count()[0] > 1000
+        runs.append(state_of(solver, slots))
+    assert_same(*runs)
+
+
+@pytest.mark.cuda
 def test_cuda_stacks_and_heaps_as_the_cpu_does():
     """Ten boxes stand within 1 mm; a heap comes to rest where nothing overlaps."""
     solver = on_floor(device="cuda:0")

@@ -109,8 +109,9 @@ def measure(s: RigidState, c: Contacts, rules: Rules, world: int, thread: int, t
             went = wp.length(s.position[i] - c.listed_position[i]) + r * turn_of(c.listed_rotation[i], s.rotation[i])
             travel = wp.max(travel, went)
     if threads > 1:
-        wp.atomic_max(c.notes, world * NOTES + SPEED, speed)
-        wp.atomic_max(c.notes, world * NOTES + TRAVEL, travel)
+        if thread < s.capacity:
+            wp.atomic_max(c.notes, world * NOTES + SPEED, speed)
+            wp.atomic_max(c.notes, world * NOTES + TRAVEL, travel)
     else:
         c.notes[world * NOTES + SPEED] = speed
         c.notes[world * NOTES + TRAVEL] = travel

@@ -5,12 +5,14 @@ and so on up. A round is a set of manifolds of which no two move the same body, 
 matter.
 """
 
+from typing import Any
+
 import warp as wp
 
 from nuno.contact.convex import Parts
 from nuno.contact.rigid_manifolds import COUNTS, ENTRIES, ROUNDS, WAITING, Contacts
-from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
+from nuno.solver.team import wait_for
 
 
 @wp.func
@@ -113,8 +115,8 @@ def priority(c: Contacts, world: int, e: int):
 
 
 @wp.func
-def sort_rounds(s: RigidState, parts: Parts, c: Contacts, world: int, thread: int, threads: int):
-    """Bring the entries with points into rounds, by all threads of a block.
+def sort_rounds(s: RigidState, parts: Parts, c: Contacts, world: int, thread: int, threads: int, those: Any):
+    """Bring the entries with points into rounds, by all ``those`` threads of a block or a team.
 
     In each round every entry bids its priority for its two bodies, and those that win both are the round.
     """
@@ -128,13 +130,13 @@ def sort_rounds(s: RigidState, parts: Parts, c: Contacts, world: int, thread: in
         c.bounds[base] = 0
     for k in range(thread, s.capacity, threads):
         c.winner[bodies + k] = wp.uint64(0)
-    barrier(threads)
+    wait_for(those)
     for local in range(thread, parts.count * c.row, threads):
         e = base + local
         if c.count[e] > 0:
             if may_act(s, parts, c, world, e, local / c.row) == 1:
                 c.waiting[base + wp.atomic_add(c.counts, count + WAITING, 1)] = e
-    barrier(threads)
+    wait_for(those)
     waiting = c.counts[count + WAITING]
     done = int(0)
     rounds = int(0)
@@ -149,7 +151,7 @@ def sort_rounds(s: RigidState, parts: Parts, c: Contacts, world: int, thread: in
                     wp.atomic_max(c.winner, i, bid)
                 if s.weight[j] > 0.0:
                     wp.atomic_max(c.winner, j, bid)
-        barrier(threads)
+        wait_for(those)
         for k in range(thread, waiting, threads):
             e = c.waiting[base + k]
             if e >= 0:
@@ -159,14 +161,14 @@ def sort_rounds(s: RigidState, parts: Parts, c: Contacts, world: int, thread: in
                 if (s.weight[i] == 0.0 or c.winner[i] == bid) and (s.weight[j] == 0.0 or c.winner[j] == bid):
                     c.order[base + wp.atomic_add(c.counts, count + ENTRIES, 1)] = e
                     c.waiting[base + k] = -1
-        barrier(threads)
+        wait_for(those)
         for k in range(thread, s.capacity, threads):
             c.winner[bodies + k] = wp.uint64(0)
         done = c.counts[count + ENTRIES]
         rounds = rounds + 1
         if thread == 0:
             c.bounds[base + rounds] = done
-        barrier(threads)
+        wait_for(those)
     if thread == 0:
         c.counts[count + ROUNDS] = rounds
-    barrier(threads)
+    wait_for(those)

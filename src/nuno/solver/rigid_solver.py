@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,9 +15,14 @@ from nuno.contact.manifold import POINTS
 from nuno.contact.rigid_manifolds import COUNTS, LEFT, OVERFLOW
 from nuno.quaternion import rotate
 from nuno.scene.rigid_shape import RigidPart
+from nuno.solver.grid_plan import cores_of
 from nuno.solver.rigid_arrays import SAVED, RigidArrays
-from nuno.solver.rigid_frame import RigidSettings, run_rigid
+from nuno.solver.rigid_frame import RigidSettings, run_rigid, run_rigid_team
 from nuno.solver.rigid_saving import load_contacts, save_contacts
+from nuno.solver.team import COUNT, VERDICT, counts_of
+from nuno.solver.warps import WARP
+
+log = logging.getLogger(__name__)
 
 SUBSTEPS = 10
 """Substeps a frame: at 60 frames a second what rests moves under 1 um, and a sphere's roll is exact to 0.1 %."""
@@ -66,6 +72,7 @@ class RigidSolver(RigidArrays):
         self.passes = PASSES
         self.origin = np.array(np.broadcast_to(np.asarray(origin, dtype=float), (self.world_count, 3)))
         self._cuda = self.device.startswith("cuda")
+        self._crowded = False  # whether the device once had no room for teams
         self.settings = RigidSettings()
         self._mass: dict[int, np.ndarray] = {}
         self._loaded: dict[int, Mapping[str, np.ndarray]] = {}
@@ -283,10 +290,16 @@ class RigidSolver(RigidArrays):
         while True:
             counts[:, OVERFLOW] = 0
             self.manifolds.counts.assign(counts.ravel())
-            inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, 0, PHASES[phase], threads]
-            wp.launch(
-                run_rigid, dim=self.world_count * threads, inputs=inputs, device=self.device, block_dim=BLOCK_THREADS
-            )  # fmt: skip
+            inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, PHASES[phase]]
+            blocks = self._team_blocks()
+            if blocks > 1 and not self._launch_teams(inputs, blocks):
+                self._crowded = True
+                continue
+            if blocks == 1:
+                wp.launch(
+                    run_rigid, dim=self.world_count * threads, inputs=[*inputs, threads], device=self.device,
+                    block_dim=BLOCK_THREADS,
+                )  # fmt: skip
             counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
             if not counts[:, OVERFLOW].any():
                 return
@@ -294,6 +307,23 @@ class RigidSolver(RigidArrays):
             self._lengthen_rows()
             counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
             counts[:, LEFT] = left
+
+    def _team_blocks(self) -> int:
+        """Blocks of a team that takes a world: one to 32 parts, where there are more parts than a block has threads."""
+        parts, cores = int(self.table.parts.count), cores_of(self.device)
+        blocks = min(-(-parts // WARP), cores // self.world_count)
+        return blocks if self._cuda and parts > BLOCK_THREADS and blocks > 1 and not self._crowded else 1
+
+    def _launch_teams(self, inputs: list[Any], blocks: int) -> bool:
+        """Launch a team of blocks for each world; return whether the device had room, else nothing has changed."""
+        gate = wp.zeros(counts_of(self.world_count), dtype=int, device=self.device)
+        inputs = [*inputs, gate, self.world_count, blocks, BLOCK_THREADS]
+        dim = self.world_count * blocks * BLOCK_THREADS
+        wp.launch(run_rigid_team, dim=dim, inputs=inputs, device=self.device, block_dim=BLOCK_THREADS)
+        if int(gate.numpy()[COUNT * VERDICT]) == 1:
+            return True
+        log.warning("a CUDA device is too busy for teams of %d blocks: a world a block goes on", blocks)
+        return False
 
     # Contacts
 
