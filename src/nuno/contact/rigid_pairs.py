@@ -6,6 +6,8 @@ where its parts have moved against each other by more than `keep_within`; points
 where they stuck.
 """
 
+from typing import Any
+
 import warp as wp
 
 from nuno.contact.convex import FLAT, SURFACE, Parts, convex_of
@@ -26,6 +28,7 @@ from nuno.contact.rigid_manifolds import (
 from nuno.contact.rigid_mesh import PATCHES, collide_mesh
 from nuno.contact.rigid_rounds import may_act
 from nuno.solver.rigid_body import RigidState
+from nuno.solver.team import wait_for
 
 LOOK = wp.constant(0.02)
 """[m] Least distance that a list looks ahead."""
@@ -290,18 +293,32 @@ def refresh(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int
 
 
 @wp.func
+def in_row(parts: Parts, c: Contacts, k: int, threads: int):
+    """The k-th part and place in its row: row by row, or for many threads first places first, which are in use."""
+    p = k / c.row
+    place = k % c.row
+    if threads > 1:
+        p = k % parts.count
+        place = k / parts.count
+    return p, place
+
+
+@wp.func
 def refresh_rows(
-    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, thread: int, threads: int
+    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, thread: int, threads: int, those: Any
 ):
     """All manifolds, and what the passes need of them."""
-    for p in range(thread, parts.count, threads):
-        if parts.slot[p] >= 0:
-            first = (world * c.parts + p) * c.row
-            for k in range(c.row):
-                if c.partner[first + k] >= 0 and c.patch[first + k] == 0:
-                    if may_act(s, parts, c, world, first + k, p) == 1:
-                        refresh(s, parts, c, world, first + k, p, dt, down)
-            for k in range(c.row):
-                if c.partner[first + k] >= 0 and c.count[first + k] > 0:
-                    if may_act(s, parts, c, world, first + k, p) == 1:
-                        ready(s, parts, c, world, first + k, p, dt, down)
+    for k in range(thread, parts.count * c.row, threads):
+        p, place = in_row(parts, c, k, threads)
+        e = (world * c.parts + p) * c.row + place
+        if parts.slot[p] >= 0 and c.partner[e] >= 0 and c.patch[e] == 0:
+            if may_act(s, parts, c, world, e, p) == 1:
+                refresh(s, parts, c, world, e, p, dt, down)
+    # a mesh's first entry has found the points of the others
+    wait_for(those)
+    for k in range(thread, parts.count * c.row, threads):
+        p, place = in_row(parts, c, k, threads)
+        e = (world * c.parts + p) * c.row + place
+        if parts.slot[p] >= 0 and c.partner[e] >= 0 and c.count[e] > 0:
+            if may_act(s, parts, c, world, e, p) == 1:
+                ready(s, parts, c, world, e, p, dt, down)

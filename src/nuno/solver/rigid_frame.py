@@ -50,7 +50,7 @@ def predict_worlds(
     for k in range(thread, s.capacity, threads):
         begin_body(s, base + k, s.active[k])
     wait_for(those)
-    refresh_rows(s, parts, c, world, run.dt, run.down, thread, threads)
+    refresh_rows(s, parts, c, world, run.dt, run.down, thread, threads, those)
     wait_for(those)
     up = -wp.normalize(run.gravity)
     if threads == 1:

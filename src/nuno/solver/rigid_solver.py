@@ -31,6 +31,8 @@ PASSES = 4
 with 4 it comes to rest."""
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
+TEAM_PARTS = 160
+"""Parts from which on a team of blocks takes less time than one (an H200; 105 take more, 205 less)."""
 
 DYNAMIC, MOVED = 1, 2
 PHASES = {"all": 0, "predict": 1, "contacts": 2, "finish": 3}
@@ -309,10 +311,10 @@ class RigidSolver(RigidArrays):
             counts[:, LEFT] = left
 
     def _team_blocks(self) -> int:
-        """Blocks of a team that takes a world: one to 32 parts, where there are more parts than a block has threads."""
+        """Blocks of a team that takes a world, one to 32 parts; 1 where a block by itself is quicker."""
         parts, cores = int(self.table.parts.count), cores_of(self.device)
         blocks = min(-(-parts // WARP), cores // self.world_count)
-        return blocks if self._cuda and parts > BLOCK_THREADS and blocks > 1 and not self._crowded else 1
+        return blocks if self._cuda and parts > TEAM_PARTS and blocks > 1 and not self._crowded else 1
 
     def _launch_teams(self, inputs: list[Any], blocks: int) -> bool:
         """Launch a team of blocks for each world; return whether the device had room, else nothing has changed."""
