@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import correlate2d
-from scipy.special import logsumexp
 
 from nuno.estimate.learned import HAND_MADE_SHARE, LEARNED_SHARE
 from nuno.estimate.outline_net import LEVELS, SCALARS, SIZE, _convolved, log_ratios, weights
@@ -75,8 +74,8 @@ def mean_log_probability(learned=LEARNED_SHARE, by_hand=HAND_MADE_SHARE, order=s
         scalars = np.concatenate(told, axis=-1).reshape(-1, SCALARS).astype(float)
         logs = by_hand * data["likelihood"][k].astype(float)
         logs[data["candidates"][k]] += learned * log_ratios(unpacked(data["real"][k]), pairs, scalars).reshape(shape)
-        of_candidates = logsumexp(logs.T, axis=0)
-        found.append(of_candidates[true] - logsumexp(of_candidates))
+        of_candidates = np.logaddexp.reduce(logs.T, axis=0)
+        found.append(of_candidates[true] - np.logaddexp.reduce(of_candidates))
     return float(np.mean(found))
 
 

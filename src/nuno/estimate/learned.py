@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import logsumexp
 
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table
@@ -120,12 +119,12 @@ def correction(outline: Outline, futures: Futures, comparison: Comparison, table
         hand: (3,) the held point [m].
     """
     error = comparison.error("silhouette")
-    by_hand = logsumexp(-error, axis=0)
+    by_hand = np.logaddexp.reduce(-error, axis=0)
     finite = np.isfinite(by_hand)
     added = np.where(finite, (HAND_MADE_SHARE - 1.0) * np.where(finite, by_hand, 0.0), 0.0)
     looked = finite.copy()
     if looked.shape[1] > FIRST_BEST:
-        worse = np.argsort(-logsumexp(by_hand, axis=0), kind="stable")[FIRST_BEST:]
+        worse = np.argsort(-np.logaddexp.reduce(by_hand, axis=0), kind="stable")[FIRST_BEST:]
         looked[:, worse] = False
     guess, candidate = np.nonzero(looked)
     if len(guess):
