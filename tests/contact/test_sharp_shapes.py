@@ -231,7 +231,7 @@ def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
 
 
 def awake_at_sharp_shapes(body):
-    """Return the elements that a cloth's last substep looked at (k,): its edges, and then its triangles."""
+    """Return the elements (k,) that a cloth's last substep looked at, edges before triangles, and how many it lists."""
     solver = body._dynamics.solver
     starts = solver._surface.sharp_colour.numpy()
     counts, wake = solver._state.sharp.numpy()[1:], solver._state.sharp_wake.numpy()

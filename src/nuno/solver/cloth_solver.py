@@ -253,7 +253,7 @@ class ClothSolver(ParticleSolver):
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
         state, worlds, cores = self._state, self.world_count, 0
         if self._cuda and self.plan not in LARGE and self.self_contact:
-            cores = wp.get_device(self.device).sm_count
+            cores = cores_of(self.device)
         state.helpers = max(0, min(cores - worlds, MOST_HELPERS * worlds))
         room = state.helpers * 4 * self._size.edge_edge
         state.help = wp.zeros(self.group_count * HELP, dtype=int, device=self.device)
@@ -340,7 +340,7 @@ class ClothSolver(ParticleSolver):
         state, blocks = self._state, self.world_count
         kernel = self._block_kernel(fine is not None)
         states = [state] if fine is None else [fine, state]
-        cores = wp.get_device(self.device).sm_count
+        cores = cores_of(self.device)
         turns = kernel in (run_blocks_shared, run_blocks_many)
         few = kernel is run_blocks_shared if turns else blocks <= cores
         threads = FEW_THREADS if few else MANY_THREADS
@@ -363,7 +363,7 @@ class ClothSolver(ParticleSolver):
         if fine:
             return run_fine_blocks_partly if n <= FINE_PARTICLES else run_fine_blocks
         if n <= WHOLE_PARTICLES:
-            few = self.world_count <= FEW_WORLDS * wp.get_device(self.device).sm_count
+            few = self.world_count <= FEW_WORLDS * cores_of(self.device)
             return run_blocks_shared if few else run_blocks_many
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 

@@ -293,11 +293,7 @@ class RigidSolver(RigidArrays):
             counts[:, OVERFLOW] = 0
             self.manifolds.counts.assign(counts.ravel())
             inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, PHASES[phase]]
-            blocks = self._team_blocks()
-            if blocks > 1 and not self._launch_teams(inputs, blocks):
-                self._crowded = True
-                continue
-            if blocks == 1:
+            if not self._launch_teams(inputs):
                 wp.launch(
                     run_rigid, dim=self.world_count * threads, inputs=[*inputs, threads], device=self.device,
                     block_dim=BLOCK_THREADS,
@@ -316,14 +312,18 @@ class RigidSolver(RigidArrays):
         blocks = min(-(-parts // WARP), cores // self.world_count)
         return blocks if self._cuda and parts > TEAM_PARTS and blocks > 1 and not self._crowded else 1
 
-    def _launch_teams(self, inputs: list[Any], blocks: int) -> bool:
-        """Launch a team of blocks for each world; return whether the device had room, else nothing has changed."""
+    def _launch_teams(self, inputs: list[Any]) -> bool:
+        """Launch a team of blocks for each world; return whether one did the work, else nothing has changed."""
+        blocks = self._team_blocks()
+        if blocks == 1:
+            return False
         gate = wp.zeros(counts_of(self.world_count), dtype=int, device=self.device)
         inputs = [*inputs, gate, self.world_count, blocks, BLOCK_THREADS]
         dim = self.world_count * blocks * BLOCK_THREADS
         wp.launch(run_rigid_team, dim=dim, inputs=inputs, device=self.device, block_dim=BLOCK_THREADS)
         if int(gate.numpy()[COUNT * VERDICT]) == 1:
             return True
+        self._crowded = True
         log.warning("a CUDA device is too busy for teams of %d blocks: a world a block goes on", blocks)
         return False
 

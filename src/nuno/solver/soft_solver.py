@@ -265,15 +265,19 @@ class SoftSolver(ParticleSolver):
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
+    def _teams(self) -> tuple[int, int]:
+        """How many worlds teams go through at once, and the blocks of each."""
+        return teams_of(self.world_count, cores_of(self.device), self.particle_count / ALONE)
+
     def _team_pays(self) -> bool:
         """Whether worlds by teams of multiprocessors are quicker than by one each."""
-        cores, alone = cores_of(self.device), self.particle_count / ALONE
-        teams, blocks = teams_of(self.world_count, cores, alone)
+        teams, blocks = self._teams()
+        alone = self.particle_count / ALONE
         by_teams = -(-self.world_count // teams) * (1.0 + alone / blocks)
-        return SLOWER * by_teams < -(-self.world_count // cores) * alone
+        return SLOWER * by_teams < -(-self.world_count // cores_of(self.device)) * alone
 
     def _grid_plan(self) -> GridPlan:
-        teams, blocks = teams_of(self.world_count, cores_of(self.device), self.particle_count / ALONE)
+        teams, blocks = self._teams()
         told = wp.zeros(TOLD * self.world_count, dtype=float, device=self.device)
         before, after = (self._topology, self._surface, self._size), (self._shapes, told)
         kernels = run_soft_grid, run_soft_fine_grid
@@ -289,7 +293,7 @@ class SoftSolver(ParticleSolver):
             return "fine_blocks_partly" if fits else "fine_blocks", FEW_THREADS
         if not self.shared_memory or self.particle_count > SHARED_PARTICLES:
             return "blocks", FEW_THREADS
-        few = self.group_count <= wp.get_device(self.device).sm_count
+        few = self.group_count <= cores_of(self.device)
         if self.particle_count > ROOMY_PARTICLES:
             return "few_partly" if few else "blocks_partly", FEW_THREADS
         return ("few_shared", FEW_THREADS) if few else ("blocks_shared", MANY_THREADS)
