@@ -67,14 +67,23 @@ def _slots(world: Simulation) -> list[int]:
 
 
 def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
-    """What static shapes would do to the body's particles in the next substep."""
+    """What static shapes would do to the body's particles in the next substep.
+
+    What other bodies press on a shape is known of the last substep instead, from what the two did together.
+    """
     world._bring_colliders()
     static = [other for other in world._bodies.values() if other._dynamics is None]
     touched, _ = world._rules.colliders_of(body, static)
     found: list[tuple[Any, ...]] = []
     dynamics.prepare(world.time, 1.0 / world.frame_rate)
     points = dynamics.vertices(body)
+    pressed = np.zeros(points.shape[:2], dtype=bool)
+    for coupled in world._stepping.last:
+        if body in coupled.particles:
+            known, contacts = coupled.shape_contacts(body)
+            pressed |= known
+            found += [(points[k, i], n, force, touched[shape].name, k) for k, i, shape, n, force in contacts]
     for shape, normals, forces in dynamics.solver.shape_forces(world.time):
-        for k, i in zip(*np.nonzero(np.linalg.norm(normals, axis=-1) > 0.0), strict=True):
+        for k, i in zip(*np.nonzero((np.linalg.norm(normals, axis=-1) > 0.0) & ~pressed), strict=True):
             found.append((points[k, i], normals[k, i], forces[k, i], touched[shape].name, k))
     return found

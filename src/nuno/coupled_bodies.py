@@ -142,6 +142,12 @@ class CoupledBodies:
                 found.append((point, sign * normal, sign * force, other.name, world))
         return found
 
+    def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
+        """What shapes did to the particles of a body that others pressed on: see `Coupling.shape_contacts`."""
+        known, found = self.coupling.shape_contacts(self.particles.index(body))
+        kept = self.kept[body]
+        return known & kept[:, None], [row for row in found if kept[row[0]]]
+
     # -- tables
 
     def _rules(self) -> tuple[np.ndarray, np.ndarray]:

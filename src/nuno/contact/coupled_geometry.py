@@ -214,6 +214,9 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
         # far inside a solid body, this is not the face that it came through
         return
     rows.active[world * rows.room + wp.atomic_add(rows.active_count, world, 1)] = r
+    for c in range(4):
+        if q[c] >= 0:
+            particles.pressed[first + q[c]] = 1
     rows.normal[r] = n
     rows.weights[r] = weights
     of = world * elements.bodies

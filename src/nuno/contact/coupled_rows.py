@@ -54,6 +54,18 @@ class Particles:
     body_sharers: wp.array(dtype=int)
     body_joining: wp.array(dtype=int)
     body_moved: wp.array(dtype=wp.int64)
+    # those in active rows, their contacts with shapes, `MOST` a particle (see `nuno.contact.coupled_shapes`), and those
+    # that have any
+    pressed: wp.array(dtype=int)
+    shape: wp.array(dtype=int)  # -1: none
+    shape_normal: wp.array(dtype=wp.vec3)
+    shape_room: wp.array(dtype=float)  # how far it may go against the normal, the shape's own motion included [m]
+    shape_motion: wp.array(dtype=wp.vec3)  # of the shape's surface there, in the substep [m]
+    shape_friction: wp.array(dtype=float)
+    shape_push: wp.array(dtype=float)  # how far the shape has pushed it out [m]
+    shape_drag: wp.array(dtype=wp.vec3)  # and how far friction took it along [m]
+    bounded: wp.array(dtype=int)
+    bounded_count: wp.array(dtype=int)
 
 
 @wp.struct
@@ -85,6 +97,8 @@ class Rows:
     active_count: wp.array(dtype=int)
 
 
+MOST = wp.constant(2)
+"""Shapes that bound a particle while rows are solved: a floor and a wall."""
 VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID, EDGE_RIGID = 0, 1, 2, 3, 4
 
 
@@ -119,25 +133,165 @@ def row_slip(particles: Particles, rigid: RigidState, first: int, start: int, ro
 
 
 @wp.func
-def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
-               at_once: int):  # fmt: skip
-    """How far a row gives way along n for a unit of its multiplier."""
-    corners = rows.corners[r]
-    weights = rows.weights[r]
-    total = float(1.0e-9)
+def give_along(particles: Particles, i: int, n: wp.vec3, push: float):
+    """How a particle goes along n where shapes bound it: times what it would go freely, and how far besides [m].
+
+    Args:
+        particles: All.
+        i: Which.
+        n: Direction.
+        push: How far along n a push would take it freely [m].
+    """
+    share = float(1.0)
+    besides = float(0.0)
+    for k in range(MOST):
+        c = MOST * i + k
+        if particles.shape[c] >= 0:
+            m = particles.shape_normal[c]
+            cosine = wp.dot(n, m)
+            room = wp.dot(particles.u[i], m) + particles.shape_room[c]
+            pushed = particles.shape_push[c]
+            if pushed - room > push * cosine:
+                # it ends on the surface, wherever it would go
+                share -= cosine * cosine
+                besides -= cosine * room
+            else:
+                # it leaves, and what the shape pushed it is taken back
+                besides -= cosine * pushed
+    return wp.max(share, 0.0), besides
+
+
+@wp.func
+def is_stuck(particles: Particles, i: int, move: wp.vec3):
+    """Whether friction with a shape holds a particle that would go by ``move`` [m]."""
+    stuck = bool(False)
+    for k in range(MOST):
+        c = MOST * i + k
+        if particles.shape[c] >= 0 and particles.shape_push[c] > 0.0:
+            m = particles.shape_normal[c]
+            drag = particles.shape_drag[c] - (particles.u[i] + move - particles.shape_motion[c])
+            drag = drag - m * wp.dot(drag, m)
+            stuck = stuck or wp.length(drag) <= particles.shape_friction[c] * particles.shape_push[c]
+    return stuck
+
+
+@wp.func
+def bound(particles: Particles, i: int, dragged: int):
+    """Put a particle back to the surfaces of the shapes that bound it, with their friction where it is ``dragged``."""
+    for k in range(MOST):
+        c = MOST * i + k
+        if particles.shape[c] >= 0:
+            m = particles.shape_normal[c]
+            old = particles.shape_push[c]
+            push = wp.max(old - wp.dot(particles.u[i], m) - particles.shape_room[c], 0.0)
+            if push != old:
+                particles.u[i] = particles.u[i] + m * (push - old)
+                particles.shape_push[c] = push
+            before = particles.shape_drag[c]
+            if dragged != 0 and (push > 0.0 or wp.length_sq(before) > 0.0):
+                drag = before - (particles.u[i] - particles.shape_motion[c])
+                drag = drag - m * wp.dot(drag, m)
+                most = particles.shape_friction[c] * push
+                size = wp.length(drag)
+                if size > most:
+                    drag = drag * (most / size)
+                particles.shape_drag[c] = drag
+                particles.u[i] = particles.u[i] + (drag - before)
+
+
+@wp.func
+def bound_corners(particles: Particles, first: int, corners: wp.vec4i, dragged: int):
+    """`bound` the particles of a row."""
     for k in range(4):
         if corners[k] >= 0:
-            i = first + corners[k]
-            w = particles.w[i]
-            if at_once != 0:
-                w = w * float(particles.sharers[i])
-            total += weights[k] * weights[k] * w
+            bound(particles, first + corners[k], dragged)
+
+
+@wp.func
+def body_weight(particles: Particles, rigid: RigidState, start: int, rows: Rows, r: int, n: wp.vec3, at_once: int):
+    """How far a row's rigid body gives way along n for a unit of its multiplier, if it has one."""
+    w = float(0.0)
     if rows.slot[r] >= 0:
         i = start + rows.slot[r]
         w = inverse_mass_at(rigid, i, wp.quat_rotate(rigid.rotation[i], rows.point[r]), n)
         if at_once != 0:
             w = w * float(particles.body_sharers[i])
-        total += w
+    return w
+
+
+@wp.func
+def corner_weight(particles: Particles, i: int, at_once: int):
+    """A particle's inverse mass, or its part of it where all rows are solved at once."""
+    w = particles.w[i]
+    if at_once != 0:
+        w = w * float(particles.sharers[i])
+    return w
+
+
+@wp.func
+def is_bounded(particles: Particles, first: int, corners: wp.vec4i):
+    """Whether a shape bounds any of a row's particles."""
+    found = bool(False)
+    for k in range(4):
+        if corners[k] >= 0:
+            found = found or particles.shape[MOST * (first + corners[k])] >= 0
+    return found
+
+
+@wp.func
+def push_step(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, gap: float,
+              soft: float, at_once: int):  # fmt: skip
+    """By how much a row's multiplier is to grow so that its gap closes, as far as shapes let its particles go."""
+    n = rows.normal[r]
+    corners = rows.corners[r]
+    weights = rows.weights[r]
+    total = float(1.0e-9)
+    for k in range(4):
+        if corners[k] >= 0:
+            total += weights[k] * weights[k] * corner_weight(particles, first + corners[k], at_once)
+    rigid_part = body_weight(particles, rigid, start, rows, r, n, at_once)
+    total += rigid_part
+    step = -gap / (total + soft)
+    if is_bounded(particles, first, corners):
+        # which particles end on a surface depends on the step, and the step on them
+        passes = int(2)
+        for _again in range(passes):
+            total = 1.0e-9 + rigid_part
+            left = float(gap)
+            for k in range(4):
+                if corners[k] >= 0:
+                    i = first + corners[k]
+                    share, besides = give_along(particles, i, n, step * weights[k] * particles.w[i])
+                    total += weights[k] * weights[k] * corner_weight(particles, i, at_once) * share
+                    left += weights[k] * besides
+            step = -left / (total + soft)
+    return step
+
+
+@wp.func
+def drag_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, slip: wp.vec3,
+                at_once: int):  # fmt: skip
+    """How far a row gives way along its slip for a unit of its multiplier.
+
+    Particles that stick to a shape, by friction, give nothing.
+    """
+    way = wp.normalize(slip)
+    corners = rows.corners[r]
+    weights = rows.weights[r]
+    rigid_part = body_weight(particles, rigid, start, rows, r, way, at_once)
+    total = float(1.0e-9)
+    for k in range(4):
+        if corners[k] >= 0:
+            total += weights[k] * weights[k] * corner_weight(particles, first + corners[k], at_once)
+    total += rigid_part
+    if is_bounded(particles, first, corners):
+        firm = float(1.0e-9)
+        for k in range(4):
+            if corners[k] >= 0:
+                i = first + corners[k]
+                if not is_stuck(particles, i, slip * (-weights[k] * particles.w[i] / (rigid_part + 1.0e-9))):
+                    firm += weights[k] * weights[k] * corner_weight(particles, i, at_once)
+        total = firm + rigid_part
     return total
 
 
@@ -200,13 +354,15 @@ def push_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
     gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r] + pressed
     wrong = wp.max(-gap, 0.0)
     if gap < 0.0 or push > 0.0:
-        step = -gap / (row_weight(particles, rigid, first, start, rows, r, n, at_once) + soft)
+        step = push_step(particles, rigid, first, start, rows, r, gap, soft, at_once)
         if at_once != 0 and step * rows.push_change[r] > 0.0:
             step = step + MOMENTUM * rows.push_change[r]
         more = wp.max(push + step, 0.0)
         rows.push[r] = more
         rows.push_change[r] = more - push
         apply_row(particles, rigid, first, start, rows, r, n * (more - push), at_once)
+        if at_once == 0:
+            bound_corners(particles, first, rows.corners[r], 0)
         if push > 0.0:
             wrong = wp.abs(gap)
     return wrong
@@ -225,7 +381,7 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
         return float(0.0)
     drag = old
     if length > 1.0e-12:
-        step = -slip / row_weight(particles, rigid, first, start, rows, r, slip / length, at_once)
+        step = -slip / drag_weight(particles, rigid, first, start, rows, r, slip, at_once)
         if at_once != 0 and wp.dot(step, rows.drag_change[r]) > 0.0:
             step = step + MOMENTUM * rows.drag_change[r]
         drag = old + step
@@ -237,6 +393,8 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
     rows.drag[r] = drag
     rows.drag_change[r] = drag - old
     apply_row(particles, rigid, first, start, rows, r, drag - old, at_once)
+    if at_once == 0:
+        bound_corners(particles, first, rows.corners[r], 1)
     return left
 
 
@@ -247,6 +405,13 @@ def summed(moved: wp.array(dtype=wp.int64), k: int):
     for c in range(3):
         moved[3 * k + c] = wp.int64(0)
     return total
+
+
+@wp.func
+def bound_all(particles: Particles, world: int, thread: int, threads: int):
+    """`bound` all particles that shapes bound, with friction."""
+    for k in range(thread, particles.bounded_count[world], threads):
+        bound(particles, particles.bounded[world * particles.count + k], 1)
 
 
 @wp.func

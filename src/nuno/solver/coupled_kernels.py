@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.contact.coupled_rows import Particles, Rows, drag_row, forget_sharers, join_row, push_row, take_sums
+from nuno.contact.coupled_rows import Particles, Rows, bound_all, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
@@ -39,6 +39,7 @@ class Layout:
     PX: wp.array(dtype=wp.float64)
     PY: wp.array(dtype=wp.float64)
     PZ: wp.array(dtype=wp.float64)
+    origin: wp.array(dtype=wp.vec3)  # (worlds), the solver's
     offset: wp.array(dtype=wp.vec3)  # (worlds), from the origin of the body's party to the solver's
 
 
@@ -178,6 +179,9 @@ def solve(
         if done == 0:
             wrong = float(0.0)
             begin_pass(passing, world, wp.where(k_pass == 0, 1, 0), thread, threads)
+            # what moved them since: the elastic constraints, the pass before, ties
+            bound_all(particles, world, thread, threads)
+            barrier(threads)
             for k in range(thread, count, threads):
                 r = rows.active[base + k]
                 party = party_of(passing, world, rows.bodies[r][0])

@@ -10,7 +10,8 @@ import warp as wp
 
 from nuno.contact.coupled_geometry import measure_rows
 from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
-from nuno.contact.coupled_rows import Particles, Rows
+from nuno.contact.coupled_rows import MOST, Particles, Rows
+from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.solver.coupled_kernels import Layout, Passing, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
@@ -90,6 +91,13 @@ class Coupling:
             return wp.zeros(max(1, count), dtype=dtype, device=self.device)
 
         made.p, made.u, made.w = (zeros(worlds * total, kind) for kind in (wp.vec3, wp.vec3, float))
+        made.pressed, made.bounded = zeros(worlds * total, int), zeros(worlds * total, int)
+        made.bounded_count = zeros(worlds, int)
+        made.shape = wp.full(max(1, MOST * worlds * total), -1, dtype=int, device=self.device)
+        for name in ("normal", "motion", "drag"):
+            setattr(made, f"shape_{name}", zeros(MOST * worlds * total, wp.vec3))
+        for name in ("room", "friction", "push"):
+            setattr(made, f"shape_{name}", zeros(MOST * worlds * total, float))
         if self._at_once:
             made.sharers, made.joining, made.moved = (
                 zeros(worlds * total * k, kind) for k, kind in ((1, int), (1, int), (3, wp.int64))
@@ -124,8 +132,16 @@ class Coupling:
         if made.doubles:
             for name in PLACES:
                 setattr(made, name.upper(), _plain(solver._fine.array(name), wp.float64))
+        made.origin = wp.array(solver.origin.astype(np.float32), dtype=wp.vec3, device=self.device)
         offset = (solver.origin - self._origins[:, k]).astype(np.float32)
         made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
+        return made
+
+    @staticmethod
+    def _surroundings(solver: ParticleSolver) -> Surroundings:
+        made, state = Surroundings(), solver._state
+        made.shapes, made.worlds, made.stride = solver._shapes, solver.world_count, solver._size.near
+        made.near, made.scalars = state.near, _plain(state.scalars, float)
         return made
 
     def _set_parties(self, party: np.ndarray) -> None:
@@ -158,9 +174,10 @@ class Coupling:
         self._set_parties(party)
         # a grip or a new state may have replaced what a layout names
         self._layouts = [self._layout(k) for k in range(len(self._solvers))]
+        self._around = [self._surroundings(solver) for solver in self._solvers]
         if self._rigid is not None:
             self._rigid.open(time, dt, [*self._slots, *self.led])
-        for total in (self._ties.total, self.holds.total, self.holds.total_twist):
+        for total in (self._ties.total, self.holds.total, self.holds.total_twist, self._particles.bounded_count):
             total.zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
@@ -214,6 +231,13 @@ class Coupling:
         if self._listed:
             rows.active_count.zero_()
             go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
+            particles.bounded_count.zero_()
+            for body, (layout, around) in enumerate(zip(self._layouts, self._around, strict=True)):
+                if around.shapes.count:
+                    go(
+                        bound_particles, (worlds, layout.particles), layout, particles, elements, around, body, k + 1,
+                        dt,
+                    )  # fmt: skip
         if self._listed or self._ties.count or self.holds.count:
             go(
                 solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self._passing, dt,
@@ -291,6 +315,31 @@ class Coupling:
                 point = point + self._origins[world, pair[0]]
                 found.append((world, pair, point, normal[r].astype(float), force))
         return found
+
+    def shape_contacts(self, k: int) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
+        """What shapes did in the last substep to those particles of a solver that rows pressed on.
+
+        Returns:
+            Which particles these are, (worlds, n) bool, and of each contact the world, the particle, the shape's number
+            in the solver's table, the normal and the force [N].
+        """
+        particles, first, n = self._particles, self._firsts[k], self._solvers[k].particle_count
+        bounded, counts = particles.bounded.numpy(), particles.bounded_count.numpy()
+        of_shapes = ("shape", "shape_normal", "shape_push", "shape_drag")
+        shape, normal, push, drag = (getattr(particles, name).numpy() for name in of_shapes)
+        weight, known, found = particles.w.numpy(), np.zeros((self.world_count, n), dtype=bool), []
+        for world in range(self.world_count):
+            base = world * particles.count
+            for j in np.sort(bounded[base : base + counts[world]]):
+                i = int(j) - base - first
+                if not 0 <= i < n:
+                    continue
+                known[world, i] = True
+                for c in range(MOST * j, MOST * (j + 1)):
+                    if shape[c] >= 0 and push[c] > 0.0:
+                        force = (push[c] * normal[c] + drag[c]).astype(float) * (self._rate / weight[j])
+                        found.append((world, i, int(shape[c]), normal[c].astype(float), force))
+        return known, found
 
     def tie_forces(self) -> np.ndarray:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
