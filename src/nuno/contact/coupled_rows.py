@@ -99,6 +99,8 @@ class Rows:
 
 MOST = wp.constant(2)
 """Shapes that bound a particle while rows are solved: a floor and a wall."""
+OPPOSED = wp.constant(0.9)
+"""Cosine of the angle between two normals from which on a particle is between what pushes along them."""
 VERTEX_TRIANGLE, EDGE_EDGE, VERTEX_RIGID, TRIANGLE_RIGID, EDGE_RIGID = 0, 1, 2, 3, 4
 
 
@@ -159,20 +161,6 @@ def give_along(particles: Particles, i: int, n: wp.vec3, push: float):
                 # it leaves, and what the shape pushed it is taken back
                 besides -= cosine * pushed
     return wp.max(share, 0.0), besides
-
-
-@wp.func
-def is_stuck(particles: Particles, i: int, move: wp.vec3):
-    """Whether friction with a shape holds a particle that would go by ``move`` [m]."""
-    stuck = bool(False)
-    for k in range(MOST):
-        c = MOST * i + k
-        if particles.shape[c] >= 0 and particles.shape_push[c] > 0.0:
-            m = particles.shape_normal[c]
-            drag = particles.shape_drag[c] - (particles.u[i] + move - particles.shape_motion[c])
-            drag = drag - m * wp.dot(drag, m)
-            stuck = stuck or wp.length(drag) <= particles.shape_friction[c] * particles.shape_push[c]
-    return stuck
 
 
 @wp.func
@@ -269,30 +257,78 @@ def push_step(particles: Particles, rigid: RigidState, first: int, start: int, r
 
 
 @wp.func
-def drag_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, slip: wp.vec3,
-                at_once: int):  # fmt: skip
-    """How far a row gives way along its slip for a unit of its multiplier.
-
-    Particles that stick to a shape, by friction, give nothing.
-    """
-    way = wp.normalize(slip)
+def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
+               at_once: int):  # fmt: skip
+    """How far a row gives way along n for a unit of its multiplier."""
     corners = rows.corners[r]
     weights = rows.weights[r]
-    rigid_part = body_weight(particles, rigid, start, rows, r, way, at_once)
     total = float(1.0e-9)
     for k in range(4):
         if corners[k] >= 0:
             total += weights[k] * weights[k] * corner_weight(particles, first + corners[k], at_once)
-    total += rigid_part
-    if is_bounded(particles, first, corners):
-        firm = float(1.0e-9)
-        for k in range(4):
-            if corners[k] >= 0:
-                i = first + corners[k]
-                if not is_stuck(particles, i, slip * (-weights[k] * particles.w[i] / (rigid_part + 1.0e-9))):
-                    firm += weights[k] * weights[k] * corner_weight(particles, i, at_once)
-        total = firm + rigid_part
-    return total
+    return total + body_weight(particles, rigid, start, rows, r, n, at_once)
+
+
+@wp.func
+def against(v: wp.vec3, size: float):
+    """A vector of a length against ``v``, or zero."""
+    return v * (-size / wp.max(wp.length(v), 1.0e-20))
+
+
+@wp.func
+def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, most_shape: float, body_free: wp.vec3, body_w: float,
+                most: float):  # fmt: skip
+    """Friction on a particle that a body presses on a shape, both at once.
+
+    The particle sticks to the body, to the shape, to both or to neither. One of the four satisfies Coulomb's law at both
+    of its sides.
+
+    Args:
+        free: Where the particle would come to without friction [m].
+        w: Its inverse mass.
+        shape_moved: What the shape's surface moves [m].
+        most_shape: The most that the shape's friction may move the particle [m].
+        body_free: Where the body's point would come to without this friction [m].
+        body_w: The body's inverse mass there.
+        most: The largest multiplier between particle and body.
+
+    Returns:
+        How far the shape's friction moves the particle [m], and the multiplier between particle and body.
+    """
+    # it sticks to the body, and with it slides on the shape or stands
+    part = body_w / (w + body_w)
+    slip = body_free * (1.0 - part) + free * part - shape_moved
+    length = wp.length(slip)
+    drag = against(slip, most_shape)
+    if length < part * most_shape:
+        drag = -slip / wp.max(part, 1.0e-12)
+    multiplier = (body_free - free - drag) / (w + body_w)
+    if wp.length(multiplier) > most:
+        # the body slides over it, and it stands on the shape
+        slip = shape_moved - body_free
+        multiplier = against(slip, wp.min(most, wp.length(slip) / (body_w + 1.0e-12)))
+        drag = shape_moved - free - multiplier * w
+        if wp.length(drag) > most_shape:
+            # it slides on both
+            place = free
+            tries = int(3)
+            for _again in range(tries):
+                drag = against(place - shape_moved, most_shape)
+                multiplier = against(place - body_free, most)
+                place = free + drag + multiplier * w
+    return drag, multiplier
+
+
+@wp.func
+def is_between(particles: Particles, i: int, n: wp.vec3):
+    """The contact of particle i with the shape that a push against n presses it on; -1: none."""
+    found = int(-1)
+    for k in range(MOST):
+        c = MOST * i + k
+        if particles.shape[c] >= 0 and particles.shape_push[c] > 0.0:
+            if wp.dot(particles.shape_normal[c], n) < -OPPOSED:
+                found = c
+    return found
 
 
 @wp.func
@@ -369,6 +405,33 @@ def push_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
 
 
 @wp.func
+def drag_between(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, c: int,
+                 slip: wp.vec3, most: float, at_once: int):  # fmt: skip
+    """`drag_row` of a particle that a rigid body presses on a shape, its contact c; see `rub_between`."""
+    i = first + rows.corners[r][0]
+    n = rows.normal[r]
+    old = rows.drag[r]
+    before = particles.shape_drag[c]
+    w = corner_weight(particles, i, at_once)
+    own = particles.u[i] - n * wp.dot(particles.u[i], n)
+    motion = particles.shape_motion[c]
+    motion = motion - n * wp.dot(motion, n)
+    body_w = body_weight(particles, rigid, start, rows, r, wp.normalize(slip + n * 1.0e-12), at_once)
+    free = own - old * w - before
+    body_free = own - slip + old * body_w
+    most_shape = particles.shape_friction[c] * particles.shape_push[c]
+    drag, multiplier = rub_between(free, w, motion, most_shape, body_free, body_w, most)
+    rows.drag[r] = multiplier
+    rows.drag_change[r] = multiplier - old
+    apply_row(particles, rigid, first, start, rows, r, multiplier - old, at_once)
+    if at_once == 0:
+        particles.shape_drag[c] = drag
+        particles.u[i] = particles.u[i] + (drag - before)
+        bound(particles, i, 1)
+    return wp.length(drag - before) + wp.length(multiplier - old) * w
+
+
+@wp.func
 def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, at_once: int):
     """Take back a row's slip, with up to mu times what its push has come to; returns what was left to take [m]."""
     most = rows.friction[r] * rows.push[r]
@@ -379,9 +442,13 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
     length = wp.length(slip)
     if most <= 0.0 and wp.length_sq(old) == 0.0:
         return float(0.0)
+    if rows.slot[r] >= 0 and rows.corners[r][1] < 0:
+        c = is_between(particles, first + rows.corners[r][0], n)
+        if c >= 0:
+            return drag_between(particles, rigid, first, start, rows, r, c, slip, most, at_once)
     drag = old
     if length > 1.0e-12:
-        step = -slip / drag_weight(particles, rigid, first, start, rows, r, slip, at_once)
+        step = -slip / row_weight(particles, rigid, first, start, rows, r, slip / length, at_once)
         if at_once != 0 and wp.dot(step, rows.drag_change[r]) > 0.0:
             step = step + MOMENTUM * rows.drag_change[r]
         drag = old + step
