@@ -51,7 +51,7 @@ def test_an_off_centre_compound_moves_about_its_centre_of_mass():
 
 
 def test_a_thrown_cloth():
-    """Closed forms: p = m v, energy m v^2 / 2, no angular momentum and no elastic energy, also after 0.1 s without air."""
+    """Closed forms: p = m v and m v^2 / 2; it neither turns nor stretches, also after 0.1 s without air."""
     world, cloth = alone(nuno.sheet((0.3, 0.2), (6, 4)), nuno.Cloth(area_density=0.3, air_drag=0.0),
                          velocity=(1.0, -2.0, 0.5))  # fmt: skip
     for _ in range(2):
