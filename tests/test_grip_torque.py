@@ -37,7 +37,7 @@ def test_a_rigid_bar_held_at_its_end(direction):
 def soft_bar(world, direction):
     """A soft bar along x whose one end is at the origin, and the vertices of that end."""
     bar = world.add(nuno.soft_box((LENGTH, 0.05, 0.05), (8, 2, 2), position=(0.5 * direction * LENGTH, 0.0, 0.0)))
-    world.attach(bar, nuno.Soft(density=DENSITY, youngs_modulus=1e6, damping=0.02, air_drag=5.0))
+    world.attach(bar, nuno.Soft(density=DENSITY, youngs_modulus=3e5, damping=0.05, air_drag=5.0))
     return bar, np.flatnonzero(np.abs(bar.vertices[:, 0]) < 1e-6)
 
 
@@ -55,8 +55,8 @@ def test_a_soft_bar_held_at_its_end(how, direction):
         grip = world.weld(bar, block, end)
     else:
         grip = world.grip(bar, end, to=bar.vertices[end].mean(axis=0), compliance=0.0 if how == "stiff" else 1e-5)
-    world.run(1.5)
+    world.run(1.0)
     force, torque = mean_torque(world, grip)
     np.testing.assert_allclose(force, (0.0, 0.0, -MASS * GRAVITY), atol=0.01 * MASS * GRAVITY)
-    # the bar sags by 0.3 mm, and its middle comes no nearer
+    # the bar sags by 1 mm, and its middle comes no nearer
     np.testing.assert_allclose(torque, (0.0, direction * LEVER, 0.0), atol=0.02 * LEVER)

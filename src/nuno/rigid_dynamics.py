@@ -168,7 +168,7 @@ class RigidDynamics(Dynamics):
         self.slot = self.solver.add(
             self.parts, position=place + quat.rotate(turn, self.centre), quaternion=turn, mass=self.mass,
             inertia=self.inertia, centre=self.centre, friction=friction, restitution=values["restitution"][:, 0],
-            group=body.group, collides_with=body.collides_with,
+            air_drag=values["air_drag"][:, 0], group=body.group, collides_with=body.collides_with,
         )  # fmt: skip
         self.radius = float(self.solver.rules.radius.numpy()[self.slot])  # [m], around the centre of mass
         self._world = world

@@ -94,6 +94,7 @@ class RigidSolver(RigidArrays):
         centre: ArrayLike = (0.0, 0.0, 0.0),
         friction: ArrayLike = 0.5,
         restitution: ArrayLike = 0.0,
+        air_drag: ArrayLike = 0.0,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
         group: int = 1,
@@ -111,6 +112,7 @@ class RigidSolver(RigidArrays):
             centre: (3,) [m], the centre of mass in the shape's frame.
             friction: Coulomb's coefficient, one or (worlds,).
             restitution: One or (worlds,); of a pair the larger counts.
+            air_drag: Rate at which the air takes velocity and spin [1/s], one or (worlds,).
             velocity: (3,) or (worlds, 3) [m/s], of the centre of mass.
             angular_velocity: (3,) or (worlds, 3) [rad/s], world frame.
             group: Bits that others' ``collides_with`` is held against.
@@ -137,6 +139,7 @@ class RigidSolver(RigidArrays):
         self.set_pose(slot, position, quaternion)
         self.set_velocity(slot, velocity, angular_velocity)
         self.set_surface(slot, friction, restitution)
+        self._write("drag", slot, air_drag)
         return slot
 
     def remove(self, slot: int) -> None:
