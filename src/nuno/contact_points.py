@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.dynamics import ParticleDynamics
+from nuno.materials import Cloth
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """The contacts of one body with others; what it has with itself is not among them.
+    """The contacts of one body with others, and with itself where that was asked for.
 
     Attributes:
         points: (k, 3) float [m], where, in the world.
@@ -45,25 +46,39 @@ class ContactPoints:
         return cls(points, normals, forces, tuple(row[3] for row in found), np.array([row[4] for row in found]))
 
 
-def contact_points(world: Simulation, body: Body) -> ContactPoints:
+def contact_points(world: Simulation, body: Body, itself: bool = False) -> ContactPoints:
     """Return a dynamic body's contacts; see ``World.contacts``."""
     dynamics: Any = body._dynamics
     found: list[tuple[Any, ...]] = []
     if isinstance(dynamics, ParticleDynamics):
         found += _on_shapes(world, body, dynamics)
+        if itself and isinstance(dynamics.material, Cloth):
+            found += _on_itself(world, body, dynamics)
     else:
         names = {slot: other.name for other, slot in zip(world._bodies.values(), _slots(world), strict=True)}
         for k in range(world.world_count):
             for slot, points, normals, forces in dynamics.solver.contacts_of(dynamics.slot, k):
                 found += [(*row, names.get(slot, ""), k) for row in zip(points, normals, forces, strict=True)]
     for coupled in world._stepping.last:
-        found += coupled.contacts(body)
+        found += coupled.contacts(body, itself)
     return ContactPoints.joined(found)
 
 
 def _slots(world: Simulation) -> list[int]:
     assert world._rigid is not None
     return world._rigid.slots_of(world)
+
+
+def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+    """What a cloth's layers would do to its particles in the next substep."""
+    from nuno.solver.self_forces import self_contact_forces
+
+    dynamics.set_self_contact(world._rules.touches_itself(body))
+    dynamics.prepare(world.time, 1.0 / world.frame_rate)
+    points = dynamics.vertices(body)
+    normals, forces = self_contact_forces(dynamics.solver, world.time)
+    touching = np.argwhere(np.linalg.norm(normals, axis=-1) > 0.0)
+    return [(points[k, i], normals[k, i], forces[k, i], body.name, int(k)) for k, i in touching]
 
 
 def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:

@@ -342,11 +342,17 @@ class World(Running):
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
 
-    def contacts(self, body: Body | str) -> ContactPoints:
+    def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:
         """Return where a dynamic body touches others: points, normals and forces.
 
         Those with static bodies are what the next substep would make of them, for cloth and soft bodies; all others
         are those of the last substep.
+
+        Args:
+            body: The body.
+            itself: Whether contacts of a cloth or soft body with itself are told too, under its own name. Both sides of
+                each are, so that their forces add up to nothing. Of a cloth they are what the next substep would make
+                of them, vertex by vertex, which takes the time of two substeps.
 
         Raises:
             BodyStateError: the body is static.
@@ -357,7 +363,7 @@ class World(Running):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
-            return contact_points(self, own)
+            return contact_points(self, own, itself)
 
     def state(self, body: Body | str) -> dict[str, Any]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
