@@ -1,4 +1,4 @@
-"""What contacts tell: layers of a cloth on each other."""
+"""What contacts tell: layers of a cloth on each other, and what all gave over a frame."""
 
 import numpy as np
 import pytest
@@ -64,3 +64,82 @@ def test_asking_changes_nothing_and_worlds_are_told_apart():
     world.contacts(napkin, itself=True)
     world.run(0.1)
     np.testing.assert_array_equal(napkin.vertices, after)
+
+
+def balance(world, body, frames):
+    """Of each frame what a body's momentum and weight took, and what contacts gave, (frames, 3) [N s] each."""
+    taken, given = [], []
+    for _ in range(frames):
+        before = body.momentum
+        world.step()
+        taken.append(body.momentum - before - body.mass * np.array(world.gravity) / world.frame_rate)
+        given.append(sum(world.contacts(body).impulses.values(), start=np.zeros(3)))
+    return np.array(taken), np.array(given)
+
+
+def test_impulses_of_a_rigid_body_at_rest_and_in_a_bounce():
+    """Balance of momentum, frame by frame: of an impact too, whose force no last substep knows."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    ball = world.add(nuno.sphere(0.05, position=(0.0, 0.0, 0.3), name="ball"))
+    crate = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.5, 0.0, 0.05), name="crate"))
+    lid = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.5, 0.0, 0.15), name="lid"))
+    for body, mass in ((ball, 1.0), (crate, 2.0), (lid, 1.0)):
+        world.attach(body, nuno.Rigid(mass=mass, restitution=0.5 if body is ball else 0.0))
+    taken, given = balance(world, ball, 40)
+    assert given[:, 2].max() > 2.0  # it bounced, from 2.2 m/s
+    # velocities are float32, and so are sums of up to 1 N s
+    np.testing.assert_allclose(given, taken, atol=1e-5)
+    world.run(0.5)
+    told = world.contacts(crate).impulses
+    assert set(told) == {"floor", "lid"}
+    np.testing.assert_allclose(told["floor"], (0.0, 0.0, 3.0 * GRAVITY / 60.0), atol=1e-4)
+    np.testing.assert_allclose(told["lid"], (0.0, 0.0, -GRAVITY / 60.0), atol=1e-4)
+    np.testing.assert_allclose(world.contacts(lid).impulses["crate"], -told["lid"], atol=1e-12)
+
+
+def test_impulses_between_a_rigid_body_a_cloth_and_a_soft_one():
+    """Balance of momentum, frame by frame, while a box falls on a held towel and a soft cube on the box."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.3, 0.3), (10, 10), position=(0.0, 0.0, 0.3), name="towel"))
+    box = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.36), name="box"))
+    cube = world.add(nuno.soft_box((0.08, 0.08, 0.08), (2, 2, 2), position=(0.0, 0.0, 0.46), name="cube"))
+    world.attach(towel)
+    world.attach(box, nuno.Rigid(mass=0.2))
+    world.attach(cube, nuno.Soft(density=100.0))
+    world.grip(towel, [0, 10, 110, 120], to=(0.0, 0.0, 0.3))
+    taken, given = balance(world, box, 30)
+    assert given[:, 2].max() > 1.5 * 0.2 * GRAVITY / 60.0
+    # float32 moves of bodies, summed over 30 substeps
+    np.testing.assert_allclose(given, taken, atol=1e-3 * 0.2 * GRAVITY / 60.0)
+    told = world.contacts(box).impulses
+    assert set(told) == {"towel", "cube"}
+    for name, impulse in told.items():
+        np.testing.assert_allclose(world.contacts(name).impulses["box"], -impulse, atol=1e-15)
+
+
+def test_impulses_are_those_of_the_last_frame_of_each_world():
+    """However many frames a run has; in a batch by world; none of another past after a restore."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    box = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.05)))
+    world.attach(box, nuno.Rigid(mass=2.0))
+    futures = world.imagine(3)
+    futures.set_material(box, nuno.Rigid(mass=[1.0, 2.0, 3.0]))
+    saved = world.save()
+    world.run(0.5)
+    whole = 2.0 * GRAVITY / 60.0
+    np.testing.assert_allclose(world.contacts(box).impulses["floor"], (0.0, 0.0, whole), atol=1e-4)
+    world.run(1.0 / 120.0)
+    np.testing.assert_allclose(world.contacts(box).impulses["floor"], (0.0, 0.0, 0.5 * whole), atol=1e-4)
+    futures.run(0.5)
+    told = futures.contacts(box).impulses["floor"]
+    np.testing.assert_allclose(told[:, 2], whole * np.array([0.5, 1.0, 1.5]), atol=1e-4)
+    world.restore(saved)
+    assert world.contacts(box).impulses == {}
+    world.run(0.5)
+    other = world.add(nuno.box((0.1, 0.1, 0.1), position=(1.0, 0.0, 0.05)))
+    world.attach(other)
+    np.testing.assert_allclose(world.contacts(box).impulses["floor"], (0.0, 0.0, whole), atol=1e-4)
+    world.remove("floor")
+    assert world.contacts(box).impulses == {}

@@ -147,6 +147,13 @@ class CoupledBodies:
                 found += [(point, sign * normal, sign * force, body.name, world) for sign in (1.0, -1.0)]
         return found
 
+    def impulses(self, body: Body) -> dict[str, np.ndarray]:
+        """What contacts with each of the others gave a body in the last frame, (worlds, 3) [N s], by name."""
+        if body not in self.bodies:
+            return {}
+        given = np.where(self.kept[body][:, None, None], self.coupling.impulses()[:, self.bodies.index(body)], 0.0)
+        return {other.name: given[:, k] for k, other in enumerate(self.bodies) if given[:, k].any()}
+
     def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
         """What shapes did to the particles of a body that others pressed on: see `Coupling.shape_contacts`."""
         known, found = self.coupling.shape_contacts(self.particles.index(body))
