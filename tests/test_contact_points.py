@@ -6,6 +6,7 @@ import pytest
 import nuno
 
 GRAVITY = 9.81
+DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
 FOLD = 0.01  # [m], radius
 
 
@@ -77,9 +78,10 @@ def balance(world, body, frames):
     return np.array(taken), np.array(given)
 
 
-def test_impulses_of_a_rigid_body_at_rest_and_in_a_bounce():
+@pytest.mark.parametrize("device", DEVICES)
+def test_impulses_of_a_rigid_body_at_rest_and_in_a_bounce(device):
     """Balance of momentum, frame by frame: of an impact too, whose force no last substep knows."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.plane(name="floor"))
     ball = world.add(nuno.sphere(0.05, position=(0.0, 0.0, 0.3), name="ball"))
     crate = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.5, 0.0, 0.05), name="crate"))
@@ -98,9 +100,10 @@ def test_impulses_of_a_rigid_body_at_rest_and_in_a_bounce():
     np.testing.assert_allclose(world.contacts(lid).impulses["crate"], -told["lid"], atol=1e-12)
 
 
-def test_impulses_between_a_rigid_body_a_cloth_and_a_soft_one():
+@pytest.mark.parametrize("device", DEVICES)
+def test_impulses_between_a_rigid_body_a_cloth_and_a_soft_one(device):
     """Balance of momentum, frame by frame, while a box falls on a held towel and a soft cube on the box."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     towel = world.add(nuno.sheet((0.3, 0.3), (10, 10), position=(0.0, 0.0, 0.3), name="towel"))
     box = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.36), name="box"))
     cube = world.add(nuno.soft_box((0.08, 0.08, 0.08), (2, 2, 2), position=(0.0, 0.0, 0.46), name="cube"))
@@ -112,10 +115,12 @@ def test_impulses_between_a_rigid_body_a_cloth_and_a_soft_one():
     assert given[:, 2].max() > 1.5 * 0.2 * GRAVITY / 60.0
     # float32 moves of bodies, summed over 30 substeps
     np.testing.assert_allclose(given, taken, atol=1e-3 * 0.2 * GRAVITY / 60.0)
-    told = world.contacts(box).impulses
+    told, saved = world.contacts(box).impulses, world.save()
     assert set(told) == {"towel", "cube"}
     for name, impulse in told.items():
         np.testing.assert_allclose(world.contacts(name).impulses["box"], -impulse, atol=1e-15)
+    world.restore(saved)
+    assert world.contacts(box).impulses == {}  # known from the next frame on
 
 
 def test_impulses_are_those_of_the_last_frame_of_each_world():

@@ -43,11 +43,6 @@ class BodyMotion:
         """Return the angular momentum (worlds, 3) [kg m2/s] about a point (3,) or (worlds, 3) [m]."""
         return self.angular_momentum + np.cross(self.centre - point, self.momentum)
 
-    def velocity_at(self, points: np.ndarray) -> np.ndarray:
-        """Return the velocity [m/s] that the rigid motion has at points (worlds, n, 3) [m], of the same shape."""
-        arms = points - self.centre[:, None]
-        return self.velocity[:, None] + np.cross(self.angular_velocity[:, None], arms)
-
 
 def motion_of_particles(mass: np.ndarray, positions: np.ndarray, velocities: np.ndarray) -> BodyMotion:
     """Return the motion of point masses.
