@@ -8,23 +8,25 @@ import nuno
 GRAVITY = 9.81
 SPEED, SPIN = np.array([1.0, -2.0, 0.5]), np.array([0.1, 0.2, -0.3])
 DRAG, SUBSTEPS = 3.0, 30
+DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
 
 
-def thrown(kind, drag, gravity=(0.0, 0.0, 0.0), **options):
+def thrown(kind, drag, gravity=(0.0, 0.0, 0.0), device="cpu", **options):
     """A world with one body of a kind in it."""
     body, material = {
         "cloth": (nuno.sheet((0.2, 0.1), (4, 2)), nuno.Cloth(air_drag=drag)),
         "soft": (nuno.soft_box((0.1, 0.2, 0.1), (1, 2, 1)), nuno.Soft(air_drag=drag)),
         "rigid": (nuno.box((0.1, 0.2, 0.3)), nuno.Rigid(air_drag=drag)),
     }[kind]
-    world = nuno.World(device="cpu", gravity=gravity, substeps=SUBSTEPS)
+    world = nuno.World(device=device, gravity=gravity, substeps=SUBSTEPS)
     return world, world.attach(world.add(body), material, **options)
 
 
+@pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("kind", ["cloth", "soft", "rigid"])
-def test_velocity_and_spin_decay(kind):
+def test_velocity_and_spin_decay(kind, device):
     """Closed form: each substep divides by 1 + drag dt, which is exp(-drag t) within drag^2 t dt / 2."""
-    world, body = thrown(kind, DRAG, velocity=SPEED, angular_velocity=SPIN)
+    world, body = thrown(kind, DRAG, device=device, velocity=SPEED, angular_velocity=SPIN)
     spin = body.angular_momentum()
     world.run(0.5)
     left = (1.0 + DRAG / 60.0 / SUBSTEPS) ** (-30 * SUBSTEPS)
