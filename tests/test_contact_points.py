@@ -100,6 +100,17 @@ def test_impulses_of_a_rigid_body_at_rest_and_in_a_bounce(device):
     np.testing.assert_allclose(world.contacts(lid).impulses["crate"], -told["lid"], atol=1e-12)
 
 
+def test_the_impulse_of_what_has_left():
+    """Balance of momentum of a ball that comes and goes at 20 m/s: it is 0.3 m away again when the frame ends."""
+    world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0))
+    world.add(nuno.plane(name="floor"))
+    ball = world.add(nuno.sphere(0.05, position=(0.0, 0.0, 0.06), name="ball"))
+    world.attach(ball, nuno.Rigid(mass=1.0, restitution=1.0), velocity=(0.0, 0.0, -20.0))
+    taken, given = balance(world, ball, 1)
+    assert ball.position[2] > 0.3 and taken[0, 2] > 39.0
+    np.testing.assert_allclose(given, taken, atol=1e-4)
+
+
 @pytest.mark.parametrize("device", DEVICES)
 def test_impulses_between_a_rigid_body_a_cloth_and_a_soft_one(device):
     """Balance of momentum, frame by frame, while a box falls on a held towel and a soft cube on the box."""

@@ -199,7 +199,6 @@ def enter(
             c.patch[e] = have
             c.count[e] = 0
             c.clear[e] = -1.0
-            c.impulse[e] = wp.vec3(0.0)
             c.friction[e] = mu
             c.bounce[e] = bounce
             have = have + 1

@@ -193,14 +193,20 @@ def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
 
 @wp.func
 def note_impulse(parts: Parts, c: Contacts, m: Meeting, e: int, dt: float):
-    """Add to an entry's impulse what its points gave the owner in this substep."""
+    """Add to an entry's impulse what its points gave the owner in this substep.
+
+    It outlasts the entry: what bounced away within the frame may have left the row by its end.
+    """
     total = wp.vec3(0.0)
     for k in range(c.count[e]):
         f = c.force[e * POINTS + k]
         total = total + (f[0] * m.n + f[1] * m.t + f[2] * m.u)
     if wp.length_sq(total) > 0.0:
+        other = parts.slot[c.partner[e]]
+        if c.met[e] != other:
+            c.impulse[e] = wp.vec3(0.0)
         c.impulse[e] = c.impulse[e] + dt * total
-        c.met[e] = parts.slot[c.partner[e]]
+        c.met[e] = other
 
 
 @wp.func

@@ -369,7 +369,7 @@ class RigidSolver(RigidArrays):
     def impulses_of(self, slot: int) -> dict[int, np.ndarray]:
         """Return what contacts gave a body in the last frame, (worlds, 3) [N s], by the slot of the other body.
 
-        A body that came within 2 cm and is farther than 7 substeps' way by the end of the frame may be left out.
+        One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
         impulse, met = self._entries("impulse"), self._entries("met")
         owner = self.table.parts.slot.numpy()[:, None]
