@@ -57,6 +57,20 @@ def test_a_mesh_stays_where_its_vertices_are_unless_placed(tmp_path):
     assert len(nuno.mesh(tmp_path / "ball.stl").faces) == len(ball.faces)
 
 
+def test_a_cloth_of_what_a_mesh_is_made_of(tmp_path):
+    """A path, a trimesh, a pair and arrays are the same cloth, with a pattern or without."""
+    flat = trimesh.Trimesh(*TRIANGLE, process=False)
+    flat.export(tmp_path / "rag.ply")
+    pattern = [(0, 0), (2, 0), (0, 2)]
+    for source in ((TRIANGLE,), TRIANGLE, (flat,), (tmp_path / "rag.ply",), (str(tmp_path / "rag.ply"),)):
+        for rest in (None, pattern):
+            cloth = nuno.cloth_mesh(*source, rest=rest, name="rag")
+            np.testing.assert_allclose(cloth.vertices, TRIANGLE[0], atol=EXACT)
+            np.testing.assert_array_equal(cloth.faces, TRIANGLE[1])
+            np.testing.assert_array_equal(cloth.shape.rest, TRIANGLE[0] if rest is None else rest)
+            assert cloth.shape.kind == "cloth_mesh" and cloth.name == "rag"
+
+
 def test_what_is_solid():
     """Closed meshes that look outwards are solid; open ones, ones inside out, and cloths are not."""
     ball = trimesh.creation.icosphere(subdivisions=1)
@@ -108,6 +122,14 @@ def test_closest_points_agree_with_trimesh():
         (lambda: nuno.mesh("no such file.stl"), MeshError),
         (lambda: nuno.mesh(3), MeshError),
         (lambda: nuno.cloth_mesh(*TRIANGLE, rest=[(0, 0), (1, 0)]), MeshError),
+        (lambda: nuno.cloth_mesh("no such file.stl"), MeshError),
+        (lambda: nuno.cloth_mesh(3), MeshError),
+        (lambda: nuno.cloth_mesh(TRIANGLE[0]), MeshError),
+        (lambda: nuno.cloth_mesh(TRIANGLE, TRIANGLE[1]), MeshError),
+        (lambda: nuno.cloth_mesh("rag.ply", TRIANGLE[1]), MeshError),
+        (lambda: nuno.cloth_mesh(trimesh.creation.box(), TRIANGLE[1]), MeshError),
+        (lambda: nuno.cloth_mesh("text", [(0, 1, 2)]), MeshError),
+        (lambda: nuno.cloth_mesh([(0, 0, 0), (1, 0, 0)], [(0, 1, 2)]), MeshError),
         (lambda: nuno.cloth_mesh(*TRIANGLE, rest=[(0, 0), (1, 0), (2, 0)]), MeshError),
         (lambda: nuno.box((1, 1, 1), friction=-1.0), InvalidInputError),
         (lambda: nuno.box((1, 1, 1), position=(0, 0, np.inf)), InvalidInputError),

@@ -107,7 +107,7 @@ def test_soft_and_rigid_resolve():
     assert soft["youngs_modulus"].shape == (2, 5) and soft["damping"].shape == (2, 1)
     assert Soft.preset("sponge").density == 30.0
     rigid = Rigid(mass=[1.0, 2.0])
-    assert rigid.resolved(2)["restitution"].shape == (2, 1)
+    assert rigid.resolved(2)["restitution"].shape == rigid.resolved(2)["air_drag"].shape == (2, 1)
     assert rigid.of_world(1, 2).mass == 2.0 and rigid.inertia is None
     assert Rigid(inertia=np.diag([1.0, 1.0, 2.0])).same_as(Rigid(inertia=np.diag([1.0, 1.0, 2.0])))
     assert not Rigid().same_as(Soft())

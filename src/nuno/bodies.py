@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from nuno.body import Body, BodyOptions
 from nuno.compound import Compound
-from nuno.errors import InvalidInputError
-from nuno.mesh.load import MeshSource, load_mesh
+from nuno.errors import InvalidInputError, MeshError
+from nuno.mesh.load import MeshSource, has_faces, load_mesh
 from nuno.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 from nuno.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra, closed_mesh
 from nuno.validation import number
@@ -70,20 +70,26 @@ def sheet(size: ArrayLike, cells: tuple[int, int], **options: Unpack[BodyOptions
 
 
 def cloth_mesh(
-    vertices: ArrayLike, faces: ArrayLike, rest: ArrayLike | None = None, **options: Unpack[BodyOptions]
-) -> Body:
+    source: MeshSource | ArrayLike, faces: ArrayLike | None = None, rest: ArrayLike | None = None,
+    **options: Unpack[BodyOptions],
+) -> Body:  # fmt: skip
     """Return a cloth of any cut.
 
     Args:
-        vertices: (n, 3) [m], its present shape.
-        faces: (m, 3) int.
-        rest: (n, 2) pattern or (n, 3) shape [m] in which nothing is stretched; None is ``vertices``.
+        source: Its present shape: a path, a trimesh or (vertices, faces) [m] as ``mesh`` takes them; or vertices (n, 3)
+            [m], where ``faces`` is given.
+        faces: (m, 3) int, of vertices alone.
+        rest: (n, 2) pattern or (n, 3) shape [m] in which nothing is stretched; None is the present shape.
         options: Those of ``Body``.
 
     Raises:
-        MeshError: not a usable mesh, or a rest shape with faces of no area.
+        MeshError: nothing to read, not a usable mesh, faces twice, or a rest shape with faces of no area.
     """
-    return Body(ClothMesh(vertices, faces, rest), **options)  # type: ignore[arg-type]
+    if faces is None:
+        return Body(ClothMesh(*load_mesh(source), rest), **options)  # type: ignore[arg-type]
+    if has_faces(source):
+        raise MeshError(f"faces are for vertices (n, 3), but {type(source).__name__} has its own; name rest=")
+    return Body(ClothMesh(source, faces, rest), **options)  # type: ignore[arg-type]
 
 
 def soft_box(size: ArrayLike, cells: tuple[int, int, int], **options: Unpack[BodyOptions]) -> Body:

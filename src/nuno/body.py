@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import uuid
 from contextlib import AbstractContextManager, nullcontext
+from copy import copy
 from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
@@ -14,6 +15,7 @@ from nuno.coordinates import Coordinates, Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.materials import Cloth, Material
 from nuno.path import Path
+from nuno.quantities import Quantities
 from nuno.shape import Shape, Sheet
 from nuno.soft_shape import SoftShape
 from nuno.surface import SurfacePoints, closest_points, sheet_points
@@ -39,7 +41,7 @@ class BodyOptions(TypedDict, total=False):
     collides_with: int
 
 
-class Body(Coordinates):
+class Body(Quantities, Coordinates):
     """A thing in the world. Its position is the shape's centre.
 
     Args:
@@ -317,6 +319,14 @@ class Body(Coordinates):
         if self._world is not None:
             self._world._body_changed(self)
         super()._moved()
+
+    def _as_static(self) -> Body:
+        """Return a copy that is static in the present place and shape; this body stays what it is."""
+        copied = copy(self)
+        if copied._dynamics is not None:
+            copied._thickness = self.thickness
+            copied._freeze()
+        return copied
 
     def _freeze(self) -> None:
         """Become static, in the present place and shape."""

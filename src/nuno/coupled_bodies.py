@@ -130,8 +130,11 @@ class CoupledBodies:
             return -force[:, k], -torque[:, k] - np.cross(arm, force[:, k])
         return None
 
-    def contacts(self, body: Body) -> list[tuple[Any, ...]]:
-        """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep."""
+    def contacts(self, body: Body, itself: bool = False) -> list[tuple[Any, ...]]:
+        """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep.
+
+        Those with ``itself`` are two rows each, one for either side.
+        """
         if body not in self.bodies:
             return []
         own, found = self.bodies.index(body), []
@@ -140,7 +143,16 @@ class CoupledBodies:
                 sign = 1.0 if pair[0] == own else -1.0
                 other = self.bodies[pair[1] if pair[0] == own else pair[0]]
                 found.append((point, sign * normal, sign * force, other.name, world))
+            elif itself and pair == (own, own) and self.kept[body][world]:
+                found += [(point, sign * normal, sign * force, body.name, world) for sign in (1.0, -1.0)]
         return found
+
+    def impulses(self, body: Body) -> dict[str, np.ndarray]:
+        """What contacts with each of the others gave a body in the last frame, (worlds, 3) [N s], by name."""
+        if body not in self.bodies:
+            return {}
+        given = np.where(self.kept[body][:, None, None], self.coupling.impulses()[:, self.bodies.index(body)], 0.0)
+        return {other.name: given[:, k] for k, other in enumerate(self.bodies) if given[:, k].any()}
 
     def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
         """What shapes did to the particles of a body that others pressed on: see `Coupling.shape_contacts`."""

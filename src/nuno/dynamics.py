@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno import quaternion as quat
+from nuno.body_motion import BodyMotion, motion_of_particles
 from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import InvalidInputError
+from nuno.given_velocity import GivenVelocity
 from nuno.grip import Grip
 from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.shape import ClothMesh, Plane, Shape, Sheet
@@ -83,6 +85,18 @@ class Dynamics:
 
     def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere as a whole; velocities turn along."""
+        raise NotImplementedError
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves as a whole."""
+        raise NotImplementedError
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the body velocities; it stays where it is."""
+        raise NotImplementedError
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J], what the body's deformation stores."""
         raise NotImplementedError
 
     def state(self) -> State:
@@ -174,6 +188,34 @@ class ParticleDynamics(Dynamics):
         motion = compose((position, quaternion), invert(self.pose(body)))
         turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
         self.solver.set_state(apply(motion, self.vertices(body)), turned.astype(np.float32))
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves as a whole: the motion of its vertices' masses."""
+        return motion_of_particles(self.solver.mass, self.vertices(body), self.velocities(body))
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the vertices velocities; they stay where they are, to the bit."""
+        from nuno.solver.state import SPEED
+
+        velocities = given.vertices
+        if velocities is None:
+            velocities = given.at(self.vertices(body), self.motion(body).centre)
+        state = self.solver.save_state()
+        state["velocities"] = velocities.astype(np.float32)
+        state["notes"][:, SPEED] = (velocities**2).sum(axis=-1).max(axis=-1)  # which bounds what pairs are listed
+        self.solver.load_state(state)
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J], what the body's deformation stores."""
+        measures: Any
+        if isinstance(self.material, Soft):
+            from nuno import soft_measures as measures
+        else:
+            from nuno import cloth_measures as measures
+        energy: np.ndarray = measures.elastic_energy(
+            topology_of(body.shape), self.vertices(body), self.material, self.world_count
+        )
+        return energy
 
     def set_self_contact(self, touching: bool) -> None:
         """Let the body touch itself or not, from the next step on."""

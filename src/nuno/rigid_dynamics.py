@@ -8,8 +8,10 @@ import numpy as np
 import warp as wp
 
 from nuno import quaternion as quat
+from nuno.body_motion import BodyMotion, motion_of_rigid
 from nuno.coordinates import Pose, apply, compose, invert
 from nuno.dynamics import Dynamics, State, check_material
+from nuno.given_velocity import GivenVelocity
 from nuno.mass_properties import mass_properties
 from nuno.materials import Rigid
 from nuno.scene.rigid_shape import RigidPart, rigid_shape
@@ -166,7 +168,7 @@ class RigidDynamics(Dynamics):
         self.slot = self.solver.add(
             self.parts, position=place + quat.rotate(turn, self.centre), quaternion=turn, mass=self.mass,
             inertia=self.inertia, centre=self.centre, friction=friction, restitution=values["restitution"][:, 0],
-            group=body.group, collides_with=body.collides_with,
+            air_drag=values["air_drag"][:, 0], group=body.group, collides_with=body.collides_with,
         )  # fmt: skip
         self.radius = float(self.solver.rules.radius.numpy()[self.slot])  # [m], around the centre of mass
         self._world = world
@@ -205,6 +207,20 @@ class RigidDynamics(Dynamics):
             self.slot, position + quat.rotate(quaternion, np.broadcast_to(self.centre, position.shape)), quaternion
         )
         self.solver.set_velocity(self.slot, quat.rotate(turn, velocity), quat.rotate(turn, spin))
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves."""
+        place, turn = self.solver.pose(self.slot)
+        return motion_of_rigid(self.mass, place, self.inertia, turn, *self.solver.velocity(self.slot))
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the body a velocity and an angular velocity."""
+        place, _ = self.solver.pose(self.slot)
+        self.solver.set_velocity(self.slot, given.at(place[:, None], place)[:, 0], given.angular)
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J]: none, for it does not deform."""
+        return np.zeros(self.world_count)
 
     def prepare(self, time: float, frame: float) -> None:
         """Bring the pushes that act from ``time`` [s] on."""

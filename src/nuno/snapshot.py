@@ -182,6 +182,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
         raise
     _take_apart(world, list(made.values()))
     world._time = snapshot.time
+    world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
     for record in snapshot.bodies:
         _fill(bodies[record.key], record)
         world._register(bodies[record.key])

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.given_velocity import given_velocity, present_velocity
 from nuno.grip import Grip, make_grip
-from nuno.materials import Material
+from nuno.materials import Material, Rigid
 from nuno.motion import arrive, path_for
 from nuno.path import Path
 from nuno.running import Running
@@ -103,29 +104,54 @@ class World(Running):
 
     # Dynamics
 
-    def attach(self, body: Body | str, material: Material | None = None) -> Body:
-        """Give a body dynamics, from the shape that it has now, at rest; no other body changes.
+    def attach(
+        self, body: Body | str, material: Material | None = None, *, velocity: ArrayLike | None = None,
+        angular_velocity: ArrayLike | None = None, keep_velocity: bool = False,
+    ) -> Body:  # fmt: skip
+        """Give a body dynamics, from the shape that it has now, at rest or moving; no other body changes.
 
         The body takes the material's friction and thickness over, and keeps them when it is detached. Without
         a material a cloth gets ``Cloth``, a soft body ``Soft`` and any other ``Rigid``, with the body's friction.
         ``Rigid`` may be given to all but planes: a cloth or soft body then keeps the shape that it has now.
 
+        Args:
+            body: The body.
+            material: The material.
+            velocity: As of ``set_velocity``; None is at rest.
+            angular_velocity: As of ``set_velocity``; None is without a turn.
+            keep_velocity: Take a dynamic body over from the dynamics that it has, which end as ``detach`` ends them
+                (its grips let go). What becomes cloth or soft keeps the velocities of the vertices. What becomes rigid
+                keeps the velocity of the centre of mass and the angular velocity I^-1 L. A static body has no velocity
+                to keep, also where it was detached at this instant: it starts at rest.
+
         Raises:
-            BodyStateError: it has dynamics already, or follows another frame.
-            InvalidInputError: the shape has no such dynamics, or the material does not fit.
+            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, or it follows another frame.
+            InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
             MeshError: a rigid body without volume.
         """
         with self._call():
             own = self._own(body)
-            if own._dynamics is not None:
-                raise BodyStateError(f"{own.name!r} is dynamic already; detach it first to change its material")
+            if own._dynamics is not None and not keep_velocity:
+                raise BodyStateError(
+                    f"{own.name!r} is dynamic already; detach it first to change its material, or set keep_velocity"
+                )
+            if keep_velocity and not (velocity is None and angular_velocity is None):
+                raise InvalidInputError("keep_velocity leaves no room for a velocity or angular_velocity")
             if own._parent is not None:
                 raise BodyStateError(f"{own.name!r} follows another frame; dissoc it first")
             if own._path is not None:
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
-            dynamics = start_dynamics(own, chosen, self)
+            given = None if own._dynamics is None else present_velocity(own)
+            if velocity is not None or angular_velocity is not None:
+                is_rigid = isinstance(chosen, Rigid)
+                given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            dynamics = start_dynamics(own._as_static(), chosen, self)
+            if given is not None:
+                dynamics.set_velocity(own, given)
+            if own._dynamics is not None:
+                self._detach(own)
             own._friction, own._dynamics = chosen.friction, dynamics
             if not dynamics.is_rigid:
                 own._deformed = None
@@ -262,6 +288,32 @@ class World(Running):
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
             own._dynamics.add_push(make_push(own, force, torque, duration, self))
 
+    def set_velocity(
+        self, body: Body | str, velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None
+    ) -> None:
+        """Give a dynamic body a velocity in place of the one that it has; it stays where it is.
+
+        Every vertex of a cloth or soft body takes the velocity of the rigid motion. What a grip holds goes on with the
+        grip.
+
+        Args:
+            body: The body.
+            velocity: (3,) or (worlds, 3) [m/s] of the centre of mass; of a cloth or soft body also of every vertex,
+                (n, 3) or (worlds, n, 3). Where worlds = n, two axes mean vertices. None is zero.
+            angular_velocity: (3,) or (worlds, 3) [rad/s], along the world's axes; None is zero.
+
+        Raises:
+            BodyStateError: the body is static.
+            InvalidInputError: not finite, of another shape, or an angular velocity on top of those of vertices.
+        """
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it with a velocity")
+            is_rigid = own._dynamics.is_rigid
+            given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            own._dynamics.set_velocity(own, given)
+
     def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
         """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back.
 
@@ -290,11 +342,17 @@ class World(Running):
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
 
-    def contacts(self, body: Body | str) -> ContactPoints:
+    def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:
         """Return where a dynamic body touches others: points, normals and forces.
 
         Those with static bodies are what the next substep would make of them, for cloth and soft bodies; all others
         are those of the last substep.
+
+        Args:
+            body: The body.
+            itself: Whether contacts of a cloth or soft body with itself are told too, under its own name. Both sides of
+                each are, so that their forces add up to nothing. Of a cloth they are what the next substep would make
+                of them, vertex by vertex, which takes the time of two substeps.
 
         Raises:
             BodyStateError: the body is static.
@@ -305,7 +363,7 @@ class World(Running):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
-            return contact_points(self, own)
+            return contact_points(self, own, itself)
 
     def state(self, body: Body | str) -> dict[str, Any]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.

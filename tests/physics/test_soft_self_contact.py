@@ -57,6 +57,11 @@ def test_prongs_close_and_stay_apart(device):
     # a thousandth of each prong's impulse; what rounding of coordinates adds while it rings is a tenth of that
     assert np.linalg.norm(mass @ body.velocities) < 1e-3 * FORCE * 0.35
     assert body.is_dynamic and not len(body._world.contacts(body))  # contacts are those with others
+    found = body._world.contacts(body, itself=True)
+    right = found.normals[:, 0] > 0.0
+    assert set(found.others) == {"fork"} and right.sum() == len(found) // 2
+    np.testing.assert_allclose(found.forces.sum(axis=0), 0.0, atol=1e-12)
+    assert 0.1 * FORCE < found.forces[right, 0].sum() < FORCE  # the rest bends the prongs
 
 
 def test_without_it_prongs_pass_through():

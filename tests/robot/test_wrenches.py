@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import nnls
 
 import nuno
+from nuno.robot import loads
 from nuno.robot.ground import Soles
 from nuno.robot.hands import Hand
 from nuno.robot.sensors import Sensors
@@ -207,3 +208,24 @@ def test_the_balance_of_momentum_is_what_the_grip_bears_while_the_hand_moves(g1)
     # of single frames: the grip's share of held vertices is from three key poses, the momentum from float32 velocities
     assert np.abs(told - borne).max() < 0.1 * weight
     np.testing.assert_allclose(told.mean(axis=0), borne.mean(axis=0), atol=0.01 * weight)
+
+
+@pytest.mark.parametrize("kind", ["cloth", "soft"])
+def test_nothing_is_missing_of_what_flies_through_the_air(kind):
+    """A body in free flight, braked by the air and pulled by its weight alone, lacks no force: nobody bears it."""
+    world = nuno.World(device="cpu")
+    if kind == "cloth":
+        body, material = nuno.sheet((0.2, 0.2), cells=(4, 4)), nuno.Cloth(air_drag=5.0)
+    else:
+        body, material = nuno.soft_box((0.1, 0.1, 0.1), cells=(2, 2, 2)), nuno.Soft(air_drag=5.0)
+    world.attach(world.add(body), material, velocity=(2.0, 0.0, 0.0))
+
+    def motion():
+        rows = np.concatenate([body.vertices.T, body.velocities.T])
+        return loads._motion_of(rows, body._dynamics.solver.mass[0], world.time)
+
+    before = motion()
+    world.step()
+    missing = loads._missing(body._dynamics, body.vertices.T, before, motion(), np.array(world.gravity))
+    # the mean of two velocities stands for their course within a frame, to (drag / 60)^2 / 12; the drag is 10 m N
+    np.testing.assert_allclose(missing[:3], 0.0, atol=0.005 * 5.0 * body.mass * 2.0)

@@ -52,6 +52,9 @@ class Contacts:
     local_a: wp.array(dtype=wp.vec3)  # in the owner's body frame
     local_b: wp.array(dtype=wp.vec3)
     force: wp.array(dtype=wp.vec3)  # along the normal and two tangents [N]
+    # of the last frame, for `RigidSolver.impulses_of`
+    impulse: wp.array(dtype=wp.vec3)  # on the owner, in the world [N s]
+    met: wp.array(dtype=int)  # the slot of the body that gave it
     # of a substep
     normal_now: wp.array(dtype=wp.vec3)
     tangent_now: wp.array(dtype=wp.vec3)
@@ -70,6 +73,17 @@ class Contacts:
     notes: wp.array(dtype=float)
     listed_position: wp.array(dtype=wp.vec3)
     listed_rotation: wp.array(dtype=wp.quat)
+
+
+@wp.func
+def forget_impulses(s: RigidState, parts: Parts, c: Contacts, world: int, thread: int, threads: int):
+    """Begin a frame of those that are active in this run."""
+    for k in range(thread, parts.count * c.row, threads):
+        e = world * c.parts * c.row + k
+        a = parts.slot[k / c.row]
+        if a >= 0 and wp.length_sq(c.impulse[e]) > 0.0:
+            if s.active[a] != 0 or s.active[c.met[e]] != 0:
+                c.impulse[e] = wp.vec3(0.0)
 
 
 @wp.func

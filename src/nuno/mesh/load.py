@@ -32,6 +32,14 @@ def load_mesh(source: MeshSource) -> tuple[np.ndarray, np.ndarray]:
     raise MeshError(f"a mesh is a path, a trimesh.Trimesh or (vertices, faces), got {type(source).__name__}")
 
 
+def has_faces(source: Any) -> bool:
+    """Return whether a source of a mesh is more than vertices: a path, a trimesh.Trimesh, or (vertices, faces)."""
+    if isinstance(source, str | PathLike) or hasattr(source, "faces"):
+        return True
+    # three numbers make a vertex
+    return isinstance(source, tuple | list) and len(source) == 2 and np.ndim(source[0]) == 2
+
+
 def _from_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if not path.is_file():
         raise MeshError(f"there is no mesh file {str(path)!r}")

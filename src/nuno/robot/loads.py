@@ -227,8 +227,8 @@ def _missing(
     The torque is about the world's origin, and both are means between two times.
     """
     missing = (now.momentum - before.momentum) / (now.time - before.time)
-    if isinstance(dynamics.material, Cloth):
-        missing += 0.5 * _of_one_world(dynamics.material.air_drag) * (now.momentum + before.momentum)
+    drag: Any = dynamics.material
+    missing += 0.5 * _of_one_world(drag.air_drag) * (now.momentum + before.momentum)
     missing[:3] -= now.mass * gravity
     missing[3:] -= moment(0.5 * (now.moment + before.moment), gravity)
     for push in dynamics.pushing(before.time):

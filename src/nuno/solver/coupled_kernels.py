@@ -155,6 +155,23 @@ def scatter(layout: Layout, particles: Particles, start: wp.array(dtype=wp.vec3)
         layout.z[k] = layout.z[k] + d[2]
 
 
+IMPULSE_UNIT = wp.constant(1.0e-16)
+"""[kg m] Step of the sums of multipliers: integers add up to the same whatever the order of threads."""
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.add_impulses")
+def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
+    """Add what each row gave its first body in the substep to the sum of its pair, by world."""
+    world, k = wp.tid()
+    if k < rows.active_count[world]:
+        r = rows.active[world * rows.room + k]
+        if rows.push[r] > 0.0:
+            pair = (world * bodies + rows.bodies[r][0]) * bodies + rows.bodies[r][1]
+            impulse = rows.push[r] * rows.normal[r] + rows.drag[r]
+            for c in range(3):
+                wp.atomic_add(total, 3 * pair + c, wp.int64(wp.rint(impulse[c] / IMPULSE_UNIT)))
+
+
 @wp.kernel(enable_backward=False)
 def solve(
     particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, passing: Passing, dt: float,

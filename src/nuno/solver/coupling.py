@@ -13,7 +13,7 @@ from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
 from nuno.contact.coupled_rows import MOST, Particles, Rows
 from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
-from nuno.solver.coupled_kernels import Layout, Passing, collect, scatter, solve
+from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, Passing, add_impulses, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
@@ -70,6 +70,7 @@ class Coupling:
         self._passing = Passing()
         for name, kind in (("wrong", float), ("done", int)):
             setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
+        self._impulses = wp.zeros(3 * self.world_count * self._bodies**2, dtype=wp.int64, device=self.device)
         firsts = np.cumsum([0, *(solver.particle_count for solver in self._solvers)])
         self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
         self._layouts: list[Layout] = []
@@ -179,6 +180,7 @@ class Coupling:
             self._rigid.open(time, dt, [*self._slots, *self.led])
         for total in (self._ties.total, self.holds.total, self.holds.total_twist, self._particles.bounded_count):
             total.zero_()
+        self._impulses.zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
@@ -243,6 +245,8 @@ class Coupling:
                 solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self._passing, dt,
                 fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
             )  # fmt: skip
+            if self._listed:
+                go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
             for layout in self._layouts:
                 go(scatter, (worlds, layout.particles), layout, particles, self._start)
 
@@ -340,6 +344,12 @@ class Coupling:
                         force = (push[c] * normal[c] + drag[c]).astype(float) * (self._rate / weight[j])
                         found.append((world, i, int(shape[c]), normal[c].astype(float), force))
         return known, found
+
+    def impulses(self) -> np.ndarray:
+        """(worlds, bodies, bodies, 3) [N s], what contacts between two bodies gave the first in the last frame."""
+        given = self._impulses.numpy().reshape(self.world_count, self._bodies, self._bodies, 3)
+        given = given * (IMPULSE_UNIT * np.sqrt(self._rate))
+        return given - np.swapaxes(given, 1, 2)
 
     def tie_forces(self) -> np.ndarray:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""

@@ -9,12 +9,12 @@ import numpy as np
 import warp as wp
 
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED
+from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED, TOLD
 from nuno.solver.rigid_solver import RigidSolver
 from nuno.solver.state import LOADS, NOTES, PARTICLE_ARRAYS, TRAVEL
 
-PAIRS = (*ENTRY, *POINT, "normal_now", "tangent_now")
-"""Arrays of pairs; the last two are what `RigidSolver.contacts_of` tells of the last substep besides."""
+PAIRS = (*ENTRY, *POINT, *TOLD, "normal_now", "tangent_now")
+"""Arrays of pairs; the last ones are what `RigidSolver` tells of the last frame and substep besides."""
 
 Copied = dict[str, np.ndarray]  # (worlds, ...) each
 

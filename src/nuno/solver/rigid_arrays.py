@@ -24,7 +24,7 @@ ROW = 24
 BODY = dict(
     position=wp.vec3, rotation=wp.quat, position_before=wp.vec3, rotation_before=wp.quat, position_free=wp.vec3,
     rotation_free=wp.quat, lost=wp.vec3, velocity=wp.vec3, spin=wp.vec3, force=wp.vec3, torque=wp.vec3,
-    inverse_mass=float, inertia=wp.mat33, inverse_inertia=wp.mat33, weight=float, give=wp.mat33,
+    drag=float, inverse_mass=float, inertia=wp.mat33, inverse_inertia=wp.mat33, weight=float, give=wp.mat33,
 )  # fmt: skip
 """Arrays of `RigidState` with a row for each body of each world."""
 SAVED = ("position", "rotation", "velocity", "spin", "force", "torque")
@@ -34,6 +34,8 @@ ENTRY = dict(
 )  # fmt: skip
 """Arrays of `Contacts` with a row for each pair, which last."""
 POINT = dict(local_a=wp.vec3, local_b=wp.vec3, force=wp.vec3)
+TOLD = dict(impulse=wp.vec3, met=int)
+"""Arrays of `Contacts` with a row for each pair that tell of the last frame: no later step depends on them."""
 PASSING = dict(
     normal_now=(wp.vec3, 1), tangent_now=(wp.vec3, 1), order=(int, 1), waiting=(int, 1), bounds=(int, 1),
     height=(float, 1), arm_a=(wp.vec3, POINTS), arm_b=(wp.vec3, POINTS), mass=(wp.vec3, POINTS),
@@ -95,6 +97,13 @@ class RigidArrays:
         self.manifolds.count.assign(count.ravel())
         self._list_anew()
 
+    def _forget_impulses(self, slot: int) -> None:
+        """Forget what contacts gave a body in the last frame, and others through it."""
+        met, impulse = self._entries("met"), self._entries("impulse").copy()
+        impulse[met == slot] = 0.0
+        impulse[:, self.part_rows.get(slot, [])] = 0.0
+        self.manifolds.impulse.assign(impulse.reshape(-1, 3))
+
     def _list_anew(self) -> None:
         self.manifolds.notes.fill_(-1.0)
 
@@ -124,7 +133,7 @@ class RigidArrays:
     def _grow_rows(self, parts: int, row: int) -> None:
         c, worlds = self.manifolds, self.world_count
         old_parts, old_row = c.parts, c.row
-        for name, kind in (*ENTRY.items(), *POINT.items()):
+        for name, kind in (*ENTRY.items(), *POINT.items(), *TOLD.items()):
             shape: tuple[int, ...] = (worlds, parts, row, POINTS) if name in POINT else (worlds, parts, row)
             wider = wp.zeros(shape, dtype=kind, device=self.device)
             if name == "partner":

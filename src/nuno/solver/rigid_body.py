@@ -28,6 +28,7 @@ class RigidState:
     spin: wp.array(dtype=wp.vec3)  # angular velocity, world frame [rad/s]
     force: wp.array(dtype=wp.vec3)  # [N]
     torque: wp.array(dtype=wp.vec3)  # [N m]
+    drag: wp.array(dtype=float)  # rate at which the air takes velocity and spin [1/s]
     inverse_mass: wp.array(dtype=float)  # [1/kg], 0: not dynamic
     inertia: wp.array(dtype=wp.mat33)  # about the centre of mass, body frame [kg m2]
     inverse_inertia: wp.array(dtype=wp.mat33)
@@ -138,10 +139,11 @@ def begin_body(s: RigidState, i: int, role: int):
 
 @wp.func
 def push_body(s: RigidState, i: int, gravity: wp.vec3, dt: float):
-    """Add to a body's velocity what gravity, force and torque give in the substep."""
+    """Add to a body's velocity what gravity, force and torque give in the substep, and take what the air takes."""
     if s.weight[i] > 0.0:
-        s.velocity[i] = s.velocity[i] + dt * (gravity + s.weight[i] * s.force[i])
-        s.spin[i] = s.spin[i] + dt * (s.give[i] * s.torque[i])
+        slow = 1.0 / (1.0 + s.drag[i] * dt)
+        s.velocity[i] = (s.velocity[i] + dt * (gravity + s.weight[i] * s.force[i])) * slow
+        s.spin[i] = (s.spin[i] + dt * (s.give[i] * s.torque[i])) * slow
 
 
 @wp.func

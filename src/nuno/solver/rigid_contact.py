@@ -192,12 +192,31 @@ def slow_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
 
 
 @wp.func
+def note_impulse(parts: Parts, c: Contacts, m: Meeting, e: int, dt: float):
+    """Add to an entry's impulse what its points gave the owner in this substep.
+
+    It outlasts the entry: what bounced away within the frame may have left the row by its end.
+    """
+    total = wp.vec3(0.0)
+    for k in range(c.count[e]):
+        f = c.force[e * POINTS + k]
+        total = total + (f[0] * m.n + f[1] * m.t + f[2] * m.u)
+    if wp.length_sq(total) > 0.0:
+        other = parts.slot[c.partner[e]]
+        if c.met[e] != other:
+            c.impulse[e] = wp.vec3(0.0)
+        c.impulse[e] = c.impulse[e] + dt * total
+        c.met[e] = other
+
+
+@wp.func
 def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float, still: float):
     """Positions alone: take back a share of what overlaps, and of what slipped though friction held it.
 
     The force of an impact is forgotten: the next substep begins with forces that last.
     """
     m = meeting_of(s, parts, c, world, e)
+    note_impulse(parts, c, m, e, dt)
     g = places_of(s, m)
     for h in range(c.count[e]):
         k = c.count[e] - 1 - h

@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.convex import Parts
-from nuno.contact.rigid_manifolds import COUNTS, ENTRIES, LEFT, OVERFLOW, ROUNDS, Contacts
+from nuno.contact.rigid_manifolds import COUNTS, ENTRIES, LEFT, OVERFLOW, ROUNDS, Contacts, forget_impulses
 from nuno.contact.rigid_pairs import Rules, end_listing, list_rows, measure, must_list, refresh_rows, reset_measures
 from nuno.contact.rigid_rounds import line_up, sort_rounds
 from nuno.solver.rigid_body import RigidState, begin_body, move_body, push_body, read_velocity
@@ -26,6 +26,7 @@ class RigidSettings:
     down: float  # size of gravity [m/s2]
     must_list: int
     passes: int  # over the velocities
+    frame: int  # substeps that are left when the last frame begins, from which on impulses are added up; 0: none begins
 
 
 @wp.func
@@ -119,6 +120,8 @@ def go_through(
     go = int(1)
     while left > 0 and go == 1:
         if phase <= 1:
+            if left == run.frame:
+                forget_impulses(s, parts, c, world, thread, threads)
             # a row that is too short ends the run here, before anything moved: the host makes longer ones and goes on
             go = predict_worlds(s, parts, c, rules, run, world, thread, threads, those)
         if go == 1:

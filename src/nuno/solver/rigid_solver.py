@@ -79,7 +79,7 @@ class RigidSolver(RigidArrays):
         self._mass: dict[int, np.ndarray] = {}
         self._loaded: dict[int, Mapping[str, np.ndarray]] = {}
         self.set_exceptions({})
-        self._dt = 0.0
+        self._dt, self._opened = 0.0, False
 
     # Bodies
 
@@ -94,6 +94,7 @@ class RigidSolver(RigidArrays):
         centre: ArrayLike = (0.0, 0.0, 0.0),
         friction: ArrayLike = 0.5,
         restitution: ArrayLike = 0.0,
+        air_drag: ArrayLike = 0.0,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
         group: int = 1,
@@ -111,6 +112,7 @@ class RigidSolver(RigidArrays):
             centre: (3,) [m], the centre of mass in the shape's frame.
             friction: Coulomb's coefficient, one or (worlds,).
             restitution: One or (worlds,); of a pair the larger counts.
+            air_drag: Rate at which the air takes velocity and spin [1/s], one or (worlds,).
             velocity: (3,) or (worlds, 3) [m/s], of the centre of mass.
             angular_velocity: (3,) or (worlds, 3) [rad/s], world frame.
             group: Bits that others' ``collides_with`` is held against.
@@ -137,10 +139,12 @@ class RigidSolver(RigidArrays):
         self.set_pose(slot, position, quaternion)
         self.set_velocity(slot, velocity, angular_velocity)
         self.set_surface(slot, friction, restitution)
+        self._write("drag", slot, air_drag)
         return slot
 
     def remove(self, slot: int) -> None:
         """Take a body away; its slot may be given to another."""
+        self._forget_impulses(slot)
         rows = self.part_rows.pop(slot)
         self.table.remove(rows)
         self._forget_rows(rows)
@@ -253,19 +257,20 @@ class RigidSolver(RigidArrays):
         rest = duration - frames * frame
         self._choose(members)
         if frames:
-            self._launch("all", frame / each, frames * each)
+            self._launch("all", frame / each, frames * each, each)
         if rest > 1e-6 * frame:
             count = max(1, math.ceil(each * rest / frame))
-            self._launch("all", rest / count, count)
+            self._launch("all", rest / count, count, count)
 
     def open(self, time: float, dt: float, members: Sequence[int] | None = None) -> None:
         """Begin substeps of ``dt`` [s] whose phases are called one by one: predict, contacts, finish."""
         self._choose(members)
-        self._dt = float(dt)
+        self._dt, self._opened = float(dt), True
 
     def predict(self) -> None:
         """Look for contacts, and move the members as their forces and those of the last substep say."""
-        self._launch("predict", self._dt, 1)
+        self._launch("predict", self._dt, 1, int(self._opened))
+        self._opened = False
 
     def contacts(self) -> None:
         """One pass over the positions of what touches."""
@@ -281,9 +286,10 @@ class RigidSolver(RigidArrays):
             roles[list(members)] = self._roles[list(members)]
         self.state.active.assign(roles)
 
-    def _launch(self, phase: str, dt: float, substeps: int) -> None:
+    def _launch(self, phase: str, dt: float, substeps: int, frame: int = 0) -> None:
         self._load_contacts()
         run = self.settings
+        run.frame = frame
         run.dt, run.gravity, run.passes = dt, wp.vec3(*self.gravity), self.passes
         run.down = float(np.linalg.norm(self.gravity))
         threads = BLOCK_THREADS if self._cuda else 1
@@ -360,6 +366,22 @@ class RigidSolver(RigidArrays):
             result.append((other, points, directions, pushes))
         return result
 
+    def impulses_of(self, slot: int) -> dict[int, np.ndarray]:
+        """Return what contacts gave a body in the last frame, (worlds, 3) [N s], by the slot of the other body.
+
+        One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
+        """
+        impulse, met = self._entries("impulse"), self._entries("met")
+        owner = self.table.parts.slot.numpy()[:, None]
+        found: dict[int, np.ndarray] = {}
+        for world, p, k in np.argwhere(impulse.any(axis=-1)):
+            a, b = int(owner[p, 0]), int(met[world, p, k])
+            if slot in (a, b):
+                other, sign = (b, 1.0) if slot == a else (a, -1.0)
+                total = found.setdefault(other, np.zeros((self.world_count, 3)))
+                total[world] += sign * impulse[world, p, k]
+        return found
+
     def contact_count(self) -> np.ndarray:
         """(worlds,) int: points at which bodies press on each other."""
         pressing = (self._entries("force")[..., 0] > 0.0) & self._in_use()
@@ -389,6 +411,7 @@ class RigidSolver(RigidArrays):
         for name in SAVED:
             self._write(name, slot, state[name])
         self._loaded[slot] = state
+        self.manifolds.impulse.zero_()  # of another past
         self._list_anew()
 
     def _load_contacts(self) -> None:
