@@ -8,15 +8,8 @@ already asks for what they have and a little more, so that they part slowly.
 import warp as wp
 
 from nuno.contact.coupled_lists import Elements, body_radius
-from nuno.contact.coupled_rows import (
-    EDGE_EDGE,
-    EDGE_RIGID,
-    LEAVE_SPEED,
-    VERTEX_RIGID,
-    VERTEX_TRIANGLE,
-    Particles,
-    Rows,
-)
+from nuno.contact.coupled_particles import Particles
+from nuno.contact.coupled_rows import EDGE_EDGE, EDGE_RIGID, LEAVE_SPEED, VERTEX_RIGID, VERTEX_TRIANGLE, Rows
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SPHERE, distance_box, distance_cylinder, distance_round
 from nuno.contact.nearness import closest_on_edges
 from nuno.solver.rigid_body import RigidState, point_before

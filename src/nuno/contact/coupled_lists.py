@@ -6,15 +6,8 @@ elements alone decide, so that it does not matter when a list was made.
 
 import warp as wp
 
-from nuno.contact.coupled_rows import (
-    EDGE_EDGE,
-    EDGE_RIGID,
-    TRIANGLE_RIGID,
-    VERTEX_RIGID,
-    VERTEX_TRIANGLE,
-    Particles,
-    Rows,
-)
+from nuno.contact.coupled_particles import Particles
+from nuno.contact.coupled_rows import EDGE_EDGE, EDGE_RIGID, TRIANGLE_RIGID, VERTEX_RIGID, VERTEX_TRIANGLE, Rows
 from nuno.solver.rigid_body import RigidState, point_of
 
 

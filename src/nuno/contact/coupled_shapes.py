@@ -14,7 +14,8 @@ the phase of shapes that follows (`nuno.contact.shapes`), which then finds every
 import warp as wp
 
 from nuno.contact.coupled_lists import Elements
-from nuno.contact.coupled_rows import LEAVE_SPEED, MOST, Particles
+from nuno.contact.coupled_particles import MOST, Particles
+from nuno.contact.coupled_rows import LEAVE_SPEED
 from nuno.contact.distances import SHELL_MESH, SOLID_MESH, mesh_gap
 from nuno.contact.led import led_place, led_turn
 from nuno.contact.shapes import COLUMNS, distance_shape

@@ -6,7 +6,8 @@ other within a substep. Their multipliers over dt^2 are the forces and torques t
 
 import warp as wp
 
-from nuno.contact.coupled_rows import Particles, blend
+from nuno.contact.coupled_particles import Particles
+from nuno.contact.coupled_rows import blend
 from nuno.solver.rigid_body import (
     RigidState,
     apply_rigid_correction,

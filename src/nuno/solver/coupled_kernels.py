@@ -2,7 +2,8 @@
 
 import warp as wp
 
-from nuno.contact.coupled_rows import Particles, Rows, bound_all, drag_row, forget_sharers, join_row, push_row, take_sums
+from nuno.contact.coupled_particles import Particles, bound_all
+from nuno.contact.coupled_rows import Rows, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState

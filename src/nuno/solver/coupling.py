@@ -10,7 +10,8 @@ import warp as wp
 
 from nuno.contact.coupled_geometry import measure_rows
 from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
-from nuno.contact.coupled_rows import MOST, Particles, Rows
+from nuno.contact.coupled_particles import MOST, Particles
+from nuno.contact.coupled_rows import Rows
 from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, Passing, add_impulses, collect, scatter, solve
