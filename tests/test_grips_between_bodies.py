@@ -242,3 +242,41 @@ def test_contacts_between_two_bodies_that_move_are_opposite():
         down.append(on_cube.forces[below].sum(axis=0))
     np.testing.assert_allclose(np.array(up), -np.array(down), atol=1e-9)
     assert np.mean(up, axis=0)[2] == pytest.approx(0.2 * GRAVITY, rel=0.05)
+
+
+def led_ball():
+    """A ball that is held by a box on a path, 0.5 m in a second."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    hand = world.add(nuno.box((0.1, 0.1, 0.1), name="hand"))
+    ball = world.add(nuno.sphere(0.05, name="ball", position=(0.5, 0, 0)))
+    world.attach(ball)
+    world.grip(ball, to=hand)
+    world.move(hand, nuno.Path([0.0, 1.0], [(0, 0, 0), (0, 0.5, 0)]))
+    return world, ball
+
+
+def test_a_rigid_body_goes_with_a_hand_on_a_path():
+    """Frame by frame as at once: it stood for half a second, and jumped; in steps it was a frame late."""
+    world, ball = led_ball()
+    world.run(1.0)
+    np.testing.assert_allclose(ball.position, (0.5, 0.5, 0.0), atol=1e-5)  # some floats' steps
+    stepped, same = led_ball()
+    for k in range(60):
+        stepped.step()
+        np.testing.assert_allclose(same.position, (0.5, (k + 1) / 120, 0.0), atol=1e-5)
+    np.testing.assert_array_equal(same.vertices, ball.vertices)
+
+
+def test_a_copy_of_a_held_rigid_body_starts_where_it_was_led():
+    """The hand has moved since the last frame: the copy starts at where it led then, too."""
+    world, ball = led_ball()
+    world.run(0.3)
+    world.find("hand").translate((0.0, 0.0, 0.1))
+    saved, futures = world.save(), world.imagine(2)
+    world.run(0.2)
+    futures.run(0.2)
+    expected = ball.vertices
+    np.testing.assert_array_equal(futures.find("ball").vertices, np.repeat(expected[None], 2, axis=0))
+    world.restore(saved)
+    world.run(0.2)
+    np.testing.assert_array_equal(ball.vertices, expected)

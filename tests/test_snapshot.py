@@ -136,13 +136,13 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 2 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 3 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=3)
+    variant("newer.npz", format=4)
     variant("strange.npz", world={"type": "Path", "fields": {}})
     variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
     variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))

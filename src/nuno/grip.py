@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno import quaternion as quat
-from nuno.coordinates import apply, invert
+from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import chosen_points
@@ -65,6 +65,8 @@ class Grip:
         self._spec: Any = spec
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
         self._offsets = offsets
+        # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame
+        self._led: tuple[float, Pose, Pose] | None = None
         self._world: Simulation | None = None
 
     def __repr__(self) -> str:
@@ -137,6 +139,30 @@ class Grip:
         # The keys become the grip's own, so that the next run starts from where this one led.
         self._spec = GripSpec(**{**self._spec.__dict__, **keys})
         return self._spec
+
+    def _lead(self, time: float, worlds: int) -> tuple[Pose, Pose]:
+        """Return from where to where a static leader takes a held rigid body in the frame from ``time`` [s] on.
+
+        It starts where the body was led last, also where the leader has jumped since.
+        """
+        assert self.target is not None and self._world is not None
+        schedule = self._world._schedule
+        way = None if schedule is None else schedule.in_frame(self.target.key, time)
+        start, end = (self.target._pose(),) * 2 if way is None else way
+
+        def held(leader: Pose) -> Pose:
+            place, turn = compose(leader, self._offsets)
+            return np.broadcast_to(place, (worlds, 3)), np.broadcast_to(turn, (worlds, 4))
+
+        goal = held(end)
+        if self._led is None:
+            before = held(start)
+        elif self._led[0] == time:  # a frame that it goes through twice starts in the same place
+            before = self._led[1]
+        else:
+            before = self._led[2]
+        self._led = time, before, goal
+        return before, goal
 
 
 def make_grip(

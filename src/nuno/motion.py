@@ -127,6 +127,22 @@ class Schedule:
     alone: dict[str, Pose]
     convoys: tuple[tuple[tuple[str, ...], np.ndarray, np.ndarray], ...] = ()
 
+    def in_frame(self, key: str, time: float) -> tuple[Pose, Pose] | None:
+        """Return where a body is at the start and at the end of the frame that starts at ``time`` [s].
+
+        None of a body that is not led, or where the schedule is over.
+        """
+        k = 2 * int(np.argmin(np.abs(self.times[::2] - time)))
+        if key not in self.poses or k + 2 >= len(self.times):
+            return None
+        places, turns = self.poses[key]
+        # what stands still has one pose for all instants
+        start, end = (
+            (places[..., min(at, places.shape[-2] - 1), :], turns[..., min(at, turns.shape[-2] - 1), :])
+            for at in (k, k + 2)
+        )
+        return start, end
+
     @cached_property
     def poses(self) -> dict[str, Pose]:
         """Of all bodies, by key, as in ``alone``."""
