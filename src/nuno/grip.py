@@ -110,6 +110,7 @@ class Grip:
         world = self._world
         if world is not None:
             with world.lock:
+                world._check_between_frames("release")
                 if self._world is not None:
                     world._drop_grip(self)
 
