@@ -280,3 +280,46 @@ def test_a_copy_of_a_held_rigid_body_starts_where_it_was_led():
     world.restore(saved)
     world.run(0.2)
     np.testing.assert_array_equal(ball.vertices, expected)
+
+
+def test_a_leader_that_becomes_dynamic_goes_on_holding():
+    """A static box holds a ball and a cloth's corner; attached, it bears them, and nothing jumps: all rest.
+
+    The ball was flung 0.5 m away, for its place in the leader's frame was taken for one in the world.
+    """
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    hand = world.add(nuno.box((0.1, 0.1, 0.1), name="hand", position=(1.0, 0.0, 0.0)))
+    ball = world.add(nuno.sphere(0.05, name="ball", position=(1.5, 0.0, 0.0)))
+    rag = world.add(nuno.sheet((0.2, 0.2), (4, 4), name="rag", position=(0.8, 0.0, 0.2)))
+    world.attach(ball)
+    world.attach(rag)
+    world.grip(ball, to=hand)
+    world.grip(rag, [0, 4], to=hand)
+    world.run(0.1)
+    world.attach(hand)
+    before, held = [body.vertices for body in (hand, ball, rag)], hand.to_local(rag.vertices[[0, 4]])
+    world.run(0.2)
+    for body, vertices in zip((hand, ball, rag), before, strict=True):
+        np.testing.assert_allclose(body.vertices, vertices, atol=2e-5)  # what rounding moves
+    world.push(hand, (0.0, 5.0, 0.0), duration=0.1)
+    world.run(0.2)
+    np.testing.assert_allclose(
+        hand.to_local(ball.vertices).mean(axis=0), (0.5, 0.0, 0.0), atol=1e-3
+    )  # the two turn together
+    np.testing.assert_allclose(hand.to_local(rag.vertices[[0, 4]]), held, atol=1e-3)
+    assert hand.position[1] > 0.01
+
+
+def test_a_leader_of_a_rigid_body_cannot_become_cloth():
+    """A frame that deforms holds no rigid body: refused by name, and all stays as it is."""
+    world = nuno.World(device="cpu")
+    tray = world.add(nuno.sheet((0.2, 0.2), (4, 4), name="tray", position=(0.0, 0.0, 0.5)))
+    cup = world.add(nuno.box((0.05, 0.05, 0.05), name="cup", position=(0.0, 0.0, 0.6)))
+    world.attach(cup)
+    world.grip(cup, to=tray)
+    with pytest.raises(nuno.BodyStateError, match="'cup', which is rigid"):
+        world.attach(tray)
+    assert not tray.is_dynamic
+    world.attach(tray, nuno.Rigid(mass=0.1))
+    world.run(0.1)
+    np.testing.assert_allclose(cup.position - tray.position, (0.0, 0.0, 0.1), atol=1e-3)

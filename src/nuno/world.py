@@ -13,12 +13,12 @@ from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.grip import Grip, make_grip
-from nuno.materials import Material
+from nuno.materials import Material, Rigid
 from nuno.motion import arrive, path_for
 from nuno.path import Path
 from nuno.running import Running
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
-from nuno.tie import check_weld
+from nuno.tie import check_leader, check_weld, tie_to_leader
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
@@ -116,7 +116,8 @@ class World(Running):
         ``Rigid`` may be given to all but planes: a cloth or soft body then keeps the shape that it has now.
 
         Raises:
-            BodyStateError: it has dynamics already, or follows another frame.
+            BodyStateError: it has dynamics already, follows another frame or a path, or would deform while it holds a
+                rigid body.
             InvalidInputError: the shape has no such dynamics, or the material does not fit.
             MeshError: a rigid body without volume.
         """
@@ -130,8 +131,13 @@ class World(Running):
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
+            led = [grip for other in self._attached() for grip in other.grips if grip.target is own]
+            check_leader(own, not isinstance(chosen, Rigid), led)
             dynamics = start_dynamics(own, chosen, self)
             own._friction, own._dynamics = chosen.friction, dynamics
+            for grip in led:
+                tie_to_leader(grip, self.world_count)
+                grip.body._dynamics.grips_changed = True  # type: ignore[union-attr]
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
