@@ -263,3 +263,16 @@ def test_a_file_finds_a_mesh_that_was_looked_at(tmp_path):
     assert block.is_solid
     other.restore(tmp_path / "room.npz")
     assert other.bodies == (block,)
+
+
+def test_a_file_with_rules_for_a_body_that_was_removed(tmp_path):
+    """It raised KeyError when it was read; the rules hold again when the body comes back."""
+    world = nuno.World(device="cpu")
+    a, b = world.add(nuno.sphere(0.1, name="a")), world.add(nuno.sphere(0.1, name="b"))
+    world.set_friction(a, b, 0.9)
+    world.ignore_contact(a, b)
+    world.remove(b)
+    world.save(tmp_path / "one.npz")
+    world.restore(tmp_path / "one.npz")
+    world.add(b)
+    assert world._rules.friction == {frozenset((a.key, b.key)): 0.9} and len(world._rules.ignored) == 1

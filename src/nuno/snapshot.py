@@ -342,8 +342,9 @@ def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:
     """Let the rules speak of the bodies' own keys, where a file named a body of this process by another."""
     new = {key: body.key for key, body in bodies.items()}
     rules = world._rules
-    rules.friction = {frozenset(new[key] for key in pair): mu for pair, mu in rules.friction.items()}
-    rules.ignored = {frozenset(new[key] for key in pair) for pair in rules.ignored}
+    # rules also speak of bodies that were removed, and may come back
+    rules.friction = {frozenset(new.get(key, key) for key in pair): mu for pair, mu in rules.friction.items()}
+    rules.ignored = {frozenset(new.get(key, key) for key in pair) for pair in rules.ignored}
 
 
 def _mapped_lead(led: tuple[float, Pose, Pose] | None, batched: Any) -> tuple[float, Pose, Pose] | None:
