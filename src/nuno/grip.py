@@ -147,9 +147,11 @@ class Grip:
         It starts where the body was led last, also where the leader has jumped since.
         """
         assert self.target is not None and self._world is not None
-        schedule = self._world._schedule
-        way = None if schedule is None else schedule.in_frame(self.target.key, time)
-        start, end = (self.target._pose(),) * 2 if way is None else way
+        schedule, start = self._world._schedule, self.target._pose()
+        end = start
+        k = None if schedule is None else schedule.frame_at(time)
+        if schedule is not None and k is not None and self.target.key in schedule.poses:
+            start, end = schedule.in_frame(self.target.key, k)
 
         def held(leader: Pose) -> Pose:
             place, turn = compose(leader, self._offsets)

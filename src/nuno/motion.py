@@ -127,14 +127,13 @@ class Schedule:
     alone: dict[str, Pose]
     convoys: tuple[tuple[tuple[str, ...], np.ndarray, np.ndarray], ...] = ()
 
-    def in_frame(self, key: str, time: float) -> tuple[Pose, Pose] | None:
-        """Return where a body is at the start and at the end of the frame that starts at ``time`` [s].
-
-        None of a body that is not led, or where the schedule is over.
-        """
+    def frame_at(self, time: float) -> int | None:
+        """Return which of ``times`` is the start of the frame at ``time`` [s]; None where the schedule is over."""
         k = 2 * int(np.argmin(np.abs(self.times[::2] - time)))
-        if key not in self.poses or k + 2 >= len(self.times):
-            return None
+        return k if k + 2 < len(self.times) else None
+
+    def in_frame(self, key: str, k: int) -> tuple[Pose, Pose]:
+        """Return where a body is at the start and at the end of the frame that `frame_at` gave."""
         places, turns = self.poses[key]
         # what stands still has one pose for all instants
         start, end = (

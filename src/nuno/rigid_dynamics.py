@@ -106,11 +106,10 @@ class RigidScene:
         schedule = world._schedule
         if schedule is None:
             return []
-        slots = []
+        k, slots = schedule.frame_at(time), []
         for key in schedule.poses:
-            way = schedule.in_frame(key, time) if key in self.static else None
-            if way is not None:
-                slot, (start, end) = self.static[key].slot, way
+            if key in self.static and k is not None:
+                slot, (start, end) = self.static[key].slot, schedule.in_frame(key, k)
                 self.static[key].where = None
                 self.solver.set_pose(slot, *start)
                 turn = quat.multiply(end[1], quat.inverse(start[1]))
@@ -130,11 +129,15 @@ class RigidScene:
 
     def load(self, saved: dict[tuple[str, str], Any]) -> None:
         """Go back to what `save` returned, in the room that there is now."""
-        solver = self.solver
+        solver, longer = self.solver, False
         for (owner, name), array in saved.items():
             own = getattr(getattr(solver, owner), name)
             if own.size == array.size:
                 wp.copy(own, array)
+            else:
+                longer = True
+        if longer:
+            solver._list_anew()
 
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""

@@ -93,10 +93,12 @@ def scene_for(snapshot: Snapshot, bodies: Mapping[str, Body], world: Simulation)
 
     scene = RigidScene(world, layout.origin)
     for place in layout.places:
+        # a file may name a body of this process by another key
+        key = bodies[place.key].key if place.key in bodies else place.key
         if place.role == STALE:
-            scene.keep_stale(place.key, place.slot, place.rows)
+            scene.keep_stale(key, place.slot, place.rows)
         else:
-            scene.kept[bodies[place.key].key] = (place.slot, place.rows)
+            scene.kept[key] = (place.slot, place.rows)
     return scene
 
 
