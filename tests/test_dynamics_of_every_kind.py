@@ -171,3 +171,26 @@ def test_what_happens_far_away_changes_no_bit():
         return {name: world.find(name).vertices for name in ("cloth", "box", "cube")}
 
     assert_same(far(False), far(True))
+
+
+@pytest.mark.parametrize("after", [0.1, 0.05])
+@pytest.mark.parametrize("kind", ["rigid", "cloth"])
+def test_a_timed_push_ends_in_copies(kind, after):
+    """1 N for 0.1 s on 1 kg: 0.1 m/s, and x = 0.005 + 0.1 t; it acted for ever after restore or imagine."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    if kind == "rigid":
+        body = world.add(nuno.box((0.1, 0.1, 0.1), name="body"))
+        world.attach(body, nuno.Rigid(mass=1.0))
+    else:
+        body = world.add(nuno.sheet((1.0, 1.0), (2, 2), name="body"))
+        world.attach(body, nuno.Cloth(area_density=1.0, air_drag=0.0))
+    world.push(body, (1.0, 0.0, 0.0), duration=0.1)
+    world.run(after)
+    saved, futures = world.save(), world.imagine(2)
+    for _ in range(2):
+        world.run(1.1 - after)
+        assert body.vertices[:, 0].mean() == pytest.approx(0.105, abs=5e-4)  # symplectic Euler: 0.1 dt a T / 2 more
+        world.restore(saved)
+    futures.run(1.1 - after)
+    world.run(1.1 - after)
+    np.testing.assert_array_equal(futures.find("body").vertices, np.repeat(body.vertices[None], 2, axis=0))

@@ -53,3 +53,63 @@ def test_a_world_in_the_background_tells_no_frames():
     with pytest.raises(nuno.BodyStateError, match="background"):
         world.run(0.1, each_frame=lambda time: None)
     world.stop()
+
+
+CALLS = {
+    "run": lambda world, cube, grip, saved: world.run(0.1),
+    "step": lambda world, cube, grip, saved: world.step(),
+    "trace": lambda world, cube, grip, saved: world.trace(cube, [1.0]),
+    "start": lambda world, cube, grip, saved: world.start(),
+    "attach": lambda world, cube, grip, saved: world.attach("box"),
+    "detach": lambda world, cube, grip, saved: world.detach(cube),
+    "add": lambda world, cube, grip, saved: world.add(nuno.sphere(0.1)),
+    "remove": lambda world, cube, grip, saved: world.remove(cube),
+    "move": lambda world, cube, grip, saved: world.move("box", None),
+    "set_material": lambda world, cube, grip, saved: world.set_material(cube, nuno.Soft(density=500.0)),
+    "grip": lambda world, cube, grip, saved: world.grip(cube, 0, to=(0.0, 0.0, 1.0)),
+    "release": lambda world, cube, grip, saved: grip.release(),
+    "push": lambda world, cube, grip, saved: world.push(cube, (1.0, 0.0, 0.0), duration=0.1),
+    "set_friction": lambda world, cube, grip, saved: world.set_friction(cube, "plate", 0.1),
+    "ignore_contact": lambda world, cube, grip, saved: world.ignore_contact(cube, "plate"),
+    "pose": lambda world, cube, grip, saved: world.find("box").translate((0.0, 0.0, 0.1)),
+    "friction": lambda world, cube, grip, saved: setattr(cube, "friction", 0.1),
+    "save": lambda world, cube, grip, saved: world.save(),
+    "restore": lambda world, cube, grip, saved: world.restore(saved),
+    "imagine": lambda world, cube, grip, saved: world.imagine(2),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_what_changes_the_world_is_refused_in_each_frame(call):
+    """The clock is behind the bodies there: a named error; the run goes on as if the call had not been made."""
+    world, plain = falling(), falling()
+    for each in (world, plain):
+        each.add(nuno.box((0.1, 0.1, 0.1), name="box", position=(5.0, 0.0, 0.5)))
+        each.grip("cube", 26, to=(0.05, 0.05, 0.11), compliance=1.0)
+    cube, saved = world.find("cube"), world.save()
+    grip, told = cube._dynamics.grips[0], []
+
+    def look(time):
+        with pytest.raises(nuno.BodyStateError, match=f"{call}.* each_frame"):
+            CALLS[call](world, cube, grip, saved)
+        told.append(time)
+
+    world.run(0.1, each_frame=look)
+    plain.run(0.1)
+    assert len(told) == 6 and world.time == plain.time
+    np.testing.assert_array_equal(cube.vertices, plain.find("cube").vertices)
+    world.step()  # after the run all is as ever
+
+
+def test_each_frame_reads():
+    """Vertices, velocities, poses, wrenches and the state on the device are there in each frame."""
+    world = falling()
+    grip = world.grip("cube", 26, to=(0.05, 0.05, 0.11), compliance=1.0)
+    cube, seen = world.find("cube"), []
+
+    def look(time):
+        assert np.isfinite(grip.wrench[0]).all() and world.state(cube)["positions"].shape == (1, 27)
+        seen.append(cube.position[2])
+
+    world.run(0.1, each_frame=look)
+    assert len(set(seen)) == 6 and world.time == pytest.approx(0.1)

@@ -136,13 +136,13 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 2 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 3 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=3)
+    variant("newer.npz", format=4)
     variant("strange.npz", world={"type": "Path", "fields": {}})
     variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
     variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))
@@ -263,3 +263,16 @@ def test_a_file_finds_a_mesh_that_was_looked_at(tmp_path):
     assert block.is_solid
     other.restore(tmp_path / "room.npz")
     assert other.bodies == (block,)
+
+
+def test_a_file_with_rules_for_a_body_that_was_removed(tmp_path):
+    """It raised KeyError when it was read; the rules hold again when the body comes back."""
+    world = nuno.World(device="cpu")
+    a, b = world.add(nuno.sphere(0.1, name="a")), world.add(nuno.sphere(0.1, name="b"))
+    world.set_friction(a, b, 0.9)
+    world.ignore_contact(a, b)
+    world.remove(b)
+    world.save(tmp_path / "one.npz")
+    world.restore(tmp_path / "one.npz")
+    world.add(b)
+    assert world._rules.friction == {frozenset((a.key, b.key)): 0.9} and len(world._rules.ignored) == 1

@@ -361,3 +361,30 @@ def test_cloth_mesh_with_its_own_rest_shape():
     np.testing.assert_array_equal(body.shape.rest, rest)
     world.run(0.1)
     world.detach(body)
+
+
+class Mill:
+    """A driver that does nothing."""
+
+    def __repr__(self):
+        return "<mill>"
+
+    def begin_frame(self, start, end):
+        """Nothing."""
+
+    end_frame = cancel_frame = load = lambda self, *_: None
+
+    def save(self):
+        """Nothing."""
+
+
+def test_imagined_worlds_are_without_drivers_and_say_so(caplog):
+    """Once of each driver, by name, and what becomes of what it moves; never of a world that has none."""
+    world = nuno.World(device="cpu")
+    world.imagine(2)
+    assert not caplog.messages
+    world.drivers.append(Mill())
+    for _ in range(2):
+        assert not world.imagine(2).drivers
+    assert len(caplog.messages) == 1
+    assert "<mill>" in caplog.messages[0] and "stands still" in caplog.messages[0]

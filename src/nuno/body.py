@@ -263,6 +263,7 @@ class Body(Quantities, Coordinates):
     def _change(self, attribute: str, value: Any) -> None:
         with self._guard():
             if self._world is not None:
+                self._world._check_between_frames(f"a change of {attribute.strip('_')}")
                 self._world._check_worlds(attribute.strip("_"), np.shape(value))
             setattr(self, attribute, value)
             if self._world is not None:
@@ -297,6 +298,7 @@ class Body(Quantities, Coordinates):
     def _place(self, position: np.ndarray, quaternion: np.ndarray) -> None:
         with self._guard():
             if self._world is not None:
+                self._world._check_between_frames("a change of the pose")
                 self._world._check_worlds("position", position.shape[:-1])
                 self._world._check_worlds("quaternion", quaternion.shape[:-1])
             if self._dynamics is None:

@@ -11,7 +11,6 @@ from nuno import quaternion as quat
 from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
-from nuno.coordinates import compose
 from nuno.dynamics import ParticleDynamics, touches_itself
 from nuno.grip import Grip
 from nuno.rigid_dynamics import RigidDynamics
@@ -313,15 +312,9 @@ class CoupledBodies:
             spec: HoldSpec = grip._spec
             own: Any = grip.body._dynamics
             if grip._offsets is not None and grip.target is not None:
-                # a static leader: from where it led last to where it is now
-                goal = [np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(grip.target._pose(), grip._offsets)]
-                now, before, last = getattr(grip, "_led", (-np.inf, goal, goal))
-                if now != time:  # a frame that it goes through twice starts in the same place
-                    before = last
-                grip._led = (time, before, goal)  # type: ignore[attr-defined]
-                poses: list[Any] = [before, goal]
+                poses: Any = grip._lead(time, worlds)
             else:
-                poses = [spec.at(time), spec.at(time + duration)]
+                poses = spec.at(time), spec.at(time + duration)
             leads = int(holds.leader.numpy()[k]) >= 0
             for end, (p, q) in enumerate(poses):
                 centre = quat.rotate(q, np.broadcast_to(own.centre, p.shape))

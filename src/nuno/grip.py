@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno import quaternion as quat
-from nuno.coordinates import apply, invert
+from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import chosen_points
@@ -65,6 +65,8 @@ class Grip:
         self._spec: Any = spec
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
         self._offsets = offsets
+        # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame
+        self._led: tuple[float, Pose, Pose] | None = None
         self._world: Simulation | None = None
 
     def __repr__(self) -> str:
@@ -108,6 +110,7 @@ class Grip:
         world = self._world
         if world is not None:
             with world.lock:
+                world._check_between_frames("release")
                 if self._world is not None:
                     world._drop_grip(self)
 
@@ -137,6 +140,32 @@ class Grip:
         # The keys become the grip's own, so that the next run starts from where this one led.
         self._spec = GripSpec(**{**self._spec.__dict__, **keys})
         return self._spec
+
+    def _lead(self, time: float, worlds: int) -> tuple[Pose, Pose]:
+        """Return from where to where a static leader takes a held rigid body in the frame from ``time`` [s] on.
+
+        It starts where the body was led last, also where the leader has jumped since.
+        """
+        assert self.target is not None and self._world is not None
+        schedule, start = self._world._schedule, self.target._pose()
+        end = start
+        k = None if schedule is None else schedule.frame_at(time)
+        if schedule is not None and k is not None and self.target.key in schedule.poses:
+            start, end = schedule.in_frame(self.target.key, k)
+
+        def held(leader: Pose) -> Pose:
+            place, turn = compose(leader, self._offsets)
+            return np.broadcast_to(place, (worlds, 3)), np.broadcast_to(turn, (worlds, 4))
+
+        goal = held(end)
+        if self._led is None:
+            before = held(start)
+        elif self._led[0] == time:  # a frame that it goes through twice starts in the same place
+            before = self._led[1]
+        else:
+            before = self._led[2]
+        self._led = time, before, goal
+        return before, goal
 
 
 def make_grip(

@@ -127,6 +127,21 @@ class Schedule:
     alone: dict[str, Pose]
     convoys: tuple[tuple[tuple[str, ...], np.ndarray, np.ndarray], ...] = ()
 
+    def frame_at(self, time: float) -> int | None:
+        """Return which of ``times`` is the start of the frame at ``time`` [s]; None where the schedule is over."""
+        k = 2 * int(np.argmin(np.abs(self.times[::2] - time)))
+        return k if k + 2 < len(self.times) else None
+
+    def in_frame(self, key: str, k: int) -> tuple[Pose, Pose]:
+        """Return where a body is at the start and at the end of the frame that `frame_at` gave."""
+        places, turns = self.poses[key]
+        # what stands still has one pose for all instants
+        start, end = (
+            (places[..., min(at, places.shape[-2] - 1), :], turns[..., min(at, turns.shape[-2] - 1), :])
+            for at in (k, k + 2)
+        )
+        return start, end
+
     @cached_property
     def poses(self) -> dict[str, Pose]:
         """Of all bodies, by key, as in ``alone``."""

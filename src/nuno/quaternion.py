@@ -10,10 +10,12 @@ from nuno.errors import InvalidInputError
 from nuno.validation import finite_array
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+ROUNDING = 4.0 * np.finfo(float).eps
+"""How far from 1 the length of a quaternion may be that was divided by its length."""
 
 
 def unit(name: str, value: Any, *shapes: tuple[int | str, ...]) -> np.ndarray:
-    """Return ``value`` as unit quaternions of one of the given shapes.
+    """Return ``value`` as unit quaternions of one of the given shapes; those of length 1 stay as they are, to the bit.
 
     Raises:
         InvalidInputError: another shape, not finite, or of length zero.
@@ -22,7 +24,7 @@ def unit(name: str, value: Any, *shapes: tuple[int | str, ...]) -> np.ndarray:
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     if (length < 1e-9).any():
         raise InvalidInputError(f"{name} must not be of length zero; no rotation is (1, 0, 0, 0)")
-    return q / length
+    return np.where(np.abs(length - 1.0) <= ROUNDING, q, q / length)
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:

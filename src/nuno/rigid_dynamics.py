@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,30 +16,70 @@ from nuno.given_velocity import GivenVelocity
 from nuno.mass_properties import mass_properties
 from nuno.materials import Rigid
 from nuno.scene.rigid_shape import RigidPart, rigid_shape
-from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED
+from nuno.solver.rigid_arrays import SAVED
+from nuno.solver.rigid_saving import LASTING, LISTING
 from nuno.solver.rigid_solver import RigidSolver
 
 if TYPE_CHECKING:
     from nuno.body import Body
     from nuno.dynamics import Push
     from nuno.simulation import Simulation
+    from nuno.snapshot import BodyRecord
+
+
+@dataclass
+class StaticPlace:
+    """A static body as the rigid solver was told of it.
+
+    Attributes:
+        slot: Its slot.
+        what: Shape, friction, groups and thickness; None of a body that the solver is yet to forget.
+        deformed: Its vertices (worlds, n, 3) [m] where it was deformed, and the pose that they belong to.
+        where: Its pose, as bytes; None where the solver has moved it since.
+    """
+
+    slot: int
+    what: tuple[Any, ...] | None
+    deformed: tuple[np.ndarray, Pose] | None
+    where: tuple[bytes, bytes] | None
+
+    def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
+        """Return whether this is what a body is, or was when it was saved, but for where it is."""
+        return self.what == _what(body) and _same_shape(self.deformed, deformed)
 
 
 class RigidScene:
-    """The rigid solver of a world, and the static bodies that it has been told of."""
+    """The rigid solver of a world, and the static bodies that it has been told of.
+
+    Attributes:
+        solver: The solver.
+        settings: What of the world it was made for.
+        static: The static bodies, by key.
+        kept: By key, the slot and rows that are kept for bodies that are still to come.
+    """
 
     def __init__(self, world: Simulation, origin: np.ndarray) -> None:
         self.solver = RigidSolver(
             world.world_count, device=world.device, gravity=world.gravity, frame_rate=world.frame_rate,
             substeps=world.substeps, origin=np.round(np.asarray(origin) * 1024.0) / 1024.0,
         )  # fmt: skip
-        self.settings = (world.world_count, world.device, world.gravity, world.frame_rate, world.substeps)
-        self._static: dict[str, tuple[int, tuple[Any, ...], tuple[bytes, ...]]] = {}
+        self.settings = self.settings_of(world)
+        self.static: dict[str, StaticPlace] = {}
+        self.kept: dict[str, tuple[int, tuple[int, ...]]] = {}
         self._version = -1
+
+    @staticmethod
+    def settings_of(world: Simulation) -> tuple[Any, ...]:
+        """Return what of a world a scene is made for."""
+        return world.world_count, world.device, world.gravity, world.frame_rate, world.substeps
+
+    def is_current(self, world: Simulation) -> bool:
+        """Return whether the solver has been told of all that has changed."""
+        return self._version == world._collider_version
 
     def bring(self, world: Simulation) -> None:
         """Tell the solver what changed among static bodies, and which pairs are exceptions."""
-        if self._version == world._collider_version:
+        if self.is_current(world):
             return
         slots: dict[str, int] = {}
         seen = set()
@@ -49,9 +90,9 @@ class RigidScene:
                     self.solver.set_groups(body._dynamics.slot, body.group, body.collides_with)
                 continue
             seen.add(body.key)
-            slots[body.key] = self._bring_static(body)
-        for key in [key for key in self._static if key not in seen]:
-            self.solver.remove(self._static.pop(key)[0])
+            slots[body.key] = self.bring_static(body)
+        for key in [key for key in self.static if key not in seen]:
+            self.solver.remove(self.static.pop(key).slot)
         rules = world._rules
         exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored)}
         pairs: dict[tuple[int, int], Any] = {}
@@ -67,15 +108,11 @@ class RigidScene:
         schedule = world._schedule
         if schedule is None:
             return []
-        k = 2 * int(np.argmin(np.abs(schedule.times[::2] - time)))
-        slots = []
-        for key, (places, turns) in schedule.poses.items():
-            if key in self._static and k + 2 < len(schedule.times):
-                slot = self._static[key][0]
-                start, end = (
-                    (places[..., min(at, places.shape[-2] - 1), :], turns[..., min(at, turns.shape[-2] - 1), :])
-                    for at in (k, k + 2)
-                )
+        k, slots = schedule.frame_at(time), []
+        for key in schedule.poses:
+            if key in self.static and k is not None:
+                slot, (start, end) = self.static[key].slot, schedule.in_frame(key, k)
+                self.static[key].where = None
                 self.solver.set_pose(slot, *start)
                 turn = quat.multiply(end[1], quat.inverse(start[1]))
                 turn = np.where(turn[..., :1] < 0.0, -turn, turn)
@@ -89,47 +126,53 @@ class RigidScene:
     def save(self) -> dict[tuple[str, str], Any]:
         """Return copies of the arrays of all bodies and contacts, to go back to."""
         solver = self.solver
-        owners = {"state": SAVED, "manifolds": (*ENTRY, *POINT, "notes")}
+        owners = {"state": SAVED, "manifolds": (*LASTING, *LISTING)}
         return {(o, name): wp.clone(getattr(getattr(solver, o), name)) for o, names in owners.items() for name in names}
 
     def load(self, saved: dict[tuple[str, str], Any]) -> None:
         """Go back to what `save` returned, in the room that there is now."""
-        solver = self.solver
+        solver, longer = self.solver, False
         for (owner, name), array in saved.items():
             own = getattr(getattr(solver, owner), name)
             if own.size == array.size:
                 wp.copy(own, array)
+            else:
+                longer = True
+        if longer:
+            solver._list_anew()
 
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""
         slots = []
         for key, body in world._bodies.items():
-            own, static = body._dynamics, self._static.get(key)
-            slots.append(own.slot if isinstance(own, RigidDynamics) else -1 if static is None else static[0])
+            own, static = body._dynamics, self.static.get(key)
+            slots.append(own.slot if isinstance(own, RigidDynamics) else -1 if static is None else static.slot)
         return slots
 
-    def _bring_static(self, body: Body) -> int:
-        """The slot of a static body, as it is now."""
+    def bring_static(self, body: Body) -> int:
+        """Tell the solver of a static body as it is now; return its slot."""
         pose = body._pose()
         where = (pose[0].tobytes(), pose[1].tobytes())
-        what = (
-            body.shape, id(body._deformed), np.asarray(body.friction).tobytes(), body.group, body.collides_with,
-            body.thickness,
-        )  # fmt: skip
-        known = self._static.get(body.key)
-        if known is not None and known[1] == what:
-            if known[2] != where:
-                self.solver.set_pose(known[0], *pose)
-                self._static[body.key] = (known[0], what, where)
-            return known[0]
+        known = self.static.get(body.key)
+        if known is not None and known.is_of(body, body._deformed):
+            if known.where != where:
+                self.solver.set_pose(known.slot, *pose)
+                known.where = where
+            return known.slot
         if known is not None:
-            self.solver.remove(known[0])
+            self.solver.remove(known.slot)
+        slot, rows = self.kept.pop(body.key, (None, None))
         slot = self.solver.add(
             parts_of(body, moves=False), position=pose[0], quaternion=pose[1], friction=body.friction,
-            group=body.group, collides_with=body.collides_with,
+            group=body.group, collides_with=body.collides_with, slot=slot, rows=rows,
         )  # fmt: skip
-        self._static[body.key] = (slot, what, where)
+        self.static[body.key] = StaticPlace(slot, _what(body), body._deformed, where)
         return slot
+
+    def keep_stale(self, key: str, slot: int, rows: tuple[int, ...]) -> None:
+        """Take the place of a static body that has gone or changed, until the solver is told so."""
+        self.solver.reserve(slot, rows)
+        self.static[key] = StaticPlace(slot, None, None, None)
 
 
 class RigidDynamics(Dynamics):
@@ -160,19 +203,21 @@ class RigidDynamics(Dynamics):
         check_material(body.shape, material, world.world_count)
         super().__init__(material, friction, world)
         self.parts = parts_of(body, moves=True)
+        self.deformed, self.thickness = body._deformed, body.thickness
         values = material.resolved(world.world_count)
         self.mass, self.inertia, self.centre = _mass_of(body, material, values["density"][:, 0])
         place, turn = body._pose()
         self.scene = world._rigid_scene(place)
         self.solver = self.scene.solver
+        slot, rows = self.scene.kept.pop(body.key, (None, None))
         self.slot = self.solver.add(
             self.parts, position=place + quat.rotate(turn, self.centre), quaternion=turn, mass=self.mass,
             inertia=self.inertia, centre=self.centre, friction=friction, restitution=values["restitution"][:, 0],
-            air_drag=values["air_drag"][:, 0], group=body.group, collides_with=body.collides_with,
+            air_drag=values["air_drag"][:, 0], group=body.group, collides_with=body.collides_with, slot=slot, rows=rows,
         )  # fmt: skip
         self.radius = float(self.solver.rules.radius.numpy()[self.slot])  # [m], around the centre of mass
         self._world = world
-        self._pushing: tuple[Push, ...] = ()
+        self._pushing: tuple[Push, ...] | None = ()  # whose forces the solver has; None: those of a loaded state
         if state is not None:
             self.load_state(state)
 
@@ -242,7 +287,11 @@ class RigidDynamics(Dynamics):
         slots = self.scene.slots_of(self._world)
         partner = _replaced(state["partner_slot"], dict(enumerate(slots)))
         self.solver.load_state(self.slot, {**state, "partner_slot": partner})
-        self._pushing = ()
+        self._pushing = None
+
+    def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
+        """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
+        return self.thickness == thickness and _same_shape(self.deformed, deformed)
 
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether pose and velocities are finite."""
@@ -259,13 +308,14 @@ def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
     from nuno.shape import Box, Capsule, Cylinder, Plane, Sphere
 
     plain = isinstance(body.shape, Box | Sphere | Capsule | Cylinder | Plane | Compound)
-    vertices = None if plain and body._deformed is None else apply(invert(body._pose()), body._vertices())
+    # the same bits wherever the body is
+    vertices = None if plain and body._deformed is None else body.local_vertices()
     return rigid_shape(body.shape, moves=moves, thickness=body.thickness, vertices=vertices, is_solid=body.is_solid)
 
 
 def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
-    vertices = apply(invert(body._pose()), body._vertices()) if body._deformed is not None else None
+    vertices = body.local_vertices() if body._deformed is not None else None
     if vertices is not None and vertices.ndim == 3:
         vertices = vertices[0]
     unit = mass_properties(body.shape, thickness=body.thickness, vertices=vertices)
@@ -277,6 +327,18 @@ def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarr
     if material.inertia is not None:
         inertia = np.broadcast_to(material.inertia, inertia.shape)
     return mass, inertia, unit.centre
+
+
+def _what(body: Body | BodyRecord) -> tuple[Any, ...]:
+    """What the solver takes of a static body, besides its pose and how it was deformed."""
+    return body.shape, np.asarray(body.friction).tobytes(), body.group, body.collides_with, body.thickness
+
+
+def _same_shape(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pose] | None) -> bool:
+    """Whether two bodies were deformed in the same way: the very same vertices, and the pose that they belong to."""
+    if a is None or b is None:
+        return a is b
+    return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))
 
 
 def _replaced(numbers: np.ndarray, by: dict[int, int]) -> np.ndarray:

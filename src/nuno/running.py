@@ -40,7 +40,9 @@ class Running(Simulation):
 
     def step(self) -> None:
         """Advance by one frame."""
-        self.run(1.0 / self.frame_rate)
+        with self._change("step"):
+            frame = 1.0 / self.frame_rate
+        self.run(frame)
 
     def run(
         self, seconds: float, progress: bool | None = None, *, each_frame: Callable[[float], None] | None = None
@@ -50,15 +52,16 @@ class Running(Simulation):
         Args:
             seconds: How long [s] of simulated time.
             progress: Show a progress bar; None shows one in a terminal after two seconds.
-            each_frame: Called with the time [s] at the end of each frame. What is dynamic is as it is then; ``time``
-                and the bodies that follow paths go on some frames at a time only.
+            each_frame: Called with the time [s] at the end of each frame, to read the world. What is dynamic is as it
+                is then; ``time`` and the bodies that follow paths go on some frames at a time only.
 
         Raises:
-            BodyStateError: ``each_frame`` is given for a world that runs in the background.
+            BodyStateError: ``each_frame`` is given for a world that runs in the background, or this or another call
+                that changes the world comes from there.
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
         span = number("seconds", seconds, low=0.0)
-        with self._call():
+        with self._change("run"):
             begin = self._time
         if self.is_running:
             if each_frame is not None:
@@ -94,7 +97,7 @@ class Running(Simulation):
             InvalidInputError: times that do not increase, or that are over.
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
-        with self._call():
+        with self._change("trace"):
             own = self._own(body)
             if self.is_running:
                 raise BodyStateError("a world that runs in the background is not traced; stop it first")
@@ -114,7 +117,7 @@ class Running(Simulation):
         Raises:
             BodyStateError: the world runs already.
         """
-        with self._call():
+        with self._change("start"):
             if self.is_running:
                 raise BodyStateError("the world runs in the background already")
             factor = math.inf if real_time_factor == math.inf else real_time_factor

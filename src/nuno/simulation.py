@@ -63,8 +63,10 @@ class Simulation:
         self._schedule: Schedule | None = None
         self._rests = False  # whether led bodies are where they were in the frame before
         self._told = 0.0  # [s], up to when the present run has told of itself
+        self._telling = False  # whether it tells of a frame just now
         self._resting: tuple[Any, ...] | None = None  # what led bodies followed when they were told to rest
         self.drivers: list[Driver] = []  # asked around every frame, such as a simulated robot
+        self._left_out: list[Driver] = []  # those of which it was said that imagined worlds are without them
         self._background: Background | None = None
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
@@ -95,6 +97,24 @@ class Simulation:
         with self.lock:
             self._raise_background_error()
             yield
+
+    @contextmanager
+    def _change(self, what: str) -> Iterator[None]:
+        """Hold the lock for a call that changes the world, or takes what it is as a whole.
+
+        Raises:
+            BodyStateError: the call comes from ``each_frame``, where the world's clock is behind its dynamic bodies.
+        """
+        with self._call():
+            self._check_between_frames(what)
+            yield
+
+    def _check_between_frames(self, what: str) -> None:
+        if self._telling:
+            raise BodyStateError(
+                f"{what} was called in each_frame, in the midst of a run; there a world can only be read: "
+                "run or step up to then, and call it after that"
+            )
 
     def _raise_background_error(self) -> None:
         background = self._background
@@ -338,7 +358,11 @@ class Simulation:
             if end > self._told + SOON:
                 if careful and self._make_room():
                     return False
-                look(end)
+                self._telling = True
+                try:
+                    look(end)
+                finally:
+                    self._telling = False
                 self._told = end
             now = end
         if stop - now > SOON:

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.body import Body
-from nuno.coordinates import compose, invert
+from nuno.coordinates import Pose, compose, invert
 from nuno.dynamics import Dynamics, Push, State, make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip, GripSpec
 from nuno.materials import Material
 from nuno.motion import CompanyPath, of_world
 from nuno.path import Path
+from nuno.rigid_layout import RigidLayout, bring_static, layout_of, scene_for, settle
 from nuno.shape import Shape
 from nuno.tie import HoldSpec, TieSpec, spread_spec
 
@@ -57,6 +58,14 @@ class BodyRecord:
     dynamics: DynamicsRecord | None
     path: Path | None = None  # that the body follows
 
+    @property
+    def deformation(self) -> tuple[np.ndarray, Pose] | None:
+        """What a deformed body's vertices are, and the pose that they belong to; None where it is not deformed."""
+        if self.deformed is None:
+            return None
+        assert self.deformed_position is not None and self.deformed_quaternion is not None
+        return self.deformed, (self.deformed_position, self.deformed_quaternion)
+
 
 @dataclass(frozen=True, eq=False)
 class GripRecord:
@@ -66,7 +75,8 @@ class GripRecord:
     body: str
     spec: GripSpec | TieSpec | HoldSpec
     target: str | None
-    offsets: np.ndarray | None
+    offsets: Any  # of points an array, of a rigid body a place and a turn, or None
+    led: tuple[float, Pose, Pose] | None = None  # see ``Grip``
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +93,7 @@ class Snapshot:
     grips: tuple[GripRecord, ...]
     pair_friction: tuple[tuple[str, str, Any], ...]
     ignored: tuple[tuple[str, str], ...]
+    rigid: RigidLayout | None = None
     from_file: bool = field(default=False)
     drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
 
@@ -135,16 +146,21 @@ class Snapshot:
         grips = [
             replace(
                 grip,
-                # of a held rigid body they are a place and a turn
                 offsets=tuple(map(batched, grip.offsets)) if isinstance(grip.offsets, tuple) else batched(grip.offsets),
                 spec=spread_spec(grip.spec, batched),
+                led=_mapped_lead(grip.led, batched),
             )
             for grip in self.grips
         ]
         friction = tuple((a, b, _plain(single(mu, 0))) for a, b, mu in self.pair_friction)
+        rigid = self.rigid
+        if rigid is not None:
+            listing = {name: batched(array) for name, array in rigid.listing.items()}
+            rigid = replace(rigid, origin=batched(rigid.origin), listing=listing)
         return replace(
-            self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count, drivers=()
-        )  # a driver moves the one world that it is in
+            self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count,
+            rigid=rigid, drivers=(),
+        )  # fmt: skip  # a driver moves the one world that it is in
 
 
 def capture(world: Simulation) -> Snapshot:
@@ -158,7 +174,8 @@ def capture(world: Simulation) -> Snapshot:
         bodies=tuple(_body_record(body, world) for body in world._bodies.values()),
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
-        ignored=tuple(ignored), drivers=tuple((driver, driver.save()) for driver in world.drivers),
+        ignored=tuple(ignored), rigid=layout_of(world),
+        drivers=tuple((driver, driver.save()) for driver in world.drivers),
     )  # fmt: skip
 
 
@@ -172,13 +189,16 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     same_settings = before[:3] == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
     world.gravity, world.frame_rate, world.substeps = snapshot.gravity, snapshot.frame_rate, snapshot.substeps
     world.world_count = snapshot.world_count
+    scene = world._rigid
     try:
+        world._rigid = scene_for(snapshot, bodies, world)
         made = {
             record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings)
             for record in snapshot.bodies if record.dynamics is not None
         }  # fmt: skip
     except BaseException:
         world.gravity, world.frame_rate, world.substeps, world.world_count = before
+        world._rigid = scene
         raise
     _take_apart(world, list(made.values()))
     world._time = snapshot.time
@@ -194,8 +214,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
         if record.dynamics is not None:
             body._dynamics = made[record.key]
             body._dynamics.pushes = list(record.dynamics.pushes)
-    world._colliders_changed()
-    world._bring_rigid()
+    bring_static(snapshot.rigid, bodies, world)
     for record in snapshot.bodies:
         if record.dynamics is not None:
             made[record.key].load_state(record.dynamics.state)
@@ -206,6 +225,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     if snapshot.from_file:
         _rename_keys(world, bodies)
     world._colliders_changed()
+    settle(snapshot.rigid, world)
     for driver, state in snapshot.drivers:
         if driver in world.drivers:
             driver.load(state)
@@ -230,7 +250,7 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
 
 def _grip_record(grip: Grip) -> GripRecord:
     target = None if grip.target is None else grip.target.key
-    return GripRecord(grip.key, grip.body.key, grip._spec, target, grip._offsets)
+    return GripRecord(grip.key, grip.body.key, grip._spec, target, grip._offsets, grip._led)
 
 
 def _known_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
@@ -266,10 +286,12 @@ def same_shape(a: Shape, b: Shape) -> bool:
 def _dynamics_for(
     record: BodyRecord, own: DynamicsRecord, body: Body, world: Simulation, same_settings: bool
 ) -> Dynamics:
-    current = body._dynamics
+    current: Any = body._dynamics
     if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
-        return current
+        if not current.is_rigid or current.scene is world._rigid:
+            return current
     as_recorded = Body(record.shape)
+    as_recorded.key = body.key
     _fill(as_recorded, record)
     return make_dynamics(as_recorded, own.material, own.state, own.friction, world)
 
@@ -303,10 +325,7 @@ def _fill(body: Body, record: BodyRecord) -> None:
     body._friction, body._thickness = record.friction, record.thickness
     body._group, body._collides_with = record.group, record.collides_with
     body._path = record.path
-    body._deformed = None
-    if record.deformed is not None:
-        assert record.deformed_position is not None and record.deformed_quaternion is not None
-        body._deformed = (record.deformed, (record.deformed_position, record.deformed_quaternion))
+    body._deformed = record.deformation
 
 
 def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation) -> None:
@@ -315,12 +334,8 @@ def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation
     if grip is None:
         grip = Grip(bodies[record.body], record.spec, target, record.offsets)
         grip.key = record.key
-    grip.body, grip.target, grip._spec, grip._offsets = (
-        bodies[record.body],
-        target,
-        record.spec,
-        record.offsets,
-    )
+    grip.body, grip.target, grip._spec = bodies[record.body], target, record.spec
+    grip._offsets, grip._led = record.offsets, record.led
     world._hold(grip)
 
 
@@ -328,8 +343,16 @@ def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:
     """Let the rules speak of the bodies' own keys, where a file named a body of this process by another."""
     new = {key: body.key for key, body in bodies.items()}
     rules = world._rules
-    rules.friction = {frozenset(new[key] for key in pair): mu for pair, mu in rules.friction.items()}
-    rules.ignored = {frozenset(new[key] for key in pair) for pair in rules.ignored}
+    # rules also speak of bodies that were removed, and may come back
+    rules.friction = {frozenset(new.get(key, key) for key in pair): mu for pair, mu in rules.friction.items()}
+    rules.ignored = {frozenset(new.get(key, key) for key in pair) for pair in rules.ignored}
+
+
+def _mapped_lead(led: tuple[float, Pose, Pose] | None, batched: Any) -> tuple[float, Pose, Pose] | None:
+    if led is None:
+        return None
+    time, start, end = led
+    return time, (batched(start[0]), batched(start[1])), (batched(end[0]), batched(end[1]))
 
 
 def _plain(value: Any) -> Any:

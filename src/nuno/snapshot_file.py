@@ -24,12 +24,15 @@ from nuno.errors import FileFormatError, NunoError
 from nuno.grip import GripSpec
 from nuno.materials import Cloth, Rigid, Soft
 from nuno.path import Path
+from nuno.rigid_layout import RigidLayout, RigidPlace
 from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
 from nuno.tie import HoldSpec, TieSpec
 from nuno.whole_file import replacing
 
-FORMAT = 2
-READABLE = (1, 2)  # 1 has no paths of bodies
+FORMAT = 3
+READABLE = (1, 2, FORMAT)  # 1 has no paths of bodies
+ORIGIN = 3
+"""The first format that says what the places of moving rigid bodies are relative to."""
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
 SHAPES = (
     shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule, shapes.Plane, shapes.Sheet,
@@ -39,8 +42,11 @@ SHAPES = (
 GRIPS = (GripSpec, TieSpec, HoldSpec)
 TYPES: dict[str, Any] = {
     kind.__name__: kind
-    for kind in (*SHAPES, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)
-}
+    for kind in (
+        *SHAPES, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord, GripRecord, RigidLayout,
+        RigidPlace, Snapshot,
+    )
+}  # fmt: skip
 
 
 def write_snapshot(snapshot: Snapshot, path: str | os.PathLike[str]) -> None:
@@ -87,6 +93,12 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         meshes = header["meshes"]
         if not isinstance(snapshot, Snapshot):
             raise TypeError("the header holds no world")
+        moving = [body.name for body in snapshot.bodies if body.dynamics and isinstance(body.dynamics.material, Rigid)]
+        if version < ORIGIN and moving:
+            raise FileFormatError(
+                f"{os.fspath(path)!r} has the format {version}, which does not say where the rigid bodies "
+                f"{', '.join(map(repr, moving))} are; make the world anew, and save it with this version of nuno"
+            )
         for body in snapshot.bodies:
             if meshes[body.key] != mesh_hash(body.shape):
                 raise FileFormatError(f"the mesh of {body.name!r} in {os.fspath(path)!r} does not match its hash")

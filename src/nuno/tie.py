@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.body import Body
+    from nuno.grip import Grip
     from nuno.simulation import Simulation
 
 
@@ -87,6 +89,13 @@ def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simu
         corners = np.stack([vertices, np.full_like(vertices, -1), np.full_like(vertices, -1)], axis=-1)
         weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
     assert corners is not None and weights is not None
+    return _tie_of(body, corners, weights, other, compliance, worlds)
+
+
+def _tie_of(
+    body: Body, corners: np.ndarray, weights: np.ndarray, other: Body, compliance: float, worlds: int
+) -> TieSpec:
+    """Return what ties points of ``body`` to ``other``: see `TieSpec` for the points."""
     assert other._dynamics is not None
     own = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
     rows = np.arange(worlds)[:, None, None]
@@ -145,6 +154,37 @@ def make_hold(
         return HoldSpec(to.times, positions.copy(), turns.copy(), str(to.interpolation), axis, compliance), None
     goal = np.broadcast_to(finite_array("to, where it is no Path or Body,", to, (3,), (worlds, 3)), (worlds, 3))
     return HoldSpec(now, goal[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance), None
+
+
+def check_leader(leader: Body, deforms: bool, grips: Sequence[Grip]) -> None:
+    """Check that a static body can be given dynamics while it leads what it holds.
+
+    Raises:
+        BodyStateError: it would deform, and holds a rigid body.
+    """
+    held = [grip.body.name for grip in grips if grip.target is leader and isinstance(grip._spec, HoldSpec)]
+    if deforms and held:
+        raise BodyStateError(
+            f"{leader.name!r} would deform, but holds {held[0]!r}, which is rigid; release that grip first"
+        )
+
+
+def tie_to_leader(grip: Grip, worlds: int) -> None:
+    """Let a grip by a static body be one by a dynamic body, which that has become: it bears the force from now on."""
+    leader, spec = grip.target, grip._spec
+    assert leader is not None and leader._dynamics is not None
+    if isinstance(spec, HoldSpec):
+        # its places are in the leader's frame already
+        grip._offsets = grip._led = None
+        return
+    corners, weights = spec.corners, spec.barycentric
+    if corners is None:
+        corners = np.stack([spec.vertices, *2 * [np.full_like(spec.vertices, -1)]], axis=-1)
+        weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+    tie = _tie_of(grip.body, corners, weights, leader, spec.compliance, worlds)
+    # at the very places where the leader held them
+    grip._spec = replace(tie, places=grip._offsets) if leader._dynamics.is_rigid else tie
+    grip._offsets = None
 
 
 def check_weld(a: Body, b: Body) -> None:

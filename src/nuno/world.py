@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from nuno.motion import arrive, path_for
 from nuno.path import Path
 from nuno.running import Running
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
-from nuno.tie import check_weld
+from nuno.tie import check_leader, check_weld, tie_to_leader
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
@@ -26,11 +27,15 @@ if TYPE_CHECKING:
     from nuno.contact_points import ContactPoints
 
 
+logger = logging.getLogger(__name__)
+
+
 class World(Running):
     """A room: static bodies, which cost nothing, and attached ones, which move.
 
-    All methods may be called while the world runs in the background; they take effect between frames. Where a
-    body is asked for, an imagined world also takes the body of the world that it was imagined from.
+    All methods may be called while the world runs in the background; they take effect between frames. In what a run
+    calls for each frame, a world can only be read: all that would change or copy it raises BodyStateError. Where a body
+    is asked for, an imagined world also takes the body of the world that it was imagined from.
 
     Args:
         device: "auto" (CUDA where there is a device, else the CPU), "cpu", "cuda" or "cuda:1" ...
@@ -57,7 +62,7 @@ class World(Running):
             BodyStateError: the body is in a world already.
             InvalidInputError: no body, or one that has values for another number of worlds.
         """
-        with self._call():
+        with self._change("add"):
             if not isinstance(body, Body):
                 raise InvalidInputError(f"add needs a Body, got {type(body).__name__}")
             if body._world is not None or body.key in self._bodies:
@@ -81,7 +86,7 @@ class World(Running):
 
     def remove(self, body: Body | str) -> Body:
         """Take a body out of the world, detached in the shape that it has now, and return it."""
-        with self._call():
+        with self._change("remove"):
             gone = self._own(body)
             if gone._dynamics is not None:
                 self._detach(gone)
@@ -125,11 +130,12 @@ class World(Running):
                 to keep, also where it was detached at this instant: it starts at rest.
 
         Raises:
-            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, or it follows another frame.
+            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path, or
+                would deform while it holds a rigid body.
             InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
             MeshError: a rigid body without volume.
         """
-        with self._call():
+        with self._change("attach"):
             own = self._own(body)
             if own._dynamics is not None and not keep_velocity:
                 raise BodyStateError(
@@ -147,12 +153,19 @@ class World(Running):
             if velocity is not None or angular_velocity is not None:
                 is_rigid = isinstance(chosen, Rigid)
                 given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            led = [grip for other in self._attached() for grip in other.grips if grip.target is own]
+            if own._dynamics is None:
+                check_leader(own, not isinstance(chosen, Rigid), led)
             dynamics = start_dynamics(own._as_static(), chosen, self)
             if given is not None:
                 dynamics.set_velocity(own, given)
             if own._dynamics is not None:
                 self._detach(own)
+                led = []
             own._friction, own._dynamics = chosen.friction, dynamics
+            for grip in led:
+                tie_to_leader(grip, self.world_count)
+                grip.body._dynamics.grips_changed = True  # type: ignore[union-attr]
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
@@ -164,7 +177,7 @@ class World(Running):
         Raises:
             BodyStateError: it has none.
         """
-        with self._call():
+        with self._change("detach"):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; there is nothing to detach")
@@ -186,7 +199,7 @@ class World(Running):
             BodyStateError: the body is dynamic, or follows another frame.
             InvalidInputError: ``to`` is no path, or one for another number of worlds.
         """
-        with self._call():
+        with self._change("move"):
             own = self._own(body)
             before = (own._path is None, own._position.ndim, own._quaternion.ndim)
             own._path = None if to is None else path_for(own, to, self.world_count)
@@ -201,7 +214,7 @@ class World(Running):
             BodyStateError: the body is static, or of another kind (detach it, and attach it with the new one).
             InvalidInputError: the material does not fit the shape or the batch.
         """
-        with self._call():
+        with self._change("set_material"):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it with the material")
@@ -234,7 +247,7 @@ class World(Running):
             BodyStateError: the body is static.
             InvalidInputError: a vertex out of range, or a target that cannot be used.
         """
-        with self._call():
+        with self._change("grip"):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
@@ -261,7 +274,7 @@ class World(Running):
             BodyStateError: one of them is static.
             InvalidInputError: points that ``a`` does not have, or a rigid ``a`` and a ``b`` that deforms.
         """
-        with self._call():
+        with self._change("weld"):
             check_weld(self._own(a), self._own(b))
             return self.grip(a, where, to=self._own(b), compliance=compliance)
 
@@ -282,7 +295,7 @@ class World(Running):
         Raises:
             BodyStateError: the body is static.
         """
-        with self._call():
+        with self._change("push"):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
@@ -320,7 +333,7 @@ class World(Running):
         Raises:
             InvalidInputError: the same body twice, or a coefficient that is negative or not finite.
         """
-        with self._call():
+        with self._change("set_friction"):
             pair = self._pair(a, b)
             if mu is None:
                 self._rules.friction.pop(pair, None)
@@ -336,7 +349,7 @@ class World(Running):
 
         A cloth given twice passes through itself, which saves most of a step's time where it does not fold.
         """
-        with self._call():
+        with self._change("ignore_contact"):
             own = self._own(a)
             pair = frozenset((own.key,)) if own is self._own(b) else self._pair(a, b)
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
@@ -392,7 +405,7 @@ class World(Running):
 
     def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
         """Return everything that the world is, and write it to ``path`` (.npz) where one is given."""
-        with self._call():
+        with self._change("save"):
             snapshot = capture(self)
         if path is not None:
             from nuno.snapshot_file import write_snapshot
@@ -417,7 +430,7 @@ class World(Running):
             snapshot = read_snapshot(snapshot)
         if not isinstance(snapshot, Snapshot):
             raise InvalidInputError(f"restore needs what save returned, or a path, got {type(saved).__name__}")
-        with self._call():
+        with self._change("restore"):
             apply(snapshot, self)
 
     def imagine(self, n: int, device: str | None = None) -> World:
@@ -427,13 +440,17 @@ class World(Running):
             n: How many.
             device: Where they run; None is where this world runs.
 
+        A driver, such as a simulated robot, moves this world only: what it moves stands still in the copies, which is
+        said once, as a warning.
+
         Raises:
             BodyStateError: this world is a batch itself.
         """
         worlds = count("n", n)
-        with self._call():
+        with self._change("imagine"):
             if self.world_count != 1:
                 raise BodyStateError(f"only a single world can be imagined further; this one has {self.world_count}")
+            self._tell_of_drivers()
             futures = World(device=self._device if device is None else device)
             snapshot = capture(self)
         apply(snapshot.spread(worlds), futures)
@@ -449,12 +466,22 @@ class World(Running):
         """
         if not isinstance(futures, World) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
-        with futures._call():
+        with futures._change("adopt"):
             snapshot = capture(futures).pick(check_world_index(k, futures.world_count))
-        with self._call():
+        with self._change("adopt"):
             if self.world_count != 1:
                 raise BodyStateError("a batch cannot adopt a world; adopt it in the single world")
             apply(snapshot, self)
+
+    def _tell_of_drivers(self) -> None:
+        """Say once of each driver that imagined worlds are without it."""
+        for driver in self.drivers:
+            if driver not in self._left_out:
+                self._left_out.append(driver)
+                logger.warning(
+                    "imagine leaves %r out: in the imagined worlds what it moves stands still where it is now; "
+                    "let it follow paths there (world.move), or lead grips along the paths that are planned", driver,
+                )  # fmt: skip
 
     # Cameras
 

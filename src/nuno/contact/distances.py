@@ -177,6 +177,7 @@ def gap_mesh(
     s: int,
     group: int,
     worlds: int,
+    within: float,
     x: float,
     y: float,
     z: float,
@@ -188,7 +189,7 @@ def gap_mesh(
     c: float,
     radius: float,
 ):
-    """`mesh_gap` of one world."""
+    """`mesh_gap` of one world; of many, where ``within`` is positive."""
     mesh = shapes.mesh[s + group * shapes.mesh_stride]
     r = mesh_gap(mesh, shapes.kind[s], wp.vec3(x, y, z), wp.vec3(ux, uy, uz), wp.vec3(a, b, c), radius)
     return r[0], r[1], r[2], r[3]
@@ -200,6 +201,7 @@ def gap_mesh(
     s: int,
     group: int,
     worlds: int,
+    within: lane,
     x: lane,
     y: lane,
     z: lane,
@@ -219,7 +221,9 @@ def gap_mesh(
     for k in range(16):
         mesh = shapes.mesh[s + wp.min(group * 16 + k, worlds - 1) * shapes.mesh_stride]
         half = wp.vec3(a[k], b[k], c[k])
-        r = mesh_gap(mesh, kind, wp.vec3(x[k], y[k], z[k]), wp.vec3(ux[k], uy[k], uz[k]), half, radius[k])
+        r = wp.vec4(FAR, 0.0, 0.0, 1.0)
+        if within[k] > 0.0:
+            r = mesh_gap(mesh, kind, wp.vec3(x[k], y[k], z[k]), wp.vec3(ux[k], uy[k], uz[k]), half, radius[k])
         gap[k] = r[0]
         nx[k] = r[1]
         ny[k] = r[2]

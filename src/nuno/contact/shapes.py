@@ -203,9 +203,12 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
             un = times(ux, wx) + times(uy, wy) + times(uz, wz)
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
             passed = -least(gap, gap - un)
+            # a lane is looked at because another is near: what is swifter must not see more than it would alone
+            within = near - gap
+            passed = least(passed, within)
             if kind == SOLID_MESH or kind == SHELL_MESH:
                 lx, ly, lz = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, ux, uy, uz)
-                deep, ax, ay, az = gap_mesh(shapes, s, g, w, x, y, z, lx, ly, lz, sa, sb, sc, radius)
+                deep, ax, ay, az = gap_mesh(shapes, s, g, w, within, x, y, z, lx, ly, lz, sa, sb, sc, radius)
                 bx, by, bz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, ax, ay, az)
                 bn = times(ux, bx) + times(uy, by) + times(uz, bz)
                 press(t, i, deep - radius, bx, by, bz, ux, uy, uz, bn, mu, leave)

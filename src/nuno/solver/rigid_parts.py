@@ -36,12 +36,29 @@ class PartTable:
         for name, kind in POOLS:
             setattr(self.parts, name, wp.zeros(64, dtype=kind, device=device))
 
-    def add(self, slot: int, parts: Sequence[RigidPart], centre: np.ndarray) -> list[int]:
-        """Write the parts of a body, whose frame's origin is at ``centre`` (3,) [m] of its shape; their rows."""
-        rows = [self._free_row() for _ in parts]
+    def add(
+        self, slot: int, parts: Sequence[RigidPart], centre: np.ndarray, rows: Sequence[int] | None = None
+    ) -> list[int]:
+        """Write the parts of a body, whose frame's origin is at ``centre`` (3,) [m] of its shape; return their rows.
+
+        Free ``rows`` may be given, one for each part; None takes the first free ones.
+        """
+        rows = [self._free_row() for _ in parts] if rows is None else self.take_rows(rows)
         for row, part in zip(rows, parts, strict=True):
             self._write(row, slot, part, centre)
         return rows
+
+    def take_rows(self, rows: Sequence[int]) -> list[int]:
+        """Take free rows; return them as a list."""
+        while len(self.rows) <= max(rows, default=-1):
+            self.rows.append(None)
+        while len(self.rows) > self.parts.capacity:
+            self._grow(2 * self.parts.capacity)
+        for row in rows:
+            assert self.rows[row] is None
+            self.rows[row] = _TAKEN
+        self.parts.count = len(self.rows)
+        return list(rows)
 
     def remove(self, rows: Sequence[int]) -> None:
         """Free the rows of a body."""

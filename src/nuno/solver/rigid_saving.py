@@ -10,10 +10,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from nuno.contact.rigid_manifolds import NOTES
 from nuno.solver.rigid_arrays import ENTRY, POINT, RigidArrays
 
 LASTING = (*ENTRY, *POINT)
 """Arrays of `Contacts` that outlast a substep."""
+LISTING = {"notes": NOTES, "listed_position": 3, "listed_rotation": 4}
+"""Arrays of `Contacts` that say when pairs are listed anew, and how many numbers make a row of each."""
 
 
 def save_contacts(arrays: RigidArrays, slot: int) -> dict[str, np.ndarray]:
@@ -46,3 +49,25 @@ def load_contacts(arrays: RigidArrays, slot: int, state: Mapping[str, np.ndarray
             table[:, row, :width].assign(np.ascontiguousarray(block))
             if width < arrays.manifolds.row and name in ("partner", "count"):
                 table[:, row, width:].fill_(-1 if name == "partner" else 0)
+
+
+def save_listing(arrays: RigidArrays) -> dict[str, np.ndarray]:
+    """Return what decides when pairs are listed anew, (worlds, rows, numbers) each.
+
+    A pair that is listed earlier may be given its points earlier, at other places of its surfaces.
+    """
+    return {name: _rows(arrays, name).copy() for name in LISTING}
+
+
+def load_listing(arrays: RigidArrays, listing: Mapping[str, np.ndarray]) -> None:
+    """Write back what `save_listing` gave, also of one world for all."""
+    for name in LISTING:
+        values = _rows(arrays, name).copy()
+        known = min(values.shape[1], listing[name].shape[1])  # no body has a slot beyond
+        values[:, :known] = listing[name][:, :known]
+        array = getattr(arrays.manifolds, name)
+        array.assign(values.reshape(array.numpy().shape))
+
+
+def _rows(arrays: RigidArrays, name: str) -> np.ndarray:
+    return getattr(arrays.manifolds, name).numpy().reshape(arrays.world_count, -1, LISTING[name])

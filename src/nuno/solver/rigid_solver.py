@@ -18,7 +18,7 @@ from nuno.scene.rigid_shape import RigidPart
 from nuno.solver.grid_plan import cores_of
 from nuno.solver.rigid_arrays import SAVED, RigidArrays
 from nuno.solver.rigid_frame import RigidSettings, run_rigid, run_rigid_team
-from nuno.solver.rigid_saving import load_contacts, save_contacts
+from nuno.solver.rigid_saving import load_contacts, load_listing, save_contacts, save_listing
 from nuno.solver.team import COUNT, VERDICT, counts_of
 from nuno.solver.warps import WARP
 
@@ -100,6 +100,7 @@ class RigidSolver(RigidArrays):
         group: int = 1,
         collides_with: int = -1,
         slot: int | None = None,
+        rows: Sequence[int] | None = None,
     ) -> int:
         """Add a body and return its slot.
 
@@ -118,17 +119,12 @@ class RigidSolver(RigidArrays):
             group: Bits that others' ``collides_with`` is held against.
             collides_with: Bits of the groups that it touches.
             slot: A free slot to take; None takes the first.
+            rows: Free rows of the table of parts to take, one for each part; None takes the first.
         """
         if slot is None:
             slot = next((k for k in range(self.state.capacity) if k not in self.part_rows), self.state.capacity)
-        while slot >= self.state.capacity:
-            self._grow_bodies(2 * self.state.capacity)
         middle = np.asarray(centre, dtype=float)
-        rows = self.table.add(slot, parts, middle)
-        self.part_rows[slot] = rows
-        if self.table.parts.capacity > self.manifolds.parts:
-            self._grow_rows(self.table.parts.capacity, self.manifolds.row)
-        self._forget_rows(rows)
+        self._take(slot, self.table.add(slot, parts, middle, rows))
         self._roles[slot] = DYNAMIC
         self._put_slot("group", slot, _bits(group))
         self._put_slot("collides_with", slot, _bits(collides_with))
@@ -141,6 +137,18 @@ class RigidSolver(RigidArrays):
         self.set_surface(slot, friction, restitution)
         self._write("drag", slot, air_drag)
         return slot
+
+    def reserve(self, slot: int, rows: Sequence[int]) -> None:
+        """Take a free slot and free rows of the table of parts for no body at all, until the slot is removed."""
+        self._take(slot, self.table.take_rows(rows))
+
+    def _take(self, slot: int, rows: list[int]) -> None:
+        while slot >= self.state.capacity:
+            self._grow_bodies(2 * self.state.capacity)
+        self.part_rows[slot] = rows
+        if self.table.parts.capacity > self.manifolds.parts:
+            self._grow_rows(self.table.parts.capacity, self.manifolds.row)
+        self._forget_rows(rows)
 
     def remove(self, slot: int) -> None:
         """Take a body away; its slot may be given to another."""
@@ -413,6 +421,16 @@ class RigidSolver(RigidArrays):
         self._loaded[slot] = state
         self.manifolds.impulse.zero_()  # of another past
         self._list_anew()
+
+    def save_listing(self) -> dict[str, np.ndarray]:
+        """Return when pairs are to be listed anew, (worlds, ...) each: `nuno.solver.rigid_saving.save_listing`."""
+        self._load_contacts()
+        return save_listing(self)
+
+    def load_listing(self, listing: Mapping[str, np.ndarray]) -> None:
+        """Take back what `save_listing` gave, once all bodies are there and loaded."""
+        self._load_contacts()
+        load_listing(self, listing)
 
     def _load_contacts(self) -> None:
         """Write the contacts of loaded states, now that the bodies that they are with may have come too."""
