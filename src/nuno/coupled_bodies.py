@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coordinates import compose
 from nuno.dynamics import ParticleDynamics, touches_itself
-from nuno.grip import Grip
+from nuno.grip import Grip, tell_unmet
 from nuno.rigid_dynamics import RigidDynamics
 from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
 from nuno.scene.ridges import Ridges, ridges_of
@@ -111,6 +112,23 @@ class CoupledBodies:
         number[[list(party).index(body) for body in self.bodies]] = np.arange(len(self.bodies))
         first = number[np.stack([party[body] for body in self.bodies])]
         self.coupling.run_frame(time, duration, substeps, first)
+        self._tell_unmet(time + duration, substeps[0])
+
+    def _tell_unmet(self, time: float, substeps: int) -> None:
+        """Say once of each grip that it was not met in half of the frame's substeps and more."""
+        if not self._ties:
+            return
+        ties, holds = self.coupling.unmet()
+        starts = np.cumsum([0, *self._tie_counts])
+        counts = [
+            *(ties[:, a:b].max(axis=1, initial=0) for a, b in itertools.pairwise(starts)),
+            *holds.T,
+        ]
+        for grip, unmet in zip([*self._point_ties, *self._frame_holds], counts, strict=True):
+            unmet = np.where(self.kept[grip.body], unmet, 0)
+            if 2 * unmet.max() > substeps and not grip.told_unmet:
+                grip.told_unmet = True
+                tell_unmet(grip, time)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray] | None:
         """Force [N] and torque [N m] (worlds, 3) of a tie or hold over the last frame; None if it is not of these."""
@@ -244,8 +262,13 @@ class CoupledBodies:
         ties.slot, ties.point, ties.compliance = put(slots, int), put(points, wp.vec3, 3), put(compliance, float)
         owners = np.repeat([self.bodies.index(grip.body) for grip in self._point_ties], self._tie_counts)
         ties.body = wp.array(owners.astype(np.int32) if ties.count else np.zeros(1, np.int32), dtype=int, device=device)
-        for name in ("pull", "total"):
-            setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=wp.vec3, device=device))
+        for name, kind in (("pull", wp.vec3), ("total", wp.vec3), ("unmet", int)):
+            setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=kind, device=device))
+        most = [
+            np.repeat(_limits(grip, worlds)[:, None], n, axis=1)
+            for grip, n in zip(self._point_ties, self._tie_counts, strict=True)
+        ]
+        ties.limit = put(most, float)
         return ties
 
     def _tie_points(self, grip: Grip) -> np.ndarray:
@@ -282,6 +305,9 @@ class CoupledBodies:
         holds.turn = wp.zeros(2 * room, dtype=wp.quat, device=device)
         for name in ("pull", "twist", "total", "total_twist"):
             setattr(holds, name, wp.zeros(room, dtype=wp.vec3, device=device))
+        holds.unmet = wp.zeros(room, dtype=int, device=device)
+        most = np.stack([_limits(grip, worlds) for grip in self._frame_holds] or [np.zeros(worlds)], axis=1)
+        holds.limit = wp.array(most.astype(np.float32).ravel(), dtype=float, device=device)
         return holds
 
     def _lead_holds(self, time: float, duration: float) -> None:
@@ -294,17 +320,15 @@ class CoupledBodies:
         for k, grip in enumerate(self._frame_holds):
             spec: HoldSpec = grip._spec
             own: Any = grip.body._dynamics
+            leads = int(holds.leader.numpy()[k]) >= 0
             if grip._offsets is not None and grip.target is not None:
-                # a static leader: from where it led last to where it is now
-                goal = [np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(grip.target._pose(), grip._offsets)]
-                now, before, last = getattr(grip, "_led", (-np.inf, goal, goal))
-                if now != time:  # a frame that it goes through twice starts in the same place
-                    before = last
-                grip._led = (time, before, goal)  # type: ignore[attr-defined]
-                poses: list[Any] = [before, goal]
+                if leads:  # a leader that was static when it was gripped to
+                    poses: list[Any] = [grip._offsets, grip._offsets]
+                else:
+                    grip._spec = spec.led_to(compose(grip.target._pose(), grip._offsets), time, duration)
+                    poses = [grip._spec.pose_at(0), grip._spec.pose_at(-1)]
             else:
                 poses = [spec.at(time), spec.at(time + duration)]
-            leads = int(holds.leader.numpy()[k]) >= 0
             for end, (p, q) in enumerate(poses):
                 centre = quat.rotate(q, np.broadcast_to(own.centre, p.shape))
                 place[:, k, end] = p + centre
@@ -317,6 +341,11 @@ class CoupledBodies:
         holds.place.assign(wp.array(place.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=device))
         turns = np.roll(turn.reshape(-1, 4), -1, axis=-1).astype(np.float32)
         holds.turn.assign(wp.array(turns, dtype=wp.quat, device=device))
+
+
+def _limits(grip: Grip, worlds: int) -> np.ndarray:
+    """(worlds,) [N], what a tie or hold bears at most."""
+    return np.broadcast_to(np.asarray(grip._spec.max_force, dtype=float), (worlds,))
 
 
 def _surface_rules(body: Body, solver: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import uuid
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +15,15 @@ from nuno.coordinates import apply, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import chosen_points
-from nuno.tie import HoldSpec, TieSpec, make_hold, make_tie
+from nuno.tie import HoldSpec, TieSpec, force_limit, make_hold, make_tie
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.body import Body
     from nuno.simulation import Simulation
+
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +71,7 @@ class Grip:
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
         self._offsets = offsets
         self._world: Simulation | None = None
+        self.told_unmet = False  # whether it was said already that it cannot be met
 
     def __repr__(self) -> str:
         return f"<grip on {self.body.name!r}, {'active' if self.active else 'released'}>"
@@ -79,6 +85,20 @@ class Grip:
     def compliance(self) -> float:
         """[m/N]; 0 is stiff."""
         return float(self._spec.compliance)
+
+    @property
+    def max_force(self) -> Any:
+        """[N], the most that it bears, a number or (worlds,); of a rigid body's turns as much [N m].
+
+        Infinite for points that follow a path, a place or a static body.
+        """
+        limit = np.atleast_1d(getattr(self._spec, "max_force", np.inf))
+        return float(limit[0]) if len(limit) == 1 else limit.copy()
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Keys of the bodies that a held rigid body passes through while it is held."""
+        return tuple(getattr(self._spec, "ignored", ()))
 
     @property
     def is_tie(self) -> bool:
@@ -139,9 +159,21 @@ class Grip:
         return self._spec
 
 
+def tell_unmet(grip: Grip, time: float) -> None:
+    """Warn that a grip cannot be met, at a time [s]: it bears its limit, or does not come to where it leads."""
+    other = "" if grip.target is None else f" to {grip.target.name!r}"
+    log.warning(
+        "the grip on %r%s is not met at t = %.3f s: it bears %s N at most (max_force), and a contact or another grip "
+        "holds against it. Lead it elsewhere, release the other, let contacts of the two be ignored, or give it a "
+        "compliance",
+        grip.body.name, other, time, f"{np.max(grip.max_force):.4g}",
+    )  # fmt: skip
+
+
 def make_grip(
-    body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation
-) -> Grip:
+    body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation,
+    *, max_force: Any = None, ignored: Sequence[Body] | None = None,
+) -> Grip:  # fmt: skip
     """Return a grip on ``body``, not yet active; see ``World.grip``.
 
     Raises:
@@ -149,17 +181,28 @@ def make_grip(
     """
     worlds = world.world_count
     assert body._dynamics is not None
+    if ignored is not None and not body._dynamics.is_rigid:
+        raise InvalidInputError(f"ignore is for rigid bodies only; {body.name!r} touches what holds its points")
     if body._dynamics.is_rigid:
         if where is not None:
             raise InvalidInputError(f"{body.name!r} is rigid and is gripped as a whole: where must be None")
         hold, local_pose = make_hold(body, to, target, free, compliance, world)
-        return Grip(body, hold, target, local_pose)
+        passed = ([] if target is None else [target]) if ignored is None else ignored
+        passed_by = tuple(other.key for other in passed if other is not body)
+        limit = force_limit(max_force, worlds, body, target)
+        return Grip(body, replace(hold, max_force=limit, ignored=passed_by), target, local_pose)
     if free is not None:
         raise InvalidInputError("free is for rigid bodies only")
     if where is None:
         raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
     if target is not None and target._dynamics is not None:
-        return Grip(body, make_tie(body, where, target, compliance, world), target)
+        tie = make_tie(body, where, target, compliance, world)
+        return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
+    if max_force is not None:
+        raise InvalidInputError(
+            f"max_force is for rigid bodies and for grips led by a dynamic body; points of {body.name!r} follow a "
+            "path, a place or a static body exactly: give a compliance [m/N] to let them yield"
+        )
     present = body.vertices
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))

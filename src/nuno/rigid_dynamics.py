@@ -51,7 +51,7 @@ class RigidScene:
         for key in [key for key in self._static if key not in seen]:
             self.solver.remove(self._static.pop(key)[0])
         rules = world._rules
-        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored)}
+        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored | rules.held)}
         pairs: dict[tuple[int, int], Any] = {}
         for pair, mu in exceptions.items():
             if len(pair) == 2 and all(key in slots for key in pair):

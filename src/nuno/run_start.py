@@ -29,7 +29,7 @@ class RunStart:
         self._resting = world._resting
         # what a grip leads from is where it led last
         grips: list[Any] = [grip for d in moving.values() for grip in d.grips]
-        self._led = [(grip, grip._spec, getattr(grip, "_led", None)) for grip in grips]
+        self._led = [(grip, grip._spec) for grip in grips]
 
     def go_back(self) -> None:
         """Set the state that it was."""
@@ -41,11 +41,7 @@ class RunStart:
         for dynamics, pushing in self._pushed:
             dynamics._pushing = pushing
         world._resting = self._resting
-        for grip, spec, led in self._led:
+        for grip, spec in self._led:
             grip._spec = spec
-            if led is not None:
-                grip._led = led
-            else:
-                grip.__dict__.pop("_led", None)
         for own in self._moving.values():
             own.grips_changed = True

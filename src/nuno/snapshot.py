@@ -311,16 +311,23 @@ def _fill(body: Body, record: BodyRecord) -> None:
 def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation) -> None:
     grip = world._known_grips.get(record.key)
     target = None if record.target is None else bodies[record.target]
+    spec = _with_own_keys(record.spec, bodies)
     if grip is None:
-        grip = Grip(bodies[record.body], record.spec, target, record.offsets)
+        grip = Grip(bodies[record.body], spec, target, record.offsets)
         grip.key = record.key
     grip.body, grip.target, grip._spec, grip._offsets = (
         bodies[record.body],
         target,
-        record.spec,
+        spec,
         record.offsets,
     )
     world._hold(grip)
+
+
+def _with_own_keys(spec: Any, bodies: dict[str, Body]) -> Any:
+    """Let a grip's spec name bodies by their own keys, which differ where a file named them by others."""
+    ignored = getattr(spec, "ignored", ())
+    return replace(spec, ignored=tuple(bodies[key].key for key in ignored if key in bodies)) if ignored else spec
 
 
 def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:

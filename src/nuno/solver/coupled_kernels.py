@@ -3,7 +3,7 @@
 import warp as wp
 
 from nuno.contact.coupled_rows import Particles, Rows, drag_row, forget_sharers, join_row, push_row, take_sums
-from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
+from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.warps import anyone
@@ -220,11 +220,8 @@ def solve(
                     done = 1
     if thread == 0:
         for k in range(ties.count):
-            r = world * ties.count + k
-            ties.total[r] = ties.total[r] + ties.pull[r]
+            sum_tie(particles, rigid, ties, world, k, dt)
         for k in range(holds.count):
-            r = world * holds.count + k
-            holds.total[r] = holds.total[r] + holds.pull[r]
-            holds.total_twist[r] = holds.total_twist[r] + holds.twist[r]
+            sum_hold(rigid, holds, world, k, dt, fraction)
     if at_once != 0:
         forget_sharers(particles, rigid, first, start, thread, threads)

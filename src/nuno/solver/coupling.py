@@ -160,8 +160,9 @@ class Coupling:
         self._layouts = [self._layout(k) for k in range(len(self._solvers))]
         if self._rigid is not None:
             self._rigid.open(time, dt, [*self._slots, *self.led])
-        for total in (self._ties.total, self.holds.total, self.holds.total_twist):
+        for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
+        self.holds.step = 1.0 / substeps
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
@@ -295,6 +296,14 @@ class Coupling:
     def tie_forces(self) -> np.ndarray:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
         return self._per_world(self._ties.total, self._ties.count)
+
+    def unmet(self) -> tuple[np.ndarray, np.ndarray]:
+        """(worlds, ties) and (worlds, holds) int, in how many of the last frame's substeps each was not met."""
+        ties, holds = (
+            part.unmet.numpy()[: self.world_count * part.count].reshape(self.world_count, part.count)
+            for part in (self._ties, self.holds)
+        )
+        return ties, holds
 
     def hold_wrenches(self) -> tuple[np.ndarray, np.ndarray]:
         """(worlds, holds, 3) each, the mean force [N] and torque [N m] on the held bodies' centres of mass."""
