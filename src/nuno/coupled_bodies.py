@@ -13,8 +13,10 @@ from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coordinates import compose
+from nuno.coupled_joints import CoupledJoints
 from nuno.dynamics import ParticleDynamics, touches_itself
 from nuno.grip import Grip, tell_unmet
+from nuno.joint import Joint
 from nuno.rigid_dynamics import RigidDynamics
 from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
 from nuno.scene.ridges import Ridges, ridges_of
@@ -82,7 +84,10 @@ class CoupledBodies:
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
-        self.coupling = Coupling(solvers, rigid, slots, elements, self._make_ties(), self._make_holds())
+        self._joints = CoupledJoints(world, [grip for grip in ties if isinstance(grip, Joint)], self.bodies)
+        self.coupling = Coupling(
+            solvers, rigid, slots, elements, self._make_ties(), self._make_holds(), self._joints.table
+        )
 
     def is_current(self) -> bool:
         """Whether the solvers still are those that the tables speak of."""
@@ -105,6 +110,7 @@ class CoupledBodies:
         """
         self.kept = kept
         self._lead_holds(time, duration)
+        self._joints.bring()
         if self.rigid and self._world._rigid is not None:
             self.coupling.led = self._world._rigid.lead(self._world, time, duration)
         # the group's numbers are those of the world's order, the coupling's have rigid bodies last
@@ -118,13 +124,15 @@ class CoupledBodies:
         """Say once of each grip that it was not met in half of the frame's substeps and more."""
         if not self._ties:
             return
-        ties, holds = self.coupling.unmet()
+        ties, holds, joints = self.coupling.unmet()
         starts = np.cumsum([0, *self._tie_counts])
         counts = [
             *(ties[:, a:b].max(axis=1, initial=0) for a, b in itertools.pairwise(starts)),
             *holds.T,
+            *joints.T,
         ]
-        for grip, unmet in zip([*self._point_ties, *self._frame_holds], counts, strict=True):
+        grips = [*self._point_ties, *self._frame_holds, *self._joints.joints]
+        for grip, unmet in zip(grips, counts, strict=True):
             unmet = np.where(self.kept[grip.body], unmet, 0)
             if 2 * unmet.max() > substeps and not grip.told_unmet:
                 grip.told_unmet = True
@@ -146,7 +154,17 @@ class CoupledBodies:
             # from the centre of mass to the origin of the body's frame
             arm = quat.rotate(held.solver.pose(held.slot)[1], np.broadcast_to(held.centre, force[:, k].shape))
             return -force[:, k], -torque[:, k] - np.cross(arm, force[:, k])
+        if grip in self._joints.joints:
+            force, torque, _ = self.coupling.joint_wrenches()
+            k = self._joints.joints.index(grip)
+            return -force[:, k], -torque[:, k]
         return None
+
+    def effort(self, joint: Joint) -> np.ndarray | None:
+        """(worlds,), what acted along a joint's free direction in the last frame; None if it is not of these."""
+        if joint not in self._joints.joints:
+            return None
+        return self.coupling.joint_wrenches()[2][:, self._joints.joints.index(joint)]
 
     def contacts(self, body: Body) -> list[tuple[Any, ...]]:
         """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep."""

@@ -6,7 +6,7 @@ import logging
 import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from nuno.coordinates import apply, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import chosen_points
-from nuno.tie import HoldSpec, TieSpec, force_limit, make_hold, make_tie
+from nuno.tie import force_limit, make_hold, make_tie
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
@@ -58,10 +58,12 @@ class Grip:
         target: The body that leads it or that it is tied to, or None.
     """
 
+    noun: ClassVar[str] = "grip"
+
     def __init__(
         self,
         body: Body,
-        spec: GripSpec | TieSpec | HoldSpec,
+        spec: Any,
         target: Body | None = None,
         offsets: Any = None,
     ) -> None:
@@ -163,10 +165,10 @@ def tell_unmet(grip: Grip, time: float) -> None:
     """Warn that a grip cannot be met, at a time [s]: it bears its limit, or does not come to where it leads."""
     other = "" if grip.target is None else f" to {grip.target.name!r}"
     log.warning(
-        "the grip on %r%s is not met at t = %.3f s: it bears %s N at most (max_force), and a contact or another grip "
-        "holds against it. Lead it elsewhere, release the other, let contacts of the two be ignored, or give it a "
-        "compliance",
-        grip.body.name, other, time, f"{np.max(grip.max_force):.4g}",
+        "the %s of %r%s is not met at t = %.3f s: a contact, a grip or a joint holds against it, and it bears %s N at "
+        "most (max_force). Lead it elsewhere, release what contradicts it, let the bodies' contact be ignored, or give "
+        "a grip a compliance",
+        grip.noun, grip.body.name, other, time, f"{np.max(grip.max_force):.4g}",
     )  # fmt: skip
 
 

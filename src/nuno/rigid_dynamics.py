@@ -98,6 +98,13 @@ class RigidScene:
             if own.size == array.size:
                 wp.copy(own, array)
 
+    def slot_of(self, world: Simulation, body: Body) -> int | None:
+        """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
+        if isinstance(body._dynamics, RigidDynamics):
+            return body._dynamics.slot
+        static = self._static.get(body.key)
+        return None if static is None else static[0]
+
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""
         slots = []

@@ -16,6 +16,7 @@ from nuno.coordinates import compose, invert
 from nuno.dynamics import Dynamics, Push, State, make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip, GripSpec
+from nuno.joint import Joint, JointSpec
 from nuno.materials import Material
 from nuno.motion import CompanyPath, of_world
 from nuno.path import Path
@@ -64,7 +65,7 @@ class GripRecord:
 
     key: str
     body: str
-    spec: GripSpec | TieSpec | HoldSpec
+    spec: GripSpec | TieSpec | HoldSpec | JointSpec
     target: str | None
     offsets: np.ndarray | None
 
@@ -313,7 +314,8 @@ def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation
     target = None if record.target is None else bodies[record.target]
     spec = _with_own_keys(record.spec, bodies)
     if grip is None:
-        grip = Grip(bodies[record.body], spec, target, record.offsets)
+        made = Joint if isinstance(spec, JointSpec) else Grip
+        grip = made(bodies[record.body], spec, target, record.offsets)
         grip.key = record.key
     grip.body, grip.target, grip._spec, grip._offsets = (
         bodies[record.body],

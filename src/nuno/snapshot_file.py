@@ -22,6 +22,7 @@ from nuno.compound import Compound
 from nuno.dynamics import Push
 from nuno.errors import FileFormatError, NunoError
 from nuno.grip import GripSpec
+from nuno.joint import JointSpec
 from nuno.materials import Cloth, Rigid, Soft
 from nuno.path import Path
 from nuno.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
@@ -36,7 +37,7 @@ SHAPES = (
     shapes.TriangleMesh, shapes.Hull, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
     soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
 )  # fmt: skip
-GRIPS = (GripSpec, TieSpec, HoldSpec)
+GRIPS = (GripSpec, TieSpec, HoldSpec, JointSpec)
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (*SHAPES, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord, GripRecord, Snapshot)

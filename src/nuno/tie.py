@@ -98,7 +98,7 @@ def spread_spec(spec: Any, batched: Any) -> Any:
     """Return a grip's, tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
     names = (
         "vertices", "corners", "barycentric", "weights", "other_corners", "other_weights", "places", "positions",
-        "quaternions",
+        "quaternions", "place", "turn", "other_place", "other_turn", "drives",
     )  # fmt: skip
     changed = {name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)}
     limit = getattr(spec, "max_force", None)

@@ -13,6 +13,7 @@ from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.grip import Grip, make_grip
+from nuno.joint import check_joined
 from nuno.materials import Material
 from nuno.motion import arrive, path_for
 from nuno.path import Path
@@ -126,6 +127,7 @@ class World(Running):
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
+            check_joined(own, chosen, self)
             dynamics = start_dynamics(own, chosen, self)
             own._friction, own._dynamics = chosen.friction, dynamics
             if not dynamics.is_rigid:

@@ -12,6 +12,7 @@ from nuno.contact.coupled_geometry import measure_rows
 from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
 from nuno.contact.coupled_rows import Particles, Rows
 from nuno.contact.coupled_ties import Holds, Ties
+from nuno.contact.joint_block import Joints
 from nuno.solver.coupled_kernels import Layout, Passing, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_body import RigidState
@@ -44,6 +45,7 @@ class Coupling:
         elements: Surfaces and what touches what.
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
+        joints: Rigid bodies that are joined.
     """
 
     def __init__(
@@ -54,9 +56,10 @@ class Coupling:
         elements: Elements,
         ties: Ties,
         holds: Holds,
+        joints: Joints,
     ) -> None:
         self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
-        self._elements, self._ties, self.holds = elements, ties, holds
+        self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
         self._scale = self._rate = 0.0
         self._listed = 0
         first = rigid if rigid is not None else solvers[0]
@@ -163,6 +166,9 @@ class Coupling:
         for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
         self.holds.step = 1.0 / substeps
+        if self.joints.count:
+            for name in ("total", "total_twist", "total_axial", "unmet"):
+                getattr(self.joints, name).zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
@@ -191,7 +197,7 @@ class Coupling:
 
         It then goes through the frame in one launch, with the same bits.
         """
-        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count or self.holds.count:
+        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count:
             return False
         layout = self._layouts[0]
         wp.launch(
@@ -215,10 +221,11 @@ class Coupling:
         if self._listed:
             rows.active_count.zero_()
             go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
-        if self._listed or self._ties.count or self.holds.count:
+        if self._listed or self._ties.count or self.holds.count or self.joints.count:
             go(
-                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self._passing, dt,
-                fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
+                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self.joints,
+                self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once),
+                self._threads,
             )  # fmt: skip
             for layout in self._layouts:
                 go(scatter, (worlds, layout.particles), layout, particles, self._start)
@@ -297,13 +304,24 @@ class Coupling:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
         return self._per_world(self._ties.total, self._ties.count)
 
-    def unmet(self) -> tuple[np.ndarray, np.ndarray]:
-        """(worlds, ties) and (worlds, holds) int, in how many of the last frame's substeps each was not met."""
-        ties, holds = (
-            part.unmet.numpy()[: self.world_count * part.count].reshape(self.world_count, part.count)
-            for part in (self._ties, self.holds)
-        )
-        return ties, holds
+    def unmet(self) -> list[np.ndarray]:
+        """(worlds, ties), (worlds, holds) and (worlds, joints) int, substeps of the frame that each was not met in."""
+        worlds = self.world_count
+        return [
+            part.unmet.numpy()[: worlds * part.count].reshape(worlds, part.count)
+            if part.count
+            else np.zeros((worlds, 0), dtype=int)
+            for part in (self._ties, self.holds, self.joints)
+        ]
+
+    def joint_wrenches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mean force [N] and torque [N m] on the joined bodies at their joints, and what acts along them, over a frame.
+
+        (worlds, joints, 3) twice, and (worlds, joints).
+        """
+        joints, worlds = self.joints, self.world_count
+        axial = joints.total_axial.numpy().reshape(worlds, joints.count).astype(float) * self._scale
+        return self._per_world(joints.total, joints.count), self._per_world(joints.total_twist, joints.count), axial
 
     def hold_wrenches(self) -> tuple[np.ndarray, np.ndarray]:
         """(worlds, holds, 3) each, the mean force [N] and torque [N m] on the held bodies' centres of mass."""
