@@ -132,6 +132,20 @@ def test_contradicting_holds_stay_slow(compliance, caplog):
         assert any("is not met" in record.getMessage() for record in caplog.records)
 
 
+def test_two_stiff_grips_on_a_vertex_are_told(caplog):
+    """They read 17 kN either way without a word; on other vertices, or with a compliance, nothing is said."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.1, 0.1), (2, 2), position=(0.0, 0.0, 0.5)))
+    world.attach(towel)
+    with caplog.at_level(logging.WARNING):
+        for vertices, compliance in (([0, 1], 0.0), ([2], 0.0), ([1], 1e-3)):
+            world.grip(towel, vertices, to=towel.vertices[vertices].mean(axis=0), compliance=compliance)
+        assert not caplog.records
+        world.grip(towel, [1, 3], to=(0.0, 0.0, 0.6))
+    (record,) = caplog.records
+    assert "[1]" in record.getMessage() and "'sheet'" in record.getMessage() and "compliance" in record.getMessage()
+
+
 def test_a_limit_that_cannot_be_is_refused():
     """Bad input: nothing changes, and the message says what is valid."""
     world = nuno.World(device="cpu")

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import nuno
+from nuno.held_points import held_points
 
 G = 9.81
+DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
 KINDS = ("fixed", "hinge", "slider", "ball")
 
 
@@ -147,14 +149,15 @@ def test_a_joint_follows_what_it_is_joined_to():
     np.testing.assert_allclose(joint.wrench[0], (0.0, -1.0, 0.0), atol=0.01)
 
 
-def test_a_saved_linkage_goes_on_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_saved_linkage_goes_on_bit_for_bit(device, tmp_path):
     """In mid-motion: restored in place, from a file in an empty world, imagined, and adopted."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     joints = linkage(world)
     world.run(0.3)
     joints[1].motor = nuno.Motor(position=0.2, stiffness=1.0, damping=0.05)
     saved = world.save(tmp_path / "linkage.npz")
-    futures, empty = world.imagine(3), nuno.World(device="cpu")
+    futures, empty = world.imagine(3), nuno.World(device=device)
     empty.restore(tmp_path / "linkage.npz")
     world.run(0.3)
     expected = readings(world)
@@ -174,7 +177,8 @@ def test_a_saved_linkage_goes_on_bit_for_bit(tmp_path):
     np.testing.assert_array_equal(readings(futures)[1], readings(world)[0])
 
 
-def test_a_batch_of_joints_is_each_of_them_alone():
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_batch_of_joints_is_each_of_them_alone(device):
     """Worlds with other axes, limits and motors go as they go alone, to the bit."""
     axes = np.array([(0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (1.0, 1.0, 0.0)])
     speeds, stops = np.array((1.0, -2.0, 0.5)), np.array((0.2, 0.9, 0.4))
@@ -186,11 +190,16 @@ def test_a_batch_of_joints_is_each_of_them_alone():
         world.run(0.5)
         return readings(world)
 
-    batch = nuno.World(device="cpu").imagine(3)
+    batch = nuno.World(device=device).imagine(3)
     together = run(batch, axes, speeds, stops)
     for k in range(3):
-        np.testing.assert_array_equal(run(nuno.World(device="cpu"), axes[k], speeds[k], stops[k])[0], together[k])
-    assert len(batch.bodies[0]._dynamics.grips[0].position) == 3
+        np.testing.assert_array_equal(run(nuno.World(device=device), axes[k], speeds[k], stops[k])[0], together[k])
+    (joint,) = batch.bodies[0]._dynamics.grips
+    assert joint.position.shape == joint.velocity.shape == joint.effort.shape == (3,)
+    np.testing.assert_array_equal(joint.limits[1], stops)
+    np.testing.assert_array_equal(joint.motor.velocity, speeds)
+    for k in range(3):
+        np.testing.assert_allclose(held_points(joint, k), [(0.0, 0.0, 1.0)], atol=1e-5)
 
 
 def test_a_run_in_pieces_is_a_run():

@@ -172,6 +172,29 @@ def tell_unmet(grip: Grip, time: float) -> None:
     )  # fmt: skip
 
 
+def tell_shared(grip: Grip) -> None:
+    """Warn where a new stiff grip holds vertices that another one holds stiffly: only one can lead them."""
+    mine = _stiff_vertices(grip)
+    if mine is None or grip.body._dynamics is None:
+        return
+    for other in grip.body._dynamics.grips:
+        theirs = _stiff_vertices(other)
+        if theirs is None:
+            continue
+        both = (mine[:, :, None] == theirs[:, None, :]) & (mine >= 0)[:, :, None]
+        if both.any():
+            log.warning(
+                "vertices %s of %r are held by two stiff grips: one of them leads, and what the two bear is not what "
+                "acts. Release the other grip, or give one a compliance",
+                sorted({int(k) for k in mine[both.any(axis=2)]}), grip.body.name,
+            )  # fmt: skip
+
+
+def _stiff_vertices(grip: Grip) -> np.ndarray | None:
+    spec = grip._spec
+    return spec.vertices if isinstance(spec, GripSpec) and spec.compliance == 0.0 else None
+
+
 def make_grip(
     body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation,
     *, max_force: Any = None, ignored: Sequence[Body] | None = None,

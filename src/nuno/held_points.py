@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.coordinates import apply
+from nuno.coordinates import compose
 from nuno.grip import GripSpec
 from nuno.joint import JointSpec
 from nuno.tie import HoldSpec
@@ -28,8 +28,7 @@ def held_points(grip: Grip, index: int = 0, vertices: np.ndarray | None = None) 
         place = grip.body._pose()[0]
         return np.atleast_2d(place[index] if place.ndim == 2 else place)
     if isinstance(spec, JointSpec):
-        place, turn = grip.body._pose()
-        return apply((place, turn), spec.place)[index : index + 1]
+        return compose(grip.body._pose(), (spec.place, spec.turn))[0][index : index + 1]
     if vertices is None:
         own = grip.body._vertices()
         vertices = own[index if len(own) > 1 else 0] if own.ndim == 3 else own

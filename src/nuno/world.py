@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.grip import Grip, make_grip
+from nuno.grip import Grip, make_grip, tell_shared
 from nuno.joint import check_joined
 from nuno.materials import Material
 from nuno.motion import arrive, path_for
@@ -230,6 +230,7 @@ class World(Running):
                 own, where, to, number("compliance", compliance, low=0.0), target, free, self, max_force=max_force,
                 ignored=None if ignore is None else [self._own(other) for other in ignore],
             )  # fmt: skip
+            tell_shared(grip)
             self._hold(grip)
         return grip
 
