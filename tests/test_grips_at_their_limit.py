@@ -107,6 +107,28 @@ def test_a_limit_of_ones_own_is_kept():
             assert world.contacts(box).forces.sum(axis=0)[2] == pytest.approx(mass * G - 20.0, rel=0.01)
 
 
+@pytest.mark.parametrize("held", ["grip", "fixed joint"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_what_stands_on_a_held_plate_stands(held, count):
+    """Statics: boxes of 1 kg on a held plate of 0.5 kg rest as on a table, by its edge; one walked at 55 mm/s."""
+    world = nuno.World(device="cpu")
+    plate = world.add(nuno.box((0.4, 0.3, 0.02), position=(0.0, 0.0, 0.5)))
+    world.attach(plate, nuno.Rigid(mass=0.5))
+    hold = world.grip(plate, to=plate.position) if held == "grip" else nuno.fixed_joint(plate, None)
+    boxes = [world.add(nuno.box((0.1, 0.1, 0.1), position=(0.12, 0.0, 0.561 + 0.1 * k))) for k in range(count)]
+    for box in boxes:
+        world.attach(box, nuno.Rigid(mass=1.0))
+    world.run(1.0)
+    for _ in range(30):
+        world.step()
+        assert max(np.abs(box.velocities).max() for box in boxes) < 1e-4
+    for k, box in enumerate(boxes):
+        np.testing.assert_allclose(box.position, (0.12, 0.0, 0.56 + 0.1 * k), atol=1e-4)
+    force, torque = hold.wrench
+    np.testing.assert_allclose(force, (0.0, 0.0, -(count + 0.5) * G), atol=1e-3)
+    np.testing.assert_allclose(torque, (0.0, count * G * 0.12, 0.0), atol=1e-3)
+
+
 @pytest.mark.parametrize("compliance", [0.0, 1e-3])
 def test_contradicting_holds_stay_slow(compliance, caplog):
     """Two holds of one body in another's frame at places 0.1 m apart: it went off at 15 km/s."""

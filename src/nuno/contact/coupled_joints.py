@@ -11,8 +11,8 @@ their sum and the inertia are solved in closed form.
 
 import warp as wp
 
-from nuno.contact.coupled_ties import CATCH_UP, UNMET, left_over, within
-from nuno.contact.joint_block import BALL, HINGE, SLIDER, Joints, apply_joint, arm_of, block_of, respond
+from nuno.contact.coupled_ties import CATCH_UP, UNMET, left_over, stand_on, within
+from nuno.contact.joint_block import BALL, FIXED, HINGE, SLIDER, Joints, apply_joint, arm_of, block_of, respond
 from nuno.contact.joint_drives import project_axis, project_ball
 from nuno.solver.rigid_body import RigidState, in_world, point_before, point_of, turn_angle, turn_between
 
@@ -183,4 +183,5 @@ def sum_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
     missed = wp.length(pull) > most or wp.length(twist) > most
     if missed or wp.length(apart) > UNMET or wp.length(off) > UNMET:
         joints.unmet[r] = joints.unmet[r] + 1
-    settle_spins(rigid, joints, world, k, dt)
+    elif joints.kind[k] == FIXED:
+        stand_on(rigid, world, joints.slot[k], joints.other[k], joints.limit[r])

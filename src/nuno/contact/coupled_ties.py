@@ -21,6 +21,9 @@ from nuno.solver.rigid_body import (
 CATCH_UP = wp.constant(1.0)
 """[m/s], [rad/s] A stiff tie or hold that starts from a wrong place mends that no faster, beside the motion of what
 leads it: contradictions are no explosions."""
+HARD = wp.constant(9.9e3)
+"""[N] What a hold must bear at least for contacts to take its body as immovable: the least limit that is chosen where
+none is asked for. A weaker one gives way to impacts."""
 UNMET = wp.constant(5.0e-4)
 """[m], [rad] What the passes leave of a tie or hold that counts as not met: ten times what they leave under loads."""
 
@@ -240,6 +243,21 @@ def project_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float,
 
 
 @wp.func
+def stand_on(rigid: RigidState, world: int, slot: int, leader: int, limit: float):
+    """Mark a body that is held entirely by what does not give, by a negative weight for the rest of the substep.
+
+    Contacts of rigid bodies come after the holds. To them a light plate in a hand would give under a heavy box, and
+    only the next substep's hold would put it back: the box would wobble and walk. See `nuno.solver.rigid_meeting`.
+    """
+    hard = limit >= HARD
+    if leader >= 0:
+        hard = hard and rigid.weight[world * rigid.capacity + leader] <= 0.0
+    if hard:
+        i = world * rigid.capacity + slot
+        rigid.weight[i] = -wp.abs(rigid.weight[i])
+
+
+@wp.func
 def sum_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float, fraction: float):
     """Add what a hold bore in the substep to the frame's sums, and note whether it was met."""
     r = world * holds.count + k
@@ -252,5 +270,7 @@ def sum_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float, fra
     if holds.compliance[k] == 0.0:
         apart, off = hold_apart(rigid, holds, world, k, dt, fraction)
         missed = missed or wp.length(apart) > UNMET or wp.length(off) > UNMET
+        if not missed and wp.length_sq(holds.free[r]) == 0.0:
+            stand_on(rigid, world, holds.slot[k], holds.leader[k], holds.limit[r])
     if missed:
         holds.unmet[r] = holds.unmet[r] + 1

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.contact.coupled_joints import begin_joint, joint_at, project_joint, sum_joint, turns_of
+from nuno.contact.coupled_joints import begin_joint, joint_at, project_joint, settle_spins, sum_joint, turns_of
 from nuno.contact.coupled_rows import Particles, Rows, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
 from nuno.contact.joint_block import Joints
@@ -230,6 +230,8 @@ def solve(
                 if not anyone(wrong >= ENOUGH):
                     done = 1
     if thread == 0:
+        for k in range(joints.count):
+            settle_spins(rigid, joints, world, k, dt)
         for k in range(ties.count):
             sum_tie(particles, rigid, ties, world, k, dt)
         for k in range(holds.count):
