@@ -35,6 +35,8 @@ PRESSED = 5e5
 """[Pa] Young's modulus of a cloth across its thickness. Fabrics give ten times as easily, rubber as much. Between two
 hard fingers a cloth that gives nothing is held by whichever few corners and vertices happen to be nearest, by µm; one
 that gives spreads the load: between 2e5 and 1e6 Pa what holds is 2 mu N."""
+UNMET_FRAMES = 6
+"""Frames one after the other after which it is told that a grip or joint is not met: an impact is over by then."""
 RIM_POINTS = 16
 """Corners that stand for the rim of a cylinder, at least: as many as leave the skin's thickness between it and them."""
 
@@ -121,7 +123,7 @@ class CoupledBodies:
         self._tell_unmet(time + duration, substeps[0])
 
     def _tell_unmet(self, time: float, substeps: int) -> None:
-        """Say once of each grip that it was not met in half of the frame's substeps and more."""
+        """Say once of each grip that it was not met in most substeps of some frames one after the other."""
         if not self._ties:
             return
         ties, holds, joints = self.coupling.unmet()
@@ -134,9 +136,11 @@ class CoupledBodies:
         grips = [*self._point_ties, *self._frame_holds, *self._joints.joints]
         for grip, unmet in zip(grips, counts, strict=True):
             unmet = np.where(self.kept[grip.body], unmet, 0)
-            if 2 * unmet.max() > substeps and not grip.told_unmet:
-                grip.told_unmet = True
-                tell_unmet(grip, time)
+            if grip.unmet_frames >= 0:
+                grip.unmet_frames = grip.unmet_frames + 1 if 2 * unmet.max() > substeps else 0
+                if grip.unmet_frames == UNMET_FRAMES:
+                    grip.unmet_frames = -1
+                    tell_unmet(grip, time)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray] | None:
         """Force [N] and torque [N m] (worlds, 3) of a tie or hold over the last frame; None if it is not of these."""

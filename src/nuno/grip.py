@@ -73,7 +73,7 @@ class Grip:
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
         self._offsets = offsets
         self._world: Simulation | None = None
-        self.told_unmet = False  # whether it was said already that it cannot be met
+        self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
 
     def __repr__(self) -> str:
         return f"<grip on {self.body.name!r}, {'active' if self.active else 'released'}>"
