@@ -54,6 +54,9 @@ from nuno.errors import (
 )
 from nuno.export import export_body
 from nuno.grip import Grip
+from nuno.joint import Joint
+from nuno.joint_drives import Motor, Spring
+from nuno.joints import ball_joint, fixed_joint, hinge, slider
 from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.path import Path
 from nuno.recording import Recording
@@ -156,6 +159,7 @@ __all__ = [
     "ImageError",
     "ImprovedFold",
     "InvalidInputError",
+    "Joint",
     "JointTrajectory",
     "Lamp",
     "Layers",
@@ -167,6 +171,7 @@ __all__ = [
     "MessageError",
     "Minimum",
     "MissingPackageError",
+    "Motor",
     "Names",
     "NotConnectedError",
     "NunoError",
@@ -203,6 +208,7 @@ __all__ = [
     "SoftSphere",
     "SoftTetrahedra",
     "Sphere",
+    "Spring",
     "StereoPoints",
     "StereoTrack",
     "Stride",
@@ -223,6 +229,7 @@ __all__ = [
     "WireRobot",
     "WorkerLostError",
     "World",
+    "ball_joint",
     "box",
     "capsule",
     "carry_mat",
@@ -237,6 +244,8 @@ __all__ = [
     "export_body",
     "find_layers",
     "fit_material",
+    "fixed_joint",
+    "hinge",
     "improve_fold",
     "lift_soft_cube",
     "locate_marker",
@@ -253,6 +262,7 @@ __all__ = [
     "replay_fold",
     "sheet",
     "similarity",
+    "slider",
     "soft_box",
     "soft_capsule",
     "soft_cylinder",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nuno.body import Body
+    from nuno.grip import Grip
 
 
 class ContactRules:
@@ -14,15 +16,22 @@ class ContactRules:
     Attributes:
         friction: The coefficient of each pair that has its own.
         ignored: The pairs that pass through each other.
+        held: Those that do while a grip holds one of them; see `set_held`.
     """
 
     def __init__(self) -> None:
         self.friction: dict[frozenset[str], Any] = {}
         self.ignored: set[frozenset[str]] = set()
+        self.held: set[frozenset[str]] = set()
+
+    def set_held(self, grips: Iterable[Grip]) -> None:
+        """Take the pairs of all active grips: what holds a rigid body is no obstacle to it."""
+        self.held = {frozenset((grip.body.key, key)) for grip in grips for key in grip.ignored}
 
     def touch(self, a: Body, b: Body) -> bool:
         """Return whether two bodies touch each other at all."""
-        if frozenset((a.key, b.key)) in self.ignored:
+        pair = frozenset((a.key, b.key))
+        if pair in self.ignored or pair in self.held:
             return False
         return bool(a.group & b.collides_with) and bool(b.group & a.collides_with)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +12,10 @@ from nuno import quaternion as quat
 from nuno.contact.convex import BALL, BLOCK, DRUM, HULL, ROD
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
+from nuno.coupled_joints import CoupledJoints
 from nuno.dynamics import ParticleDynamics, touches_itself
-from nuno.grip import Grip
+from nuno.grip import Grip, tell_unmet
+from nuno.joint import Joint
 from nuno.rigid_dynamics import RigidDynamics
 from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
 from nuno.scene.ridges import Ridges, ridges_of
@@ -31,6 +34,8 @@ PRESSED = 5e5
 """[Pa] Young's modulus of a cloth across its thickness. Fabrics give ten times as easily, rubber as much. Between two
 hard fingers a cloth that gives nothing is held by whichever few corners and vertices happen to be nearest, by µm; one
 that gives spreads the load: between 2e5 and 1e6 Pa what holds is 2 mu N."""
+UNMET_FRAMES = 6
+"""Frames one after the other after which it is told that a grip or joint is not met: an impact is over by then."""
 RIM_POINTS = 16
 """Corners that stand for the rim of a cylinder, at least: as many as leave the skin's thickness between it and them."""
 
@@ -80,7 +85,10 @@ class CoupledBodies:
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
-        self.coupling = Coupling(solvers, rigid, slots, elements, self._make_ties(), self._make_holds())
+        self._joints = CoupledJoints(world, [grip for grip in ties if isinstance(grip, Joint)], self.bodies)
+        self.coupling = Coupling(
+            solvers, rigid, slots, elements, self._make_ties(), self._make_holds(), self._joints.table
+        )
 
     def is_current(self) -> bool:
         """Whether the solvers still are those that the tables speak of."""
@@ -103,6 +111,7 @@ class CoupledBodies:
         """
         self.kept = kept
         self._lead_holds(time, duration)
+        self._joints.bring()
         if self.rigid and self._world._rigid is not None:
             self.coupling.led = self._world._rigid.lead(self._world, time, duration)
         # the group's numbers are those of the world's order, the coupling's have rigid bodies last
@@ -110,6 +119,27 @@ class CoupledBodies:
         number[[list(party).index(body) for body in self.bodies]] = np.arange(len(self.bodies))
         first = number[np.stack([party[body] for body in self.bodies])]
         self.coupling.run_frame(time, duration, substeps, first)
+        self._tell_unmet(time + duration, substeps[0])
+
+    def _tell_unmet(self, time: float, substeps: int) -> None:
+        """Say once of each grip that it was not met in most substeps of some frames one after the other."""
+        if not self._ties:
+            return
+        ties, holds, joints = self.coupling.unmet()
+        starts = np.cumsum([0, *self._tie_counts])
+        counts = [
+            *(ties[:, a:b].max(axis=1, initial=0) for a, b in itertools.pairwise(starts)),
+            *holds.T,
+            *joints.T,
+        ]
+        grips = [*self._point_ties, *self._frame_holds, *self._joints.joints]
+        for grip, unmet in zip(grips, counts, strict=True):
+            unmet = np.where(self.kept[grip.body], unmet, 0)
+            if grip.unmet_frames >= 0:
+                grip.unmet_frames = grip.unmet_frames + 1 if 2 * unmet.max() > substeps else 0
+                if grip.unmet_frames == UNMET_FRAMES:
+                    grip.unmet_frames = -1
+                    tell_unmet(grip, time)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray] | None:
         """Force [N] and torque [N m] (worlds, 3) of a tie or hold over the last frame; None if it is not of these."""
@@ -127,7 +157,17 @@ class CoupledBodies:
             # from the centre of mass to the origin of the body's frame
             arm = quat.rotate(held.solver.pose(held.slot)[1], np.broadcast_to(held.centre, force[:, k].shape))
             return -force[:, k], -torque[:, k] - np.cross(arm, force[:, k])
+        if grip in self._joints.joints:
+            force, torque, _ = self.coupling.joint_wrenches()
+            k = self._joints.joints.index(grip)
+            return -force[:, k], -torque[:, k]
         return None
+
+    def effort(self, joint: Joint) -> np.ndarray | None:
+        """(worlds,), what acted along a joint's free direction in the last frame; None if it is not of these."""
+        if joint not in self._joints.joints:
+            return None
+        return self.coupling.joint_wrenches()[2][:, self._joints.joints.index(joint)]
 
     def contacts(self, body: Body, itself: bool = False) -> list[tuple[Any, ...]]:
         """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep.
@@ -261,8 +301,13 @@ class CoupledBodies:
         ties.slot, ties.point, ties.compliance = put(slots, int), put(points, wp.vec3, 3), put(compliance, float)
         owners = np.repeat([self.bodies.index(grip.body) for grip in self._point_ties], self._tie_counts)
         ties.body = wp.array(owners.astype(np.int32) if ties.count else np.zeros(1, np.int32), dtype=int, device=device)
-        for name in ("pull", "total"):
-            setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=wp.vec3, device=device))
+        for name, kind in (("pull", wp.vec3), ("total", wp.vec3), ("unmet", int)):
+            setattr(ties, name, wp.zeros(max(1, worlds * ties.count), dtype=kind, device=device))
+        most = [
+            np.repeat(_limits(grip, worlds)[:, None], n, axis=1)
+            for grip, n in zip(self._point_ties, self._tie_counts, strict=True)
+        ]
+        ties.limit = put(most, float)
         return ties
 
     def _tie_points(self, grip: Grip) -> np.ndarray:
@@ -299,6 +344,9 @@ class CoupledBodies:
         holds.turn = wp.zeros(2 * room, dtype=wp.quat, device=device)
         for name in ("pull", "twist", "total", "total_twist"):
             setattr(holds, name, wp.zeros(room, dtype=wp.vec3, device=device))
+        holds.unmet = wp.zeros(room, dtype=int, device=device)
+        most = np.stack([_limits(grip, worlds) for grip in self._frame_holds] or [np.zeros(worlds)], axis=1)
+        holds.limit = wp.array(most.astype(np.float32).ravel(), dtype=float, device=device)
         return holds
 
     def _lead_holds(self, time: float, duration: float) -> None:
@@ -328,6 +376,11 @@ class CoupledBodies:
         holds.place.assign(wp.array(place.reshape(-1, 3).astype(np.float32), dtype=wp.vec3, device=device))
         turns = np.roll(turn.reshape(-1, 4), -1, axis=-1).astype(np.float32)
         holds.turn.assign(wp.array(turns, dtype=wp.quat, device=device))
+
+
+def _limits(grip: Grip, worlds: int) -> np.ndarray:
+    """(worlds,) [N], what a tie or hold bears at most."""
+    return np.broadcast_to(np.asarray(grip._spec.max_force, dtype=float), (worlds,))
 
 
 def _surface_rules(body: Body, solver: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import uuid
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,12 +15,15 @@ from nuno.coordinates import Pose, apply, compose, invert
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.path import Path
 from nuno.surface import chosen_points
-from nuno.tie import HoldSpec, TieSpec, make_hold, make_tie
+from nuno.tie import force_limit, make_hold, make_tie
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.body import Body
     from nuno.simulation import Simulation
+
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +58,12 @@ class Grip:
         target: The body that leads it or that it is tied to, or None.
     """
 
+    noun: ClassVar[str] = "grip"
+
     def __init__(
         self,
         body: Body,
-        spec: GripSpec | TieSpec | HoldSpec,
+        spec: Any,
         target: Body | None = None,
         offsets: Any = None,
     ) -> None:
@@ -68,6 +75,7 @@ class Grip:
         # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame
         self._led: tuple[float, Pose, Pose] | None = None
         self._world: Simulation | None = None
+        self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
 
     def __repr__(self) -> str:
         return f"<grip on {self.body.name!r}, {'active' if self.active else 'released'}>"
@@ -81,6 +89,20 @@ class Grip:
     def compliance(self) -> float:
         """[m/N]; 0 is stiff."""
         return float(self._spec.compliance)
+
+    @property
+    def max_force(self) -> Any:
+        """[N], the most that it bears, a number or (worlds,); of a rigid body's turns as much [N m].
+
+        Infinite for points that follow a path, a place or a static body.
+        """
+        limit = np.atleast_1d(getattr(self._spec, "max_force", np.inf))
+        return float(limit[0]) if len(limit) == 1 else limit.copy()
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Keys of the bodies that a held rigid body passes through while it is held."""
+        return tuple(getattr(self._spec, "ignored", ()))
 
     @property
     def is_tie(self) -> bool:
@@ -168,9 +190,44 @@ class Grip:
         return before, goal
 
 
+def tell_unmet(grip: Grip, time: float) -> None:
+    """Warn that a grip cannot be met, at a time [s]: it bears its limit, or does not come to where it leads."""
+    other = "" if grip.target is None else f" to {grip.target.name!r}"
+    log.warning(
+        "the %s of %r%s is not met at t = %.3f s: a contact, a grip or a joint holds against it, and it bears %s N at "
+        "most (max_force). Lead it elsewhere, release what contradicts it, let the bodies' contact be ignored, or give "
+        "a grip a compliance",
+        grip.noun, grip.body.name, other, time, f"{np.max(grip.max_force):.4g}",
+    )  # fmt: skip
+
+
+def tell_shared(grip: Grip) -> None:
+    """Warn where a new stiff grip holds vertices that another one holds stiffly: only one can lead them."""
+    mine = _stiff_vertices(grip)
+    if mine is None or grip.body._dynamics is None:
+        return
+    for other in grip.body._dynamics.grips:
+        theirs = _stiff_vertices(other)
+        if theirs is None:
+            continue
+        both = (mine[:, :, None] == theirs[:, None, :]) & (mine >= 0)[:, :, None]
+        if both.any():
+            log.warning(
+                "vertices %s of %r are held by two stiff grips: one of them leads, and what the two bear is not what "
+                "acts. Release the other grip, or give one a compliance",
+                sorted({int(k) for k in mine[both.any(axis=2)]}), grip.body.name,
+            )  # fmt: skip
+
+
+def _stiff_vertices(grip: Grip) -> np.ndarray | None:
+    spec = grip._spec
+    return spec.vertices if isinstance(spec, GripSpec) and spec.compliance == 0.0 else None
+
+
 def make_grip(
-    body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation
-) -> Grip:
+    body: Body, where: Any, to: Any, compliance: float, target: Body | None, free: Any, world: Simulation,
+    *, max_force: Any = None, ignored: Sequence[Body] | None = None,
+) -> Grip:  # fmt: skip
     """Return a grip on ``body``, not yet active; see ``World.grip``.
 
     Raises:
@@ -178,17 +235,28 @@ def make_grip(
     """
     worlds = world.world_count
     assert body._dynamics is not None
+    if ignored is not None and not body._dynamics.is_rigid:
+        raise InvalidInputError(f"ignore is for rigid bodies only; {body.name!r} touches what holds its points")
     if body._dynamics.is_rigid:
         if where is not None:
             raise InvalidInputError(f"{body.name!r} is rigid and is gripped as a whole: where must be None")
         hold, local_pose = make_hold(body, to, target, free, compliance, world)
-        return Grip(body, hold, target, local_pose)
+        passed = ([] if target is None else [target]) if ignored is None else ignored
+        passed_by = tuple(other.key for other in passed if other is not body)
+        limit = force_limit(max_force, worlds, body, target)
+        return Grip(body, replace(hold, max_force=limit, ignored=passed_by), target, local_pose)
     if free is not None:
         raise InvalidInputError("free is for rigid bodies only")
     if where is None:
         raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
     if target is not None and target._dynamics is not None:
-        return Grip(body, make_tie(body, where, target, compliance, world), target)
+        tie = make_tie(body, where, target, compliance, world)
+        return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
+    if max_force is not None:
+        raise InvalidInputError(
+            f"max_force is for rigid bodies and for grips led by a dynamic body; points of {body.name!r} follow a "
+            "path, a place or a static body exactly: give a compliance [m/N] to let them yield"
+        )
     present = body.vertices
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))

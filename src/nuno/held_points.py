@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.coordinates import compose
 from nuno.grip import GripSpec
+from nuno.joint import JointSpec
 from nuno.tie import HoldSpec
 
 if TYPE_CHECKING:
@@ -25,6 +27,8 @@ def held_points(grip: Grip, index: int = 0, vertices: np.ndarray | None = None) 
     if isinstance(spec, HoldSpec):
         place = grip.body._pose()[0]
         return np.atleast_2d(place[index] if place.ndim == 2 else place)
+    if isinstance(spec, JointSpec):
+        return compose(grip.body._pose(), (spec.place, spec.turn))[0][index : index + 1]
     if vertices is None:
         own = grip.body._vertices()
         vertices = own[index if len(own) > 1 else 0] if own.ndim == 3 else own

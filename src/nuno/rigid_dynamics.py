@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno import quaternion as quat
 from nuno.body_motion import BodyMotion, motion_of_rigid
-from nuno.coordinates import Pose, apply, compose, invert
+from nuno.coordinates import Pose, compose, invert
 from nuno.dynamics import Dynamics, State, check_material
 from nuno.given_velocity import GivenVelocity
 from nuno.mass_properties import mass_properties
@@ -94,7 +94,7 @@ class RigidScene:
         for key in [key for key in self.static if key not in seen]:
             self.solver.remove(self.static.pop(key).slot)
         rules = world._rules
-        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored)}
+        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored | rules.held)}
         pairs: dict[tuple[int, int], Any] = {}
         for pair, mu in exceptions.items():
             if len(pair) == 2 and all(key in slots for key in pair):
@@ -140,6 +140,13 @@ class RigidScene:
                 longer = True
         if longer:
             solver._list_anew()
+
+    def slot_of(self, world: Simulation, body: Body) -> int | None:
+        """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
+        if isinstance(body._dynamics, RigidDynamics):
+            return body._dynamics.slot
+        static = self.static.get(body.key)
+        return None if static is None else static.slot
 
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""

@@ -170,6 +170,8 @@ class Simulation:
         self._known_grips[grip.key] = grip
         grip.body._dynamics.grips.append(grip)
         grip.body._dynamics.grips_changed = True
+        if grip.ignored:
+            self._colliders_changed()
 
     def _drop_grip(self, grip: Grip) -> None:
         grip._world = None
@@ -177,9 +179,12 @@ class Simulation:
         if dynamics is not None:
             dynamics.grips = [other for other in dynamics.grips if other is not grip]
             dynamics.grips_changed = True
+            if grip.ignored:
+                self._colliders_changed()
 
     def _colliders_changed(self) -> None:
         self._collider_version += 1
+        self._rules.set_held(grip for dynamics in self._attached() for grip in dynamics.grips)
         self._colliders.clear()
         self._led = None
 

@@ -16,6 +16,7 @@ from nuno.coordinates import Pose, compose, invert
 from nuno.dynamics import Dynamics, Push, State, make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.grip import Grip, GripSpec
+from nuno.joint import Joint, JointSpec
 from nuno.materials import Material
 from nuno.motion import CompanyPath, of_world
 from nuno.path import Path
@@ -73,7 +74,7 @@ class GripRecord:
 
     key: str
     body: str
-    spec: GripSpec | TieSpec | HoldSpec
+    spec: GripSpec | TieSpec | HoldSpec | JointSpec
     target: str | None
     offsets: Any  # of points an array, of a rigid body a place and a turn, or None
     led: tuple[float, Pose, Pose] | None = None  # see ``Grip``
@@ -331,12 +332,20 @@ def _fill(body: Body, record: BodyRecord) -> None:
 def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation) -> None:
     grip = world._known_grips.get(record.key)
     target = None if record.target is None else bodies[record.target]
+    spec = _with_own_keys(record.spec, bodies)
     if grip is None:
-        grip = Grip(bodies[record.body], record.spec, target, record.offsets)
+        made = Joint if isinstance(spec, JointSpec) else Grip
+        grip = made(bodies[record.body], spec, target, record.offsets)
         grip.key = record.key
-    grip.body, grip.target, grip._spec = bodies[record.body], target, record.spec
+    grip.body, grip.target, grip._spec = bodies[record.body], target, spec
     grip._offsets, grip._led = record.offsets, record.led
     world._hold(grip)
+
+
+def _with_own_keys(spec: Any, bodies: dict[str, Body]) -> Any:
+    """Let a grip's spec name bodies by their own keys, which differ where a file named them by others."""
+    ignored = getattr(spec, "ignored", ())
+    return replace(spec, ignored=tuple(bodies[key].key for key in ignored if key in bodies)) if ignored else spec
 
 
 def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:

@@ -22,6 +22,7 @@ from nuno.compound import Compound
 from nuno.dynamics import Push
 from nuno.errors import FileFormatError, NunoError
 from nuno.grip import GripSpec
+from nuno.joint import JointSpec
 from nuno.materials import Cloth, Rigid, Soft
 from nuno.path import Path
 from nuno.rigid_layout import RigidLayout, RigidPlace
@@ -39,7 +40,7 @@ SHAPES = (
     shapes.TriangleMesh, shapes.Hull, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
     soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
 )  # fmt: skip
-GRIPS = (GripSpec, TieSpec, HoldSpec)
+GRIPS = (GripSpec, TieSpec, HoldSpec, JointSpec)
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (

@@ -20,6 +20,7 @@ from nuno.path import Path
 if TYPE_CHECKING:
     from nuno.body import Body
     from nuno.grip import Grip
+    from nuno.joint import Joint
     from nuno.simulation import Simulation
 
 KEPT = 16
@@ -168,6 +169,15 @@ class Stepping:
         count = np.maximum(held.sum(axis=1, keepdims=True), 1)
         arms = np.where(held, now - np.where(held, now, 0.0).sum(axis=1, keepdims=True) / count, 0.0)
         return forces.sum(axis=1), np.cross(arms, forces).sum(axis=1)
+
+    def effort(self, joint: Joint) -> np.ndarray:
+        """(worlds,), what acted along a joint's free direction in the last frame; see ``Joint.effort``."""
+        total = np.zeros(self._world.world_count)
+        for coupled in self.last:
+            own = coupled.effort(joint)
+            if own is not None:
+                total[coupled.kept[joint.body]] = own[coupled.kept[joint.body]]
+        return total
 
 
 def _joined(first: np.ndarray, members: list[int]) -> list[list[int]]:

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from nuno.simulation import Simulation
 
 
+MOST_FORCE = 1e4
+"""[N] The most that a grip or weld bears where nothing else is asked for: ten times what a person lifts."""
+MOST_ACCELERATION = 1e3
+"""[m/s2] What a grip or weld can give the heaviest of the rigid bodies that it holds, at least: 100 g."""
+
+
 @dataclass(frozen=True, eq=False)
 class TieSpec:
     """Points of a cloth or soft body that stay on points of another body that moves.
@@ -32,6 +38,7 @@ class TieSpec:
         other_weights: Likewise.
         places: (worlds, k, 3) float64 [m] in the other body's frame where that is rigid, or None.
         compliance: [m/N], 0 is stiff.
+        max_force: (worlds,) float64 [N], the most that each point bears.
     """
 
     corners: np.ndarray
@@ -40,6 +47,7 @@ class TieSpec:
     other_weights: np.ndarray | None
     places: np.ndarray | None
     compliance: float
+    max_force: np.ndarray | float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +56,14 @@ class HoldSpec:
 
     Attributes:
         times: (m,) float64 [s] of the world's clock.
-        positions: (worlds, m, 3) float64 [m], of the body's frame; in the leader's frame where it has one.
+        positions: (worlds, m, 3) float64 [m], of the body's frame; in a dynamic leader's frame where it has one. Of a
+            static leader, the last frame's start and end, once it has led one.
         quaternions: (worlds, m, 4) float64, likewise.
         interpolation: "linear" or "minimum_jerk".
         free: (3,) float64, the direction along which the body slides freely, of length 1, or None.
         compliance: [m/N], and [1/(N m)] for turns; 0 is stiff.
+        max_force: (worlds,) float64 [N], the most that it bears; of turns as much [N m].
+        ignored: Keys of the bodies that the held one passes through.
     """
 
     times: np.ndarray
@@ -61,20 +72,51 @@ class HoldSpec:
     interpolation: str
     free: np.ndarray | None
     compliance: float
+    max_force: np.ndarray | float = np.inf
+    ignored: tuple[str, ...] = ()
 
     def at(self, time: float) -> Pose:
         """Return positions (worlds, 3) and quaternions (worlds, 4) at a time [s]."""
         path = Path(self.times, self.positions, self.quaternions, self.interpolation)  # type: ignore[arg-type]
         return path.at(time), path.quaternion_at(time)
 
+    def pose_at(self, key: int) -> Pose:
+        """Return positions (worlds, 3) and quaternions (worlds, 4) at a key."""
+        return self.positions[:, key], self.quaternions[:, key]
+
 
 def spread_spec(spec: Any, batched: Any) -> Any:
     """Return a grip's, tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
     names = (
         "vertices", "corners", "barycentric", "weights", "other_corners", "other_weights", "places", "positions",
-        "quaternions",
+        "quaternions", "place", "turn", "other_place", "other_turn", "drives",
     )  # fmt: skip
-    return replace(spec, **{name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)})
+    changed = {name: batched(getattr(spec, name)) for name in names if hasattr(spec, name)}
+    limit = getattr(spec, "max_force", None)
+    return replace(spec, **changed, **({"max_force": batched(limit)} if isinstance(limit, np.ndarray) else {}))
+
+
+def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
+    """Return (worlds,) float64 [N], what a grip or weld of some bodies bears at most.
+
+    Args:
+        asked: What the caller gave: one value, (worlds,), or None.
+        worlds: Worlds in the batch.
+        bodies: Those that are held, by whose mass a limit is chosen where None is asked for.
+
+    Raises:
+        InvalidInputError: a limit that is not positive, or of another shape.
+    """
+    if asked is not None:
+        if np.shape(asked) == () and asked == np.inf:
+            return np.full(worlds, np.inf)
+        limit = np.broadcast_to(finite_array("max_force", asked, (), (worlds,)), (worlds,)).copy()
+        if (limit <= 0.0).any():
+            raise InvalidInputError(f"max_force must be positive, got {asked!r}")
+        return limit
+    rigid: list[Any] = [b._dynamics for b in bodies if b is not None and b._dynamics is not None]
+    masses = [np.asarray(dynamics.mass) for dynamics in rigid if dynamics.is_rigid]
+    return np.max([np.full(worlds, MOST_FORCE), *(MOST_ACCELERATION * mass for mass in masses)], axis=0)
 
 
 def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from nuno.body import Body
 from nuno.dynamics import ParticleDynamics, check_material, default_material, make_push, start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.given_velocity import given_velocity, present_velocity
-from nuno.grip import Grip, make_grip
+from nuno.grip import Grip, make_grip, tell_shared
+from nuno.joint import Joint, check_joined
 from nuno.materials import Material, Rigid
 from nuno.motion import arrive, path_for
 from nuno.path import Path
@@ -130,8 +132,8 @@ class World(Running):
                 to keep, also where it was detached at this instant: it starts at rest.
 
         Raises:
-            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path, or
-                would deform while it holds a rigid body.
+            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path,
+                or would deform while it holds a rigid body.
             InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
             MeshError: a rigid body without volume.
         """
@@ -149,11 +151,17 @@ class World(Running):
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
+            check_joined(own, chosen, self)
             given = None if own._dynamics is None else present_velocity(own)
             if velocity is not None or angular_velocity is not None:
                 is_rigid = isinstance(chosen, Rigid)
                 given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
-            led = [grip for other in self._attached() for grip in other.grips if grip.target is own]
+            led = [
+                grip
+                for other in self._attached()
+                for grip in other.grips
+                if grip.target is own and not isinstance(grip, Joint)
+            ]
             if own._dynamics is None:
                 check_leader(own, not isinstance(chosen, Rigid), led)
             dynamics = start_dynamics(own._as_static(), chosen, self)
@@ -228,8 +236,9 @@ class World(Running):
             self._colliders_changed()
 
     def grip(
-        self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None
-    ) -> Grip:
+        self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,
+        max_force: ArrayLike | None = None, ignore: Sequence[Body | str] | None = None,
+    ) -> Grip:  # fmt: skip
         """Hold points of a dynamic body, or a rigid one as a whole, from now on.
 
         Args:
@@ -242,10 +251,14 @@ class World(Running):
                 nearest points. If that body is dynamic it bears the force.
             compliance: [m/N]; 0 is stiff. Of a rigid body's turns as much [1/(N m)].
             free: (3,), a direction of the world along which a rigid body may slide; None holds it entirely.
+            max_force: [N], a number or (worlds,): the most that the grip bears, at each point where it holds points,
+                and as much [N m] of a rigid body's turns. None is 10 kN, or 1,000 m/s2 times the mass of the heaviest
+                rigid body that it joins. Points that follow a path, a place or a static body have no limit.
+            ignore: Bodies that a rigid body passes through while it is held; None is ``to``, where that is a body.
 
         Raises:
             BodyStateError: the body is static.
-            InvalidInputError: a vertex out of range, or a target that cannot be used.
+            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit where there is none.
         """
         with self._change("grip"):
             own = self._own(body)
@@ -257,11 +270,18 @@ class World(Running):
             if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
                 if not target._dynamics.is_rigid:
                     raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
-            grip = make_grip(own, where, to, number("compliance", compliance, low=0.0), target, free, self)
+            grip = make_grip(
+                own, where, to, number("compliance", compliance, low=0.0), target, free, self, max_force=max_force,
+                ignored=None if ignore is None else [self._own(other) for other in ignore],
+            )  # fmt: skip
+            tell_shared(grip)
             self._hold(grip)
         return grip
 
-    def weld(self, a: Body | str, b: Body | str, where: Any = None, *, compliance: float = 0.0) -> Grip:
+    def weld(
+        self, a: Body | str, b: Body | str, where: Any = None, *, compliance: float = 0.0,
+        max_force: ArrayLike | None = None,
+    ) -> Grip:  # fmt: skip
         """Join two dynamic bodies where they are now, until the grip that is returned is released.
 
         Args:
@@ -269,6 +289,7 @@ class World(Running):
             b: Another body. Points of ``a`` stay on its nearest points, or at their places in its frame if it is rigid.
             where: None where both are rigid.
             compliance: [m/N]; 0 is stiff.
+            max_force: [N], the most that it bears; see ``grip``.
 
         Raises:
             BodyStateError: one of them is static.
@@ -276,7 +297,7 @@ class World(Running):
         """
         with self._change("weld"):
             check_weld(self._own(a), self._own(b))
-            return self.grip(a, where, to=self._own(b), compliance=compliance)
+            return self.grip(a, where, to=self._own(b), compliance=compliance, max_force=max_force)
 
     def push(
         self, body: Body | str, force: ArrayLike, torque: ArrayLike | None = None, duration: float | None = None

@@ -51,6 +51,7 @@ class Hand:
         if self.description.joint is not None:
             robot.joint_index(self.description.joint)
         self.body, self._offset = carrier(links, name)
+        self._shapes = carried_by(links, self.body)
         self._grips: list[Grip] = []
 
     def __repr__(self) -> str:
@@ -122,7 +123,9 @@ class Hand:
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
-                    self._grips.append(world.grip(body, where, to=self.body))
+                    rigid = body._dynamics is not None and body._dynamics.is_rigid
+                    ignored = self._shapes if rigid else None
+                    self._grips.append(world.grip(body, where, to=self.body, ignore=ignored))
         return self.held
 
     def open(self) -> None:
@@ -188,6 +191,19 @@ def carrier(links: Links, frame: str) -> tuple[Body, Pose]:
         raise InvalidInputError(f"no link that is fixed to {frame!r} of {robot.name!r} has a shape in the world")
     k = next((k for k in fixed if links.names[k] == name), fixed[0])
     return links.bodies[k], compose(invert(links.offset_of(k)), pose_of(own.placement))
+
+
+def carried_by(links: Links, body: Body) -> list[Body]:
+    """Return a link's body and those of all links that it carries, such as a hand's fingers."""
+    model = links.robot.model
+    own = links.joints[links.bodies.index(body)]
+
+    def is_carried(joint: int) -> bool:
+        while joint > own:  # a joint's parent has a lower number
+            joint = model.parents[joint]
+        return joint == own
+
+    return [other for other, joint in zip(links.bodies, links.joints, strict=True) if is_carried(joint)]
 
 
 def hands_of(links: Links) -> dict[str, Hand]:

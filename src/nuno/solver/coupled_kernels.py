@@ -2,9 +2,11 @@
 
 import warp as wp
 
+from nuno.contact.coupled_joints import begin_joint, joint_at, project_joint, settle_spins, sum_joint, turns_of
 from nuno.contact.coupled_particles import Particles, bound_all
 from nuno.contact.coupled_rows import Rows, drag_row, forget_sharers, join_row, push_row, take_sums
-from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie
+from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
+from nuno.contact.joint_block import Joints
 from nuno.solver.lanes import barrier
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.warps import anyone
@@ -175,8 +177,8 @@ def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
 
 @wp.kernel(enable_backward=False)
 def solve(
-    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, passing: Passing, dt: float,
-    fraction: float, passes: int, at_once: int, threads: int,
+    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, joints: Joints, passing: Passing,
+    dt: float, fraction: float, passes: int, at_once: int, threads: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
@@ -192,6 +194,8 @@ def solve(
         for k in range(holds.count):
             holds.pull[world * holds.count + k] = wp.vec3(0.0, 0.0, 0.0)
             holds.twist[world * holds.count + k] = wp.vec3(0.0, 0.0, 0.0)
+        for k in range(joints.count):
+            begin_joint(joints, world, k)
     done = int(0)
     for k_pass in range(passes + LAST_PASSES):
         if done == 0:
@@ -232,6 +236,13 @@ def solve(
                         off = project_hold(rigid, holds, world, k, dt, fraction)
                         note_wrong(passing, party, off, threads)
                         wrong = wp.max(wrong, off)
+                for at in range(turns_of(joints)):
+                    k = joint_at(joints, at)
+                    party = party_of(passing, world, joints.body[k])
+                    if goes_on(passing, party):
+                        off = project_joint(rigid, joints, world, k, dt)
+                        note_wrong(passing, party, off, threads)
+                        wrong = wp.max(wrong, off)
             barrier(threads)
             end_pass(passing, world, thread, threads)
             if threads == 1 and wrong < ENOUGH:
@@ -241,12 +252,13 @@ def solve(
                 if not anyone(wrong >= ENOUGH):
                     done = 1
     if thread == 0:
+        for k in range(joints.count):
+            settle_spins(rigid, joints, world, k, dt)
         for k in range(ties.count):
-            r = world * ties.count + k
-            ties.total[r] = ties.total[r] + ties.pull[r]
+            sum_tie(particles, rigid, ties, world, k, dt)
         for k in range(holds.count):
-            r = world * holds.count + k
-            holds.total[r] = holds.total[r] + holds.pull[r]
-            holds.total_twist[r] = holds.total_twist[r] + holds.twist[r]
+            sum_hold(rigid, holds, world, k, dt, fraction)
+        for k in range(joints.count):
+            sum_joint(rigid, joints, world, k, dt)
     if at_once != 0:
         forget_sharers(particles, rigid, first, start, thread, threads)

@@ -14,6 +14,7 @@ from nuno.contact.coupled_particles import MOST, Particles
 from nuno.contact.coupled_rows import Rows
 from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
+from nuno.contact.joint_block import Joints
 from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, Passing, add_impulses, collect, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_body import RigidState
@@ -46,6 +47,7 @@ class Coupling:
         elements: Surfaces and what touches what.
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
+        joints: Rigid bodies that are joined.
     """
 
     def __init__(
@@ -56,9 +58,10 @@ class Coupling:
         elements: Elements,
         ties: Ties,
         holds: Holds,
+        joints: Joints,
     ) -> None:
         self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
-        self._elements, self._ties, self.holds = elements, ties, holds
+        self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
         self._scale = self._rate = 0.0
         self._listed = 0
         first = rigid if rigid is not None else solvers[0]
@@ -179,9 +182,14 @@ class Coupling:
         self._around = [self._surroundings(solver) for solver in self._solvers]
         if self._rigid is not None:
             self._rigid.open(time, dt, [*self._slots, *self.led])
-        for total in (self._ties.total, self.holds.total, self.holds.total_twist, self._particles.bounded_count):
-            total.zero_()
+        self._particles.bounded_count.zero_()
         self._impulses.zero_()
+        for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
+            total.zero_()
+        self.holds.step = 1.0 / substeps
+        if self.joints.count:
+            for name in ("total", "total_twist", "total_axial", "unmet"):
+                getattr(self.joints, name).zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
@@ -210,7 +218,7 @@ class Coupling:
 
         It then goes through the frame in one launch, with the same bits.
         """
-        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count or self.holds.count:
+        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count:
             return False
         layout = self._layouts[0]
         wp.launch(
@@ -241,10 +249,11 @@ class Coupling:
                         bound_particles, (worlds, layout.particles), layout, particles, elements, around, body, k + 1,
                         dt,
                     )  # fmt: skip
-        if self._listed or self._ties.count or self.holds.count:
+        if self._listed or self._ties.count or self.holds.count or self.joints.count:
             go(
-                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self._passing, dt,
-                fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
+                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self.joints,
+                self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once),
+                self._threads,
             )  # fmt: skip
             if self._listed:
                 go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
@@ -355,6 +364,25 @@ class Coupling:
     def tie_forces(self) -> np.ndarray:
         """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
         return self._per_world(self._ties.total, self._ties.count)
+
+    def unmet(self) -> list[np.ndarray]:
+        """(worlds, ties), (worlds, holds) and (worlds, joints) int, substeps of the frame that each was not met in."""
+        worlds = self.world_count
+        return [
+            part.unmet.numpy()[: worlds * part.count].reshape(worlds, part.count)
+            if part.count
+            else np.zeros((worlds, 0), dtype=int)
+            for part in (self._ties, self.holds, self.joints)
+        ]
+
+    def joint_wrenches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mean force [N] and torque [N m] on the joined bodies at their joints, and what acts along them, over a frame.
+
+        (worlds, joints, 3) twice, and (worlds, joints).
+        """
+        joints, worlds = self.joints, self.world_count
+        axial = joints.total_axial.numpy().reshape(worlds, joints.count).astype(float) * self._scale
+        return self._per_world(joints.total, joints.count), self._per_world(joints.total_twist, joints.count), axial
 
     def hold_wrenches(self) -> tuple[np.ndarray, np.ndarray]:
         """(worlds, holds, 3) each, the mean force [N] and torque [N m] on the held bodies' centres of mass."""

@@ -32,7 +32,7 @@ class RigidState:
     inverse_mass: wp.array(dtype=float)  # [1/kg], 0: not dynamic
     inertia: wp.array(dtype=wp.mat33)  # about the centre of mass, body frame [kg m2]
     inverse_inertia: wp.array(dtype=wp.mat33)
-    weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg]
+    weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg], negative once a hold says where it is
     give: wp.array(dtype=wp.mat33)  # the inverse inertia in this run, world frame, of where the substep began
 
 

@@ -46,10 +46,19 @@ def meeting_of(s: RigidState, parts: Parts, c: Contacts, world: int, e: int):
     m.n = c.normal_now[e]
     m.t = c.tangent_now[e]
     m.u = wp.cross(m.n, m.t)
-    m.wa = s.weight[m.i]
-    m.wb = s.weight[m.j]
+    wa = s.weight[m.i]
+    wb = s.weight[m.j]
+    m.wa = wp.abs(wa)
+    m.wb = wp.abs(wb)
     m.ia = s.give[m.i]
     m.ib = s.give[m.j]
+    # what is held (a negative weight) gives to what does not give either, but not to what is free
+    if wa < 0.0 and wb > 0.0:
+        m.wa = 0.0
+        m.ia = wp.mat33(0.0)
+    if wb < 0.0 and wa > 0.0:
+        m.wb = 0.0
+        m.ib = wp.mat33(0.0)
     return m
 
 
