@@ -1,5 +1,6 @@
 """Soft shapes and their bodies, before anything makes them move."""
 
+import json
 import sys
 
 import numpy as np
@@ -136,7 +137,8 @@ def test_given_tetrahedra():
         (lambda: nuno.soft_sphere(float("nan"), 0.1), "radius must be > 0"),
         (lambda: nuno.soft_sphere(10.0, 0.01), "cell must be larger"),
         (lambda: nuno.soft_cylinder(0.1, -1.0, 0.1), "height must be > 0"),
-        (lambda: nuno.soft_mesh(CUBE, 0.1, tetrahedraliser="tetgen"), '"lattice" or "pytetwild"'),
+        (lambda: nuno.soft_mesh(CUBE, 0.1, tetrahedraliser="tetgen"), '"fitted", "lattice" or "pytetwild"'),
+        (lambda: nuno.soft_sphere(0.1, 0.05, tetrahedraliser="pytetwild"), '"fitted" or "lattice"'),
         (lambda: nuno.soft_mesh((CUBE.vertices, CUBE.faces[1:]), 0.1), "is open"),
         (lambda: nuno.soft_mesh((CUBE.vertices, CUBE.faces[1:]), 0.1, tetrahedraliser="pytetwild"), "is open"),
     ],
@@ -171,6 +173,57 @@ def test_save_and_restore(tmp_path):
     kept = other.bodies
     other.restore(tmp_path / "room.npz")
     assert other.bodies == kept
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_round_shapes_are_in_place(name):
+    """The mean of the vertices, which is the body's position, is the shape's centre."""
+    for make in (ROUND[name][0], lambda: nuno.soft_sphere(0.1, 0.2 / 7)):
+        vertices, _ = make().skin()
+        np.testing.assert_allclose(vertices.min(axis=0) + vertices.max(axis=0), 0.0, atol=1e-12)
+
+
+def test_fitted_or_lattice():
+    """Fitted bodies keep to their surface; lattices have whole voxels about it, all of their corners off it."""
+    fitted, lattice = (nuno.soft_sphere(0.1, 0.2 / 12, tetrahedraliser=kind) for kind in ("fitted", "lattice"))
+    radius = [np.linalg.norm(body.vertices[np.unique(body.faces)], axis=1) for body in (fitted, lattice)]
+    np.testing.assert_allclose(radius[0], 0.1, rtol=6.1e-4)  # of 128 segments around and 64 rings
+    assert radius[1].max() > 0.11
+    assert fitted.shape == nuno.soft_sphere(0.1, 0.2 / 12).shape != lattice.shape
+
+
+def test_what_cannot_be_fitted_is_a_lattice_and_says_so(caplog):
+    """A plate thinner than a cell, aligned with nothing, is filled as before; the warning names the cell."""
+    turn = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))
+    plate = trimesh.creation.box((0.2, 0.2, 0.01)).apply_transform(turn)
+    with caplog.at_level("WARNING"):
+        body = nuno.soft_mesh(plate, cell=0.05)
+    assert "a cell of 0.05 m is too large" in caplog.text
+    made, asked = body.shape.tetrahedra(), nuno.soft_mesh(plate, 0.05, tetrahedraliser="lattice").shape.tetrahedra()
+    np.testing.assert_array_equal(made.vertices, asked.vertices)
+
+
+def test_a_file_that_does_not_say_is_of_lattices(tmp_path):
+    """Files of earlier versions have no tetrahedraliser; their bodies come back as the lattices that they were."""
+    world = nuno.World(device="cpu")
+    for kind in ("lattice", "fitted"):
+        world.add(nuno.soft_sphere(0.1, 0.05, tetrahedraliser=kind, name=kind))
+        world.add(nuno.soft_mesh(CUBE, 0.07, tetrahedraliser=kind, name=f"mesh {kind}"))
+    world.save(tmp_path / "room.npz")
+    with np.load(tmp_path / "room.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    header = json.loads(str(arrays["header"]))
+    for record in header["world"]["fields"]["bodies"]:
+        fields = record["fields"]["shape"]["fields"]
+        if fields["tetrahedraliser"] == "lattice":
+            del fields["tetrahedraliser"]
+    arrays["header"] = np.array(json.dumps(header))
+    np.savez(tmp_path / "old.npz", **arrays)
+    other = nuno.World(device="cpu")
+    other.restore(tmp_path / "old.npz")
+    for before, after in zip(world.bodies, other.bodies, strict=True):
+        assert before.shape.tetrahedraliser == after.shape.tetrahedraliser
+        np.testing.assert_array_equal(before.vertices, after.vertices)
 
 
 def test_missing_tetrahedraliser(monkeypatch):

@@ -101,38 +101,50 @@ def soft_box(size: ArrayLike, cells: tuple[int, int, int], **options: Unpack[Bod
     return Body(SoftBox(size, cells), **options)  # type: ignore[arg-type]
 
 
-def soft_sphere(radius: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
-    """Return a soft sphere of ``radius`` [m], in a lattice of voxels of at most ``cell`` [m]; options as for ``Body``.
+def soft_sphere(
+    radius: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
+    **options: Unpack[BodyOptions],
+) -> Body:  # fmt: skip
+    """Return a soft sphere of ``radius`` [m], from voxels of at most ``cell`` [m].
 
-    ``vertices`` are the lattice's; the round surface is ``Body.skin()``.
+    ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``. The tetrahedra are made as
+    by ``soft_mesh``, and so are those of ``soft_cylinder`` and ``soft_capsule``; options as for ``Body``.
     """
-    return Body(SoftSphere(radius, cell), **options)
+    return Body(SoftSphere(radius, cell, tetrahedraliser), **options)
 
 
-def soft_cylinder(radius: float, height: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
-    """Return a soft cylinder along z, in a lattice of voxels of at most ``cell`` [m]; options as for ``Body``."""
-    return Body(SoftCylinder(radius, height, cell), **options)
+def soft_cylinder(
+    radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
+    **options: Unpack[BodyOptions],
+) -> Body:  # fmt: skip
+    """Return a soft cylinder of ``radius`` and ``height`` [m] along z; otherwise as ``soft_sphere``."""
+    return Body(SoftCylinder(radius, height, cell, tetrahedraliser), **options)
 
 
-def soft_capsule(radius: float, height: float, cell: float, **options: Unpack[BodyOptions]) -> Body:
+def soft_capsule(
+    radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
+    **options: Unpack[BodyOptions],
+) -> Body:  # fmt: skip
     """Return a soft capsule along z, ``height`` [m] between its half spheres; otherwise as ``soft_sphere``."""
-    return Body(SoftCapsule(radius, height, cell), **options)
+    return Body(SoftCapsule(radius, height, cell, tetrahedraliser), **options)
 
 
 def soft_mesh(
-    source: MeshSource, cell: float, *, tetrahedraliser: Literal["lattice", "pytetwild"] = "lattice",
+    source: MeshSource, cell: float, *, tetrahedraliser: Literal["fitted", "lattice", "pytetwild"] = "fitted",
     **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
-    """Return what a closed surface bounds, as a soft body.
+    """Return the inside of a closed surface as a soft body.
 
-    A lattice of voxels around the surface, five tetrahedra each, moves; the surface is embedded in it (``Body.skin``).
-    With ``tetrahedraliser="pytetwild"`` the tetrahedra follow the surface instead (fTetWild; pip install
-    'nuno-sim[tetrahedra]'), and their own boundary is the skin.
+    Its bounding box is divided into voxels of five tetrahedra, whose boundary is moved onto the surface; the surface is
+    embedded in them (``Body.skin``). With ``tetrahedraliser="lattice"`` whole voxels around the surface move, whose
+    flat faces make the contacts; parts thinner than a cell need it, and where there are some it is taken with a
+    warning. With "pytetwild" the tetrahedra are fTetWild's (pip install 'nuno-sim[tetrahedra]'), and their own boundary
+    is the skin.
 
     Args:
         source: A path, a trimesh or (vertices, faces) [m].
         cell: Longest edge of a voxel [m], or the length of an edge that pytetwild aims at.
-        tetrahedraliser: "lattice" or "pytetwild".
+        tetrahedraliser: "fitted", "lattice" or "pytetwild".
         options: Those of ``Body``.
 
     Raises:
@@ -141,10 +153,10 @@ def soft_mesh(
         MissingPackageError: pytetwild is asked for and not installed.
     """
     vertices, faces = load_mesh(source)
-    if tetrahedraliser == "lattice":
-        return Body(SoftMesh(vertices, faces, cell), **options)
+    if tetrahedraliser in ("fitted", "lattice"):
+        return Body(SoftMesh(vertices, faces, cell, tetrahedraliser), **options)
     if tetrahedraliser != "pytetwild":
-        raise InvalidInputError(f'tetrahedraliser must be "lattice" or "pytetwild", got {tetrahedraliser!r}')
+        raise InvalidInputError(f'tetrahedraliser must be "fitted", "lattice" or "pytetwild", got {tetrahedraliser!r}')
     from nuno.mesh.tetrahedraliser import fitted_tetrahedra
 
     points, triangles = closed_mesh(vertices, faces)

@@ -181,8 +181,8 @@ class Body(Quantities, Coordinates):
     def skin(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the surface that is drawn: vertices (k, 3), in a batch (worlds, k, 3) [m], and faces (m, 3) int32.
 
-        Of a soft body in a lattice, this is the surface that is embedded in it; of any other body, its ``vertices`` and
-        ``faces``.
+        Of a soft body made from a surface, this is that surface, which is embedded in it; of any other body, its
+        ``vertices`` and ``faces``.
         """
         vertices = self.vertices
         if not isinstance(self._shape, SoftShape):

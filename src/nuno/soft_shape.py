@@ -1,27 +1,34 @@
 """Soft shapes: solids that are filled with tetrahedra.
 
 A soft shape's ``mesh()`` is that of its tetrahedra: all their vertices, which are what dynamics move, and their
-boundary. Where the tetrahedra are a lattice around a surface, the surface is the skin: it moves along with them, and
+boundary. Where the tetrahedra are made from a surface, the surface is the skin: it moves along with them, and
 ``Body.skin`` has it.
+
+``tetrahedraliser`` is "fitted" for tetrahedra whose boundary follows the surface, or "lattice" for whole voxels around
+it; a shape that does not say is a lattice, as those in files of earlier versions are.
 """
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
-from nuno.errors import MeshError
+from nuno.errors import InvalidInputError, MeshError
 from nuno.mesh import primitives
 from nuno.mesh.closed import check_closed
+from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra
 from nuno.mesh.lattice import MOST_VOXELS, lattice_tetrahedra
 from nuno.mesh.primitives import MeshArrays
 from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra, volumes
 from nuno.shape import Shape, checked_mesh, frozen, lengths
 from nuno.validation import count, finite_array, index_array, number
 
+logger = logging.getLogger(__name__)
+FITTED, LATTICE = "fitted", "lattice"
 FINE = 128  # segments around what a round shape's lattice is filled from: within 0.1 % of its volume
 
 
@@ -63,10 +70,11 @@ class SoftBox(SoftShape):
 
 @dataclass(frozen=True)
 class SoftSphere(SoftShape):
-    """A sphere of ``radius`` [m], in a lattice of voxels of at most ``cell`` [m]."""
+    """A sphere of ``radius`` [m], from voxels of at most ``cell`` [m]."""
 
     radius: float
     cell: float
+    tetrahedraliser: str = LATTICE
     kind: ClassVar[str] = "soft_sphere"
 
     def __post_init__(self) -> None:
@@ -76,11 +84,12 @@ class SoftSphere(SoftShape):
 
 @dataclass(frozen=True)
 class SoftCylinder(SoftShape):
-    """A cylinder of ``radius`` and ``height`` [m] along z, in a lattice of voxels of at most ``cell`` [m]."""
+    """A cylinder of ``radius`` and ``height`` [m] along z, from voxels of at most ``cell`` [m]."""
 
     radius: float
     height: float
     cell: float
+    tetrahedraliser: str = LATTICE
     kind: ClassVar[str] = "soft_cylinder"
 
     def __post_init__(self) -> None:
@@ -90,11 +99,12 @@ class SoftCylinder(SoftShape):
 
 @dataclass(frozen=True)
 class SoftCapsule(SoftShape):
-    """A capsule, ``height`` [m] along z between half spheres, in a lattice of voxels of at most ``cell`` [m]."""
+    """A capsule, ``height`` [m] along z between half spheres, from voxels of at most ``cell`` [m]."""
 
     radius: float
     height: float
     cell: float
+    tetrahedraliser: str = LATTICE
     kind: ClassVar[str] = "soft_capsule"
 
     def __post_init__(self) -> None:
@@ -104,12 +114,13 @@ class SoftCapsule(SoftShape):
 
 @dataclass(frozen=True, eq=False)
 class SoftMesh(SoftShape):
-    """What a closed surface bounds, in a lattice of voxels in which the surface is embedded.
+    """The inside of a closed surface, from voxels; the surface is embedded in their tetrahedra.
 
     Attributes:
         vertices: (n, 3) float [m]; those of no face are left out.
         faces: (m, 3) int, closed, counterclockwise from outside.
         cell: Longest edge of a voxel [m].
+        tetrahedraliser: "fitted" or "lattice".
 
     Raises:
         MeshError: the surface is open, inside out or intersects itself, or the cell is too small.
@@ -118,6 +129,7 @@ class SoftMesh(SoftShape):
     vertices: np.ndarray
     faces: np.ndarray
     cell: float
+    tetrahedraliser: str = LATTICE
     kind: ClassVar[str] = "soft_mesh"
 
     def __post_init__(self) -> None:
@@ -129,7 +141,7 @@ class SoftMesh(SoftShape):
 
     @property
     def centre(self) -> np.ndarray:
-        """(3,) float [m], the mean of the lattice's vertices around the surface as it was given."""
+        """(3,) float [m], the mean of the tetrahedra's vertices, for the surface as it was given."""
         return _filled(self)[2].copy()
 
 
@@ -186,6 +198,9 @@ def closed_mesh(vertices: Any, faces: Any) -> MeshArrays:
 def _set_lengths(shape: SoftShape, *names: str) -> None:
     for name in names:
         object.__setattr__(shape, name, number(name, getattr(shape, name), above=0.0))
+    kind = getattr(shape, "tetrahedraliser", LATTICE)
+    if kind not in (FITTED, LATTICE):
+        raise InvalidInputError(f'tetrahedraliser must be "fitted" or "lattice", got {kind!r}')
 
 
 @lru_cache(maxsize=64)
@@ -193,10 +208,10 @@ def _filled(shape: Any) -> tuple[Tetrahedra, np.ndarray, np.ndarray]:
     """Return the tetrahedra about the mean of their vertices, their boundary, and that mean."""
     made = {
         "soft_box": lambda: _whole(*box_tetrahedra(shape.size, shape.cells)),
-        "soft_sphere": lambda: _round(primitives.sphere_mesh, shape.radius, cell=shape.cell),
-        "soft_cylinder": lambda: _round(primitives.cylinder_mesh, shape.radius, shape.height, cell=shape.cell),
-        "soft_capsule": lambda: _round(primitives.capsule_mesh, shape.radius, shape.height, cell=shape.cell),
-        "soft_mesh": lambda: lattice_tetrahedra(shape.vertices, shape.faces, shape.cell),
+        "soft_sphere": lambda: _round(shape, primitives.sphere_mesh, shape.radius),
+        "soft_cylinder": lambda: _round(shape, primitives.cylinder_mesh, shape.radius, shape.height),
+        "soft_capsule": lambda: _round(shape, primitives.capsule_mesh, shape.radius, shape.height),
+        "soft_mesh": lambda: _voxels(shape, shape.vertices, shape.faces),
         "soft_tetrahedra": lambda: _whole(shape.vertices, shape.tets),
     }[shape.kind]()
     centre = made.vertices.mean(axis=0)
@@ -211,6 +226,22 @@ def _whole(vertices: np.ndarray, tets: np.ndarray) -> Tetrahedra:
     return Tetrahedra(vertices, tets, np.ones(len(tets)), boundary_faces(tets))
 
 
-def _round(surface: Any, *sizes: float, cell: float) -> Tetrahedra:
+def _round(shape: Any, surface: Any, *sizes: float) -> Tetrahedra:
     vertices, faces = surface(*sizes, around=FINE)
-    return lattice_tetrahedra(vertices, faces, cell, skin=surface(*sizes))
+    return _voxels(shape, vertices, faces, surface(*sizes), mean=(0.0, 0.0, 0.0))
+
+
+def _voxels(
+    shape: Any, vertices: np.ndarray, faces: np.ndarray, skin: MeshArrays | None = None,
+    mean: tuple[float, float, float] | None = None,
+) -> Tetrahedra:  # fmt: skip
+    if shape.tetrahedraliser == FITTED:
+        try:
+            return fitted_tetrahedra(vertices, faces, shape.cell, skin, mean)
+        except UnresolvedMeshError as error:
+            logger.warning(
+                "a %s is filled with whole voxels, whose flat faces make its contacts: a cell of %g m is too large to "
+                "follow its surface (%s); a smaller cell may",
+                shape.kind, shape.cell, error,
+            )  # fmt: skip
+    return lattice_tetrahedra(vertices, faces, shape.cell, skin)

@@ -1,4 +1,4 @@
-"""How much of each voxel of a lattice lies inside a closed mesh, from where straight lines cross the surface."""
+"""The part of each voxel of a lattice that is inside a closed mesh, from where straight lines cross the surface."""
 
 from __future__ import annotations
 
@@ -31,6 +31,33 @@ def filled_fraction(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int
         overlaps.append(crossed)
     # Rounding may turn the order of two crossings of one line around, but not along all axes.
     return np.clip(total / 3.0, 0.0, 1.0), sum(overlaps) if min(overlaps) else 0
+
+
+def inside_nodes(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int, int]) -> np.ndarray:
+    """Return (nx + 1, ny + 1, nz + 1) bool, the lattice's nodes that are inside; one on the surface may be either.
+
+    Lines through the nodes run along each of the axes; where rounding lets one slip between two faces, the other two
+    decide.
+
+    Args:
+        points: (n, 3) float, in edges of a voxel from the lattice's corner.
+        faces: (m, 3) int, closed, counterclockwise from outside.
+        cells: Voxels along x, y, z.
+    """
+    votes = np.zeros([count + 1 for count in cells], dtype=int)
+    for axis in range(3):
+        turn = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        nx, ny, nz = (cells[t] + 1 for t in turn)
+        moved = points[:, turn].copy()
+        moved[:, :2] = (moved[:, :2] + 0.5) / SAMPLES  # a line of the pattern through every node
+        line, height, sign = _crossings(moved, faces, (nx, ny))
+        sound = np.bincount(line, sign, minlength=nx * ny) == 0
+        above = np.clip(np.floor(height).astype(int) + 1, 0, nz)
+        depth = np.bincount(line * (nz + 1) + above, sign, minlength=nx * ny * (nz + 1)).reshape(-1, nz + 1)
+        inside = np.cumsum(depth, axis=1)[:, :nz] > 0.5
+        vote = np.where(sound[:, None], np.where(inside, 1, -1), 0).reshape(nx, ny, nz)
+        votes += np.transpose(vote, np.argsort(turn))
+    return votes > 0
 
 
 def _along_last_axis(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int, int]) -> tuple[np.ndarray, int]:

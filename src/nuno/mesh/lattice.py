@@ -36,22 +36,9 @@ def lattice_tetrahedra(
     Raises:
         MeshError: too many voxels, or the mesh overlaps itself.
     """
-    low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
-    counts = np.maximum(np.ceil(extent / cell * (1.0 - 1e-9)), 1.0)
-    if counts.prod() > MOST_VOXELS:
-        raise MeshError(
-            f"cell {cell:g} m divides the mesh's bounding box of {_metres(extent)} into {counts.prod():.3g} voxels; "
-            f"at most {MOST_VOXELS:.0e} are made, so cell must be larger (are the mesh's numbers metres?)"
-        )
-    cells = (int(counts[0]), int(counts[1]), int(counts[2]))
-    edges = extent / counts
+    low, edges, cells = divided_box(vertices, cell)
     points = (vertices - low) / edges
-    fraction, overlaps = filled_fraction(points, faces, cells)
-    if overlaps:
-        raise MeshError(
-            f"the mesh overlaps itself: {overlaps} of the lines drawn through it are inside it more than once; unite "
-            "its parts, e.g. trimesh.boolean.union(mesh.split()) (pip install 'trimesh[easy]')"
-        )
+    fraction = whole_fraction(points, faces, cells)
     drawn = (points, faces) if skin is None else ((skin[0] - low) / edges, skin[1])
     filled = fraction > CLOSE
     for used in _voxels_of_edges(points, faces, cells), _voxels_of_edges(*drawn, cells):
@@ -70,6 +57,37 @@ def lattice_tetrahedra(
     home, weights = _embedding(drawn[0], which, voxels, lattice, tets)
     triangles = np.array(drawn[1], dtype=np.int32)
     return Tetrahedra(low + lattice * edges, tets, share, triangles, home, weights)
+
+
+def divided_box(vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray, tuple[int, int, int]]:
+    """Return the bounding box's lower corner (3,) [m], and its voxels' edges (3,) [m] and counts along x, y, z.
+
+    Raises:
+        MeshError: too many voxels.
+    """
+    low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
+    counts = np.maximum(np.ceil(extent / cell * (1.0 - 1e-9)), 1.0)
+    if counts.prod() > MOST_VOXELS:
+        raise MeshError(
+            f"cell {cell:g} m divides the mesh's bounding box of {_metres(extent)} into {counts.prod():.3g} voxels; "
+            f"at most {MOST_VOXELS:.0e} are made, so cell must be larger (are the mesh's numbers metres?)"
+        )
+    return low, extent / counts, (int(counts[0]), int(counts[1]), int(counts[2]))
+
+
+def whole_fraction(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int, int]) -> np.ndarray:
+    """Return (nx, ny, nz), the part of each voxel that is inside a mesh, as `filled_fraction` has it.
+
+    Raises:
+        MeshError: the mesh overlaps itself.
+    """
+    fraction, overlaps = filled_fraction(points, faces, cells)
+    if overlaps:
+        raise MeshError(
+            f"the mesh overlaps itself: {overlaps} of the lines drawn through it are inside it more than once; unite "
+            "its parts, e.g. trimesh.boolean.union(mesh.split()) (pip install 'trimesh[easy]')"
+        )
+    return fraction
 
 
 def _floored(fraction: np.ndarray, volume: float) -> np.ndarray:

@@ -25,7 +25,7 @@ class Tetrahedra:
     Attributes:
         vertices: (n, 3) float64 [m].
         tets: (m, 4) int32, all of positive volume.
-        fraction: (m,) float64 in (0, 1], how much of each is filled: it scales its mass and stiffness.
+        fraction: (m,) float64 above 0, the part of each that is filled: it scales its mass and stiffness.
         faces: (f, 3) int32, triangles of the skin; they name ``vertices``, or embedded points where there are some.
         skin_tets: (k,) int32, in which tetrahedron each embedded point is; None where the skin is the boundary.
         skin_weights: (k, 4) float64, the weights of its corners, which add up to 1; None likewise.

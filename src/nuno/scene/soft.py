@@ -30,7 +30,8 @@ class SoftTopology:
         tets: (m, 4) int32, vertex indices, of positive volume.
         volume: (m,) float64, rest volume of each element [m3], whole where it is only partly filled.
         inverse: (m, 3, 3) float64 [1/m], inverse of the matrix whose columns are the edges from the first vertex.
-        fraction: (m,) float64, how much of each element is filled: scales its mass and stiffness.
+        fraction: (m,) float64, the filled part of each element's volume: scales its mass and stiffness. Above 1
+            where flat faces cut a round body's volume.
         faces: (f, 3) int32, triangles of the boundary, counterclockwise from outside.
         stars: The elements in groups, sorted by colour.
         cell_size: Smallest height of an element [m], between a vertex and the opposite face.
@@ -65,11 +66,11 @@ class SoftTopology:
         Args:
             vertices: (n, 3) float, rest shape [m].
             tets: (m, 4) int; an element given inside out is turned around.
-            fraction: (m,) float in (0, 1], how much of each element is filled; None for all of it.
+            fraction: (m,) float above 0, the part of each element that is filled; None for all of it.
 
         Raises:
             MeshError: there is no element, an index is out of range, an element is flat, a vertex belongs to none, or
-                a fraction is out of range.
+                a fraction is not above 0.
         """
         rest = np.asarray(vertices, dtype=np.float64)
         corners = np.array(tets, dtype=np.int64)
@@ -82,8 +83,8 @@ class SoftTopology:
         if loose := len(rest) - len(np.unique(corners)):
             raise MeshError(f"{loose} of {len(rest)} vertices belong to no tetrahedron; leave them out")
         share = np.ones(len(corners)) if fraction is None else np.asarray(fraction, dtype=np.float64)
-        if share.shape != (len(corners),) or not ((share > 0.0) & (share <= 1.0)).all():
-            raise MeshError(f"fraction must be ({len(corners)},) in (0, 1], got {share.shape}")
+        if share.shape != (len(corners),) or not ((share > 0.0) & np.isfinite(share)).all():
+            raise MeshError(f"fraction must be ({len(corners)},) above 0, got {share.shape}")
         edges = edge_matrices(rest, corners)
         volume = np.linalg.det(edges) / 6.0
         inside_out = volume < 0.0
