@@ -63,16 +63,6 @@ def turned(start: wp.quat, turn: wp.vec3):
 
 
 @wp.func
-def turn_angle(turn: wp.vec3):
-    """The rotation vector [rad] of a `turn_between`."""
-    half = 0.5 * wp.length(turn)
-    scale = float(1.0)
-    if half > 1.0e-4:
-        scale = wp.atan(half) / half
-    return scale * turn
-
-
-@wp.func
 def in_world(q: wp.quat, body: wp.mat33):
     """A tensor in the body's frame as a tensor in the world's."""
     r = wp.quat_to_matrix(q)
@@ -179,11 +169,13 @@ def move_body(s: RigidState, i: int, role: int, dt: float):
 def read_velocity(s: RigidState, i: int, role: int, dt: float):
     """Add to the free velocities what corrections moved in the substep.
 
-    A body that nothing touched so keeps its velocity to the bit, and rounding of coordinates stays out of it.
+    A body that nothing touched so keeps its velocity to the bit, and rounding of coordinates stays out of it. Turns are
+    subtracted as contacts add to them: an impulse gives the spin then that it gave the turn, and no energy is made of
+    the difference between an angle and twice the tangent of its half.
     """
     if role == 1 and s.inverse_mass[i] > 0.0:
         s.velocity[i] = s.velocity[i] + (s.position[i] - s.position_free[i] + s.lost[i]) / dt
         start = s.rotation_before[i]
-        free = turn_angle(turn_between(start, s.rotation_free[i]))
-        now = turn_angle(turn_between(start, s.rotation[i]))
+        free = turn_between(start, s.rotation_free[i])
+        now = turn_between(start, s.rotation[i])
         s.spin[i] = s.spin[i] + (now - free) / dt

@@ -17,6 +17,7 @@ from nuno.solver.rigid_meeting import (
     Meeting,
     against,
     ease,
+    free_places_of,
     keep_places,
     keep_speeds,
     meeting_of,
@@ -153,9 +154,38 @@ def solve_points(c: Contacts, m: Meeting, start: Going, e: int, step: float, of:
 
 
 @wp.func
+def note_approach(s: RigidState, c: Contacts, m: Meeting, world: int, e: int):
+    """Keep in ``aim`` how fast each point would part in this substep without its contact [m/s], for `bounce_speed`."""
+    g = speeds_of(s, m, world)
+    for k in range(c.count[e]):
+        o = e * POINTS + k
+        if c.start[o][0] < FAR:
+            c.aim[o] = wp.dot(m.n, against(g, c.arm_a[o], c.arm_b[o]))
+
+
+@wp.func
+def bounce_speed(bounce: float, gain: float, free: float, pushed: float, dt: float):
+    """The speed [m/s] at which a point parts after an impact, so that the bounce alone takes energy.
+
+    A body's speed is that of the middle of the substep before; half a ``gain``, of what forces make of it in a substep,
+    brings it to the instant. Without the contact the point would now go at ``free`` [m/s] and be ``pushed`` [m] farther
+    in: under the same forces it had another speed where it touched. It leaves at ``bounce`` times that, from where it
+    is. All speeds are along the normal, negative towards the other.
+
+    Of the approach's own speed alone the fall within the substep of the impact would be lost, and half a substep of
+    gravity twice over: at each bounce about 3/2 g dt v of the energy per mass.
+    """
+    now = free + 0.5 * gain
+    square = wp.max(now * now + 2.0 * gain / dt * pushed, 0.0)
+    return wp.max(bounce * wp.sqrt(square) - 0.5 * gain, 0.0)
+
+
+@wp.func
 def part_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: float):
     """Positions: nothing comes nearer than touching, and nothing slips that friction holds."""
     m = meeting_of(s, parts, c, world, e)
+    if c.bounce[e] > 0.0:
+        note_approach(s, c, m, world, e)
     keep_places(s, m, solve_points(c, m, places_of(s, m), e, dt * dt, PLACES, 0))
 
 
@@ -175,8 +205,12 @@ def aim_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt: 
             wanted = -FAR
             if c.force[o][0] > 0.0 or gap < REST:
                 wanted = 0.0
-                if start[3] < -still:
-                    wanted = -c.bounce[e] * start[3]
+                if start[3] < -still and c.bounce[e] > 0.0:
+                    # what an earlier impact left in neighbours' forces is undone within the substep: it is no gain
+                    gain = wp.clamp(c.aim[o] - start[3], -still, still)
+                    free = start[3] + gain
+                    went = wp.dot(m.n, against(free_places_of(s, m), c.arm_a[o], c.arm_b[o])) + (free - c.aim[o]) * dt
+                    wanted = bounce_speed(c.bounce[e], gain, free, gap - start[0] - went, dt)
             c.aim[o] = wanted
 
 

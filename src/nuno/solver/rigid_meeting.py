@@ -74,6 +74,17 @@ def places_of(s: RigidState, m: Meeting):
 
 
 @wp.func
+def free_places_of(s: RigidState, m: Meeting):
+    """How far the bodies would have gone in this substep without contacts."""
+    g = Going()
+    g.xa = s.position_free[m.i] - s.position_before[m.i]
+    g.xb = s.position_free[m.j] - s.position_before[m.j]
+    g.ta = turn_between(s.rotation_before[m.i], s.rotation_free[m.i])
+    g.tb = turn_between(s.rotation_before[m.j], s.rotation_free[m.j])
+    return g
+
+
+@wp.func
 def speeds_of(s: RigidState, m: Meeting, world: int):
     """How fast the bodies go."""
     g = Going()
