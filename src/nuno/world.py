@@ -15,6 +15,7 @@ from nuno.grip import Grip, make_grip
 from nuno.materials import Material
 from nuno.motion import arrive, path_for
 from nuno.path import Path
+from nuno.resolution import tell
 from nuno.running import Running
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
 from nuno.tie import check_weld
@@ -130,6 +131,7 @@ class World(Running):
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
+            tell(own, self)
         return own
 
     def detach(self, body: Body | str) -> Body:
@@ -187,6 +189,7 @@ class World(Running):
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
+            tell(own, self)
 
     def grip(
         self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None
@@ -379,7 +382,7 @@ class World(Running):
             futures = World(device=self._device if device is None else device)
             snapshot = capture(self)
         apply(snapshot.spread(worlds), futures)
-        futures._family = self._family
+        futures._family, futures._quiet = self._family, self._quiet
         return futures
 
     def adopt(self, futures: World, k: int) -> None:

@@ -177,9 +177,9 @@ def project_floats(t: StateFloat, which: int, tables: StateFloat):
         elif which == 1:
             bend_twist(t, a, b, c, d, alpha, 1, tables.y[k])
         elif which == 2:
-            shear_cell(t, a, b, c, d, 0.7, alpha)
+            shear_cell(t, a, b, c, d, 0.7, alpha, 0.0, 1.0)
         else:
-            stretch_triangle(t, a, b, c, -1.3, 0.6, 0.7, alpha)
+            stretch_triangle(t, a, b, c, -1.3, 0.6, 0.7, alpha, 0.0, 1.0)
 
 
 @wp.kernel(enable_backward=False)
@@ -193,9 +193,9 @@ def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int),
     elif which == 1:
         bend_twist(t, a, b, c, d, alpha, 1, gamma)
     elif which == 2:
-        shear_cell(t, a, b, c, d, lane(0.7), alpha)
+        shear_cell(t, a, b, c, d, lane(0.7), alpha, lane(0.0), 1.0)
     else:
-        stretch_triangle(t, a, b, c, lane(-1.3), lane(0.6), lane(0.7), alpha)
+        stretch_triangle(t, a, b, c, lane(-1.3), lane(0.6), lane(0.7), alpha, lane(0.0), 1.0)
 
 
 @wp.kernel(enable_backward=False)
@@ -208,9 +208,9 @@ def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
     elif which == 1:
         bend_twist(t, 0, 1, 2, 3, alpha, 1, gamma)
     elif which == 2:
-        shear_cell(t, 0, 1, 2, 3, 0.7, alpha)
+        shear_cell(t, 0, 1, 2, 3, 0.7, alpha, lane(0.0), 1.0)
     else:
-        stretch_triangle(t, 0, 1, 2, -1.3, 0.6, 0.7, alpha)
+        stretch_triangle(t, 0, 1, 2, -1.3, 0.6, 0.7, alpha, lane(0.0), 1.0)
 
 
 def filled(kind, values, dtype):

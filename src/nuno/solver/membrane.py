@@ -1,8 +1,9 @@
 """In-plane elasticity: stretch along warp and weft, and shear (XPBD, Macklin et al. 2016).
 
-Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep
-and there is one pass, so that the update is d lambda = -C / (grad C . W grad C + alpha). An index may be an int, or a
-vector of sixteen where sixteen elements are projected at once (`nuno.solver.vector`).
+Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep,
+and the update is d lambda = -(C + alpha lambda) / (grad C . W grad C + alpha), times an over-relaxation where a substep
+makes several sweeps (`nuno.solver.sweeps`). An index may be an int, or a vector of sixteen where sixteen elements are
+projected at once (`nuno.solver.vector`).
 """
 
 from typing import Any
@@ -22,7 +23,9 @@ def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
 
 
 @wp.func
-def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float):
+def stretch_yarn(
+    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
+):
     """All edges of a yarn at once: C_k = |x_k - x_k+1| - rest_k.
 
     Linear in its lambdas, a yarn has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and beside it -w_k times the
@@ -33,6 +36,7 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
     Args:
         t: The world's state.
         table: The edges, each yarn's one after the other.
+        rest: Their lengths at rest [m]; in a later sweep those that the one before left them with (`note_lengths`).
         gains: Room for a number an edge; so are ``pulls`` and ``inverses``.
         pulls: See ``gains``.
         inverses: See ``gains``.
@@ -74,7 +78,7 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
             put(gains, k - 1, gain)
         alpha = scaled(at(t.stretch_soft, table.edge_soft[k]), table.edge_scale[k] * rate)
         pivot = over(one, wa + wb + alpha + fill(ax, 1.0e-12) - times(beside, gain))
-        pull = times(spread(ax, table.edge_rest[k]) - length + times(beside, pull), pivot)
+        pull = times(spread(ax, rest[k]) - length + times(beside, pull), pivot)
         put(pulls, k, pull)
         put(inverses, k, inverse)
         ax = bx
@@ -115,10 +119,10 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
 
 
 @wp.func
-def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, relax: float):
     """A rectangular cell: C = F_u . F_v = (|d1|^2 - |d2|^2) / (4 area), d1 and d2 its diagonals.
 
-    ``scale`` is 1 / (4 area).
+    ``scale`` is 1 / (4 area). Returned is minus the change of lambda; ``past`` is the sum of those of this substep.
     """
     ax = at(t.x, a)
     ay = at(t.y, a)
@@ -146,7 +150,8 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
     wd = at(t.w, d)
     gradient = times(wa + wd, q1) + times(wb + wc, q2)
     weight = scaled(gradient, scaled(scale * 4.0, scale)) + alpha + fill(q1, 1.0e-12)
-    s = scaled(over(scaled(q1 - q2, scale), weight), scale * 2.0)
+    gain = over(scaled(q1 - q2, scale) - times(alpha, past), weight) * relax
+    s = scaled(gain, scale * 2.0)
     sa = times(s, wa)
     sb = times(s, wb)
     sc = times(s, wc)
@@ -163,6 +168,7 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
     put(t.x, c, cx - times(d2x, sc))
     put(t.y, c, cy - times(d2y, sc))
     put(t.z, c, cz - times(d2z, sc))
+    return gain
 
 
 @wp.func
@@ -174,8 +180,11 @@ def slope(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
 
 
 @wp.func
-def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any):
-    """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i."""
+def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, relax: float):
+    """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i.
+
+    Returned is the change of lambda; ``past`` is the sum of those of this substep.
+    """
     fx = slope(t.x, a, b, c, ka, kb, kc)
     fy = slope(t.y, a, b, c, ka, kb, kc)
     fz = slope(t.z, a, b, c, ka, kb, kc)
@@ -184,10 +193,12 @@ def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, 
     wb = scaled(at(t.w, b), kb)
     wc = scaled(at(t.w, c), kc)
     weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc)
-    s = over(fill(fx, 1.0) - length, times(weight + alpha + fill(fx, 1.0e-12), length))
+    missing = fill(fx, 1.0) - length - times(alpha, past)
+    s = over(missing, times(weight + alpha + fill(fx, 1.0e-12), length)) * relax
     shift(t, a, fx, fy, fz, times(s, wa))
     shift(t, b, fx, fy, fz, times(s, wb))
     shift(t, c, fx, fy, fz, times(s, wc))
+    return times(s, length)
 
 
 @wp.func
@@ -197,8 +208,8 @@ def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
 
 
 @wp.func
-def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any):
-    """A triangle's shear: C = F_u . F_v."""
+def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, relax: float):
+    """A triangle's shear: C = F_u . F_v; the last two and what is returned as in `stretch_triangle`."""
     ua = corner(table.triangle_u, k, 0, 3)
     ub = corner(table.triangle_u, k, 1, 3)
     uc = corner(table.triangle_u, k, 2, 3)
@@ -221,10 +232,11 @@ def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: An
     weight = weight + times(wa, shear_gradient(ua, va, uu, vv, uv))
     weight = weight + times(wb, shear_gradient(ub, vb, uu, vv, uv))
     weight = weight + times(wc, shear_gradient(uc, vc, uu, vv, uv))
-    s = over(-uv, weight)
+    s = over(-uv - times(alpha, past), weight) * relax
     shift_sheared(t, a, ua, va, ux, uy, uz, vx, vy, vz, times(s, wa))
     shift_sheared(t, b, ub, vb, ux, uy, uz, vx, vy, vz, times(s, wb))
     shift_sheared(t, c, uc, vc, ux, uy, uz, vx, vy, vz, times(s, wc))
+    return s
 
 
 @wp.func

@@ -3,6 +3,7 @@
 import math
 
 from nuno.scene.cloth import ClothTopology
+from nuno.solver.relaxation import MOST_SOFTENED
 
 SAG, MESH_SAG = 0.01, 0.0025
 """Strain scale 2 g L dt^2 / h^2 that the default number of substeps allows a sheet and a cloth mesh."""
@@ -15,8 +16,18 @@ FEWEST, MOST_SUBSTEPS = 10, 240
 
 
 def default_substeps(
-    topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0
-) -> int:
+    topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
+    softening: float = 0.0,
+) -> int:  # fmt: skip
+    """Substeps a frame, within bounds, for `wanted_substeps`, which has the arguments."""
+    wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening)
+    return min(max(FEWEST, wanted), MOST_SUBSTEPS)
+
+
+def wanted_substeps(
+    topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
+    softening: float = 0.0,
+) -> int:  # fmt: skip
     """Substeps a frame from the cell size h and the cloth's extent L [m], its density rho and rigidity B.
 
     In-plane, one pass a substep leaves a hanging cloth strains of the order 2 g L dt^2 / h^2. Held at ``SAG``, the 99th
@@ -24,8 +35,8 @@ def default_substeps(
     corners is 0 to 0.2 % of strain above its value at 160 substeps or more, which itself is 0.4 to 1.8 %; at 5000 N/m
     it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
     the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
-    within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. One so stiff that this asks for more than
-    `MOST_SUBSTEPS` comes out softer.
+    within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. Shear, and a mesh's stretch, have several sweeps
+    a substep, but not more than `nuno.solver.relaxation.MOST_SWEEPS`: what would need more has shorter substeps.
 
     Args:
         topology: The cloth's elements.
@@ -33,6 +44,7 @@ def default_substeps(
         frame: Length of a frame [s].
         density: Smallest area density [kg/m2].
         rigidity: Largest bending rigidity [N m].
+        softening: What `nuno.solver.relaxation.softening` gives, the larger of the two [1/s2].
     """
     h = topology.cell_size
     allowed = SAG if len(topology.edges) else MESH_SAG
@@ -42,4 +54,21 @@ def default_substeps(
             step = min(step, math.sqrt(PATCH_STEP * density / (topology.bend_rate * rigidity)))
         else:
             step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
-    return min(max(FEWEST, math.ceil(frame / step)), MOST_SUBSTEPS)
+    if softening > 0.0:
+        step = min(step, math.sqrt(MOST_SOFTENED / softening))
+    return max(1, math.ceil(frame / step - 1e-9))
+
+
+def bending_share(topology: ClothTopology, step: float, density: float, rigidity: float) -> float:
+    """The bending rigidity that a cloth shows in substeps of ``step`` [s], over the nominal one.
+
+    What one pass adds to a bend's compliance is taken off its denominator as far as the bound on that goes
+    (`nuno.solver.bending.bend_stiffness`); from there on compliance grows as dt^2.
+    """
+    if rigidity <= 0.0:
+        return 1.0
+    if len(topology.patches):
+        allowed = PATCH_STEP * density / (topology.bend_rate * rigidity)
+    else:
+        allowed = topology.cell_size**4 * density / (BENDING_STEP * rigidity)
+    return min(1.0, allowed / step**2)

@@ -1,0 +1,120 @@
+"""How stiff a cloth comes out that is solved in few sweeps a substep, and how many sweeps it takes to come out right.
+
+A constraint C of stiffness 1 / alpha stands among equal neighbours, all pulled alike. D is grad C . W grad C, and what
+the neighbours' multipliers move it by adds up to -D, for a uniform stress pulls at no inner vertex. In Gauss-Seidel the
+half of the neighbours that comes later in the order undoes D / 2 of each correction: with one pass a substep the body
+is at rest with a compliance of alpha + dt^2 D / 2, too soft by 1 + q, where q = dt^2 D / (2 alpha) (`softening`). More
+sweeps, over-relaxed, leave less; with the elements in two halves, of which one goes first, they are a map of two
+numbers (`stiffness_share`).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from nuno.scene.cloth import ClothTopology, Elements
+
+FIRM = 0.05
+"""How much softer than nominal a cloth's plane may come out of one plain pass, before there are more sweeps."""
+AIM = 0.97
+"""The share of nominal that the law is to give: elements at a rim that is held have fewer neighbours than it knows of,
+and come out up to 5 % above it."""
+LEAST_RELAXED, MOST_RELAXED = 1.0, 1.45
+"""Bounds of the over-relaxation; beyond 2 it would oscillate, and near it short waves take long to die down."""
+MOST_SWEEPS = 6
+"""Sweeps of a substep at most; what needs more has shorter substeps."""
+MOST_SOFTENED = 3.0
+"""The largest q that the rule for substeps allows: three sweeps bring it to `AIM`."""
+
+
+def softening(topology: ClothTopology, values: dict[str, np.ndarray]) -> dict[str, float]:
+    """Q / dt^2 [1/s2] of a cloth's shear and, on a mesh, of its stretch, as means over the area.
+
+    Args:
+        topology: The cloth's elements.
+        values: What `nuno.materials.Cloth.resolved` gives. Of several worlds the softest counts.
+
+    Returns:
+        By "shear" and "stretch"; a sheet's stretch is solved exactly along its yarns and has none.
+    """
+    density = np.asarray(values["area_density"], dtype=float)
+    shear = np.asarray(values["shear_stiffness"], dtype=float)
+    if len(topology.cells):
+        return {"shear": _mean(topology.cells, shear / density, _of_cells(topology)), "stretch": 0.0}
+    triangles = topology.triangles
+    weights = [np.asarray(triangles.extra[side], dtype=float) for side in ("u", "v")]
+    light = 1.0 / topology.area[triangles.vertices]
+    area = np.asarray(triangles.extra["area"], dtype=float)
+    stretch = max(
+        _mean(triangles, np.asarray(values[f"stretch_stiffness_{side}"], dtype=float) / density, rate)
+        for side, rate in zip(("warp", "weft"), (0.5 * area * (w**2 * light).sum(axis=1) for w in weights), strict=True)
+    )
+    # at rest F_u and F_v are unit vectors at a right angle
+    rate = 0.5 * area * ((weights[0] ** 2 + weights[1] ** 2) * light).sum(axis=1)
+    return {"shear": _mean(triangles, shear / density, rate), "stretch": stretch}
+
+
+def _of_cells(topology: ClothTopology) -> np.ndarray:
+    """Area D / 2 of each cell of a sheet, per density [1/m2]."""
+    corners = topology.cells.vertices
+    area = 0.25 / np.asarray(topology.cells.extra["quarter"], dtype=float)
+    x = topology.rest[corners]
+    diagonal = ((x[:, 3] - x[:, 0]) ** 2).sum(axis=1)
+    light = (1.0 / topology.area[corners]).sum(axis=1)
+    return 0.5 * area * 4.0 * diagonal * light / (4.0 * area) ** 2
+
+
+def _mean(elements: Elements, stiffness: np.ndarray, rate: np.ndarray) -> float:
+    """The largest mean of stiffness over density (worlds, elements or 1) times what each element has of D."""
+    if stiffness.shape[1] > 1:
+        stiffness = stiffness[:, elements.faces[:, 0]]
+    return float((stiffness * rate).mean(axis=1).max())
+
+
+def stiffness_share(q: float, sweeps: int, relax: float) -> float:
+    """The stiffness that a uniform stress meets, over the nominal one.
+
+    Args:
+        q: What `softening` gives, times dt^2.
+        sweeps: Sweeps of a substep; 0 for one plain pass.
+        relax: The over-relaxation.
+    """
+    if q <= 0.0:
+        return 1.0
+    alpha = 0.5 / q  # over D
+    moved = np.zeros((2, 2))  # the multipliers of both halves, by what each half was off
+    for _ in range(max(1, sweeps)):
+        for half in (0, 1):
+            off = np.eye(2)[half] + moved[half] - moved[1 - half] + alpha * moved[half]
+            moved[half] -= relax * off / (1.0 + alpha)
+    missing = np.linalg.solve(moved, -np.ones(2))
+    return float(alpha / missing.mean())
+
+
+@lru_cache(maxsize=4096)
+def relaxation(q: float, sweeps: int) -> float:
+    """The least over-relaxation with which ``sweeps`` sweeps come to `AIM` of the nominal stiffness, or the most."""
+    if sweeps == 0 or stiffness_share(q, sweeps, LEAST_RELAXED) >= AIM:
+        return LEAST_RELAXED
+    # the share need not rise all the way: look for where it first comes to it
+    tried = np.linspace(LEAST_RELAXED, MOST_RELAXED, 19).tolist()
+    for low, high in pairwise(tried):
+        if stiffness_share(q, sweeps, high) >= AIM:
+            for _ in range(12):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if stiffness_share(q, sweeps, middle) < AIM else (low, middle)
+            return high
+    return MOST_RELAXED
+
+
+def sweeps_for(q: float) -> int:
+    """How many sweeps a substep needs, 0 for one plain pass; `MOST_SWEEPS` where none is enough."""
+    if 1.0 - stiffness_share(q, 0, LEAST_RELAXED) <= FIRM:
+        return 0
+    for sweeps in range(2, MOST_SWEEPS):
+        if stiffness_share(q, sweeps, relaxation(q, sweeps)) >= AIM - 1e-3:
+            return sweeps
+    return MOST_SWEEPS
