@@ -33,6 +33,8 @@ class Resolution:
         stretch: The share of a cloth's stretch stiffness, of a soft body's modulus.
         shear: The share of a cloth's shear stiffness, of a soft body's modulus.
         bending: The share of a cloth's bending rigidity, of a soft body's modulus.
+        tension: The tension [N/m] from which on a sheet flutters and bears no more, None where it is not known: for
+            cloth meshes and soft bodies.
     """
 
     substeps: int
@@ -43,6 +45,7 @@ class Resolution:
     stretch: float
     shear: float
     bending: float
+    tension: float | None = None
 
     @property
     def least(self) -> float:

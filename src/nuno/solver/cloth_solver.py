@@ -58,7 +58,7 @@ from nuno.solver.state import (
     StateLanes,
     Topology,
 )
-from nuno.solver.substeps import bending_share, default_substeps, wanted_substeps
+from nuno.solver.substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
 from nuno.solver.upload import upload
 from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
@@ -134,7 +134,8 @@ class ClothSolver(ParticleSolver):
         soft = softening(topology, values)
         self._softening = max(soft.values())
         frame, density = 1.0 / frame_rate, float(values["area_density"].min())
-        rule = (down, frame, density, rigidity, self._softening)
+        stiffness = max(float(values[f"stretch_stiffness_{side}"].max()) for side in ("warp", "weft"))
+        rule = (down, frame, density, rigidity, self._softening, stiffness)
         self.substeps = int(substeps) if substeps else default_substeps(topology, *rule)
         # substeps that are given are taken as they are, one pass each
         self.sweeps = 0 if substeps else sweeps_for(self._softening * (frame / self.substeps) ** 2)
@@ -161,9 +162,11 @@ class ClothSolver(ParticleSolver):
         share = {name: min(1.0, stiffness_share(q * step**2, self.sweeps, relax)) for name, q in soft.items()}
         bending = bending_share(self.topology, step, density, rigidity)
         capped = not given and wanted > self.substeps
-        return Resolution(
-            self.substeps, given, wanted, capped, max(1, self.sweeps), share["stretch"], share["shear"], bending
-        )
+        tension = None
+        if len(self.topology.edges):
+            tension = bearable_tension(self.topology, step, density, self.sweeps > 0)
+        parts = share["stretch"], share["shear"], bending
+        return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count

@@ -21,7 +21,7 @@ from nuno.solver.fine_yarns import PAIR_EDGES, WARP_EDGES, stretch_fine_yarns
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
-from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
+from nuno.solver.membrane import LEAN, shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.sheet_strips import bend_in_strips, fits_strips
 from nuno.solver.state import (
     DAMPING,
@@ -126,6 +126,12 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
 
 
 @wp.func
+def lean_of(run: Settings):
+    """How much of the predicted directions yarns take, for the kernels of CUDA's threads."""
+    return wp.where(run.sweeps > 0, LEAN, 1.0)
+
+
+@wp.func
 def stretch_yarns(
     t: StateFloat, table: Topology, rest: wp.array(dtype=float), run: Settings, sweep: int, first: int, last: int,
     thread: int, threads: int,
@@ -140,13 +146,16 @@ def stretch_yarns(
         count = table.yarn[first + 1] - table.yarn[first]
     if count > 0 and count <= YARN_EDGES:
         stretch_yarns_together(
-            t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, table.yarn[first],
-            count, last - first, sweep > 0 or t.stretch_soft.shape[0] > STRETCH_KINDS, rate, threads,
+            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.stretch_soft, table.edge, rest, table.edge_scale,
+            table.edge_soft, table.yarn[first], count, last - first,
+            sweep > 0 or t.stretch_soft.shape[0] > STRETCH_KINDS, rate, lean_of(run), threads,
         )  # fmt: skip
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+            stretch_yarn(
+                t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
+            )
 
 
 @wp.func
@@ -170,16 +179,18 @@ def stretch_yarns(
                 end = other
             if stop - start <= WARP_EDGES:
                 stretch_fine_yarns(
-                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, start,
-                    stop, other, end, rate,
+                    t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.stretch_soft, table.edge, rest, table.edge_scale,
+                    table.edge_soft, start, stop, other, end, rate, lean_of(run),
                 )  # fmt: skip
             elif thread % WARP == 0:
-                stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
+                stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate, run.sweeps)
             k += wp.where(end > other, 2 * warps, warps)
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+            stretch_yarn(
+                t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
+            )
 
 
 @wp.func
@@ -190,7 +201,9 @@ def stretch_yarns(
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         start = table.yarn[k]
-        stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+        stretch_yarn(
+            t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
+        )
 
 
 @wp.func

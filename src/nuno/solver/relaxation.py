@@ -97,7 +97,7 @@ def stiffness_share(q: float, sweeps: int, relax: float) -> float:
 @lru_cache(maxsize=4096)
 def relaxation(q: float, sweeps: int) -> float:
     """The least over-relaxation with which ``sweeps`` sweeps come to `AIM` of the nominal stiffness, or the most."""
-    if sweeps == 0 or stiffness_share(q, sweeps, LEAST_RELAXED) >= AIM:
+    if sweeps <= 1 or stiffness_share(q, sweeps, LEAST_RELAXED) >= AIM:
         return LEAST_RELAXED
     # the share need not rise all the way: look for where it first comes to it
     tried = np.linspace(LEAST_RELAXED, MOST_RELAXED, 19).tolist()
@@ -111,9 +111,9 @@ def relaxation(q: float, sweeps: int) -> float:
 
 
 def sweeps_for(q: float) -> int:
-    """How many sweeps a substep needs, 0 for one plain pass; `MOST_SWEEPS` where none is enough."""
-    if 1.0 - stiffness_share(q, 0, LEAST_RELAXED) <= FIRM:
-        return 0
+    """How many sweeps a substep needs; `MOST_SWEEPS` where none is enough."""
+    if 1.0 - stiffness_share(q, 1, LEAST_RELAXED) <= FIRM:
+        return 1
     for sweeps in range(2, MOST_SWEEPS):
         if stiffness_share(q, sweeps, relaxation(q, sweeps)) >= AIM - 1e-3:
             return sweeps

@@ -3,6 +3,7 @@
 import math
 
 from nuno.scene.cloth import ClothTopology
+from nuno.solver.membrane import LEAN
 from nuno.solver.relaxation import MOST_SOFTENED
 
 SAG, MESH_SAG = 0.01, 0.0025
@@ -11,22 +12,24 @@ BENDING_STEP = 1.8
 """The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
 PATCH_STEP = 0.75
 """The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
+TAUT, MOST_TAUT = 0.08, 300.0
+"""The strain of a sheet, and the tension [N/m], of which the default number of substeps bears the smaller."""
 FEWEST, MOST_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
 
 
 def default_substeps(
     topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
-    softening: float = 0.0,
+    softening: float = 0.0, stretch: float = 0.0,
 ) -> int:  # fmt: skip
     """Substeps a frame, within bounds, for `wanted_substeps`, which has the arguments."""
-    wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening)
+    wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening, stretch)
     return min(max(FEWEST, wanted), MOST_SUBSTEPS)
 
 
 def wanted_substeps(
     topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
-    softening: float = 0.0,
+    softening: float = 0.0, stretch: float = 0.0,
 ) -> int:  # fmt: skip
     """Substeps a frame from the cell size h and the cloth's extent L [m], its density rho and rigidity B.
 
@@ -36,7 +39,8 @@ def wanted_substeps(
     it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
     the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
     within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. Shear, and a mesh's stretch, have several sweeps
-    a substep, but not more than `nuno.solver.relaxation.MOST_SWEEPS`: what would need more has shorter substeps.
+    a substep: what `nuno.solver.relaxation.MOST_SOFTENED` says would need too many has shorter substeps. A sheet bears
+    the tension of the strain `TAUT`, but at most `MOST_TAUT` (see `bearable_tension`).
 
     Args:
         topology: The cloth's elements.
@@ -45,6 +49,7 @@ def wanted_substeps(
         density: Smallest area density [kg/m2].
         rigidity: Largest bending rigidity [N m].
         softening: What `nuno.solver.relaxation.softening` gives, the larger of the two [1/s2].
+        stretch: Largest stretch stiffness [N/m].
     """
     h = topology.cell_size
     allowed = SAG if len(topology.edges) else MESH_SAG
@@ -56,7 +61,16 @@ def wanted_substeps(
             step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
     if softening > 0.0:
         step = min(step, math.sqrt(MOST_SOFTENED / softening))
+    if len(topology.edges) and stretch > 0.0:
+        taut = min(TAUT * stretch, MOST_TAUT)
+        step = min(step, math.sqrt(bearable_tension(topology, 1.0, density, True) / taut))
     return max(1, math.ceil(frame / step - 1e-9))
+
+
+def bearable_tension(topology: ClothTopology, step: float, density: float, swept: bool) -> float:
+    """The tension [N/m] from which on a sheet flutters in substeps of ``step`` [s]: see `nuno.solver.membrane.LEAN`."""
+    lean = float(LEAN) if swept else 1.0
+    return density * (topology.cell_size / step) ** 2 / (1.0 + 2.0 * lean)
 
 
 def bending_share(topology: ClothTopology, step: float, density: float, rigidity: float) -> float:
