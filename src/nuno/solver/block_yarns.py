@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno.contact.renewal import shares_work
 from nuno.solver.fine import fine
-from nuno.solver.frame import lean_of, stretch_yarns
+from nuno.solver.frame import stretch_yarns
 from nuno.solver.lanes import barrier
 from nuno.solver.membrane import stretch_yarn
 from nuno.solver.state import Settings, Topology
@@ -28,13 +28,7 @@ const decltype(x.data[0] + 0.f) px = x.data[b], py = y.data[b], pz = z.data[b]; 
 const float wa = w.data[a], wb = w.data[b];
 float ex = x.data[a] - px, ey = y.data[a] - py, ez = z.data[a] - pz;
 const float length = sqrtf(ex * ex + ey * ey + ez * ez + 1.0e-20f);
-float inverse = 1.f / length;
-if (lean < 1.f) {
-    // nuno.solver.membrane.edge_way
-    const float ox = sx.data[a] - sx.data[b], oy = sy.data[a] - sy.data[b], oz = sz.data[a] - sz.data[b];
-    ex = ox + (ex - ox) * lean; ey = oy + (ey - oy) * lean; ez = oz + (ez - oz) * lean;
-    inverse = 1.f / sqrtf(ex * ex + ey * ey + ez * ez + 1.0e-20f);
-}
+const float inverse = 1.f / length;
 ex *= inverse; ey *= inverse; ez *= inverse;
 rows[0][0][k] = ex; rows[0][1][k] = ey; rows[0][2][k] = ez;
 __syncthreads();
@@ -86,9 +80,6 @@ def stretch_edges(
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
     w: wp.array(dtype=float),
-    sx: wp.array(dtype=float),
-    sy: wp.array(dtype=float),
-    sz: wp.array(dtype=float),
     soft: wp.array(dtype=float),
     edge: wp.array(dtype=wp.vec2i),
     rest: wp.array(dtype=float),
@@ -98,7 +89,6 @@ def stretch_edges(
     last: int,
     longest: int,
     rate: float,
-    lean: float,
 ):
     """Solve the edges first to last, those of whole yarns of at most ``longest`` edges, and move their vertices.
 
@@ -113,9 +103,6 @@ def stretch_edges(
     y: wp.array(dtype=fine),
     z: wp.array(dtype=fine),
     w: wp.array(dtype=float),
-    sx: wp.array(dtype=fine),
-    sy: wp.array(dtype=fine),
-    sz: wp.array(dtype=fine),
     soft: wp.array(dtype=float),
     edge: wp.array(dtype=wp.vec2i),
     rest: wp.array(dtype=float),
@@ -125,7 +112,6 @@ def stretch_edges(
     last: int,
     longest: int,
     rate: float,
-    lean: float,
 ): ...
 
 
@@ -149,14 +135,13 @@ def stretch_yarns_of_block(
                 k += 1
             if longest > 0:
                 stretch_edges(
-                    t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.stretch_soft, table.edge, lengths, table.edge_scale,
-                    table.edge_soft, start, table.yarn[k], longest, rate, lean_of(run),
+                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, lengths, table.edge_scale, table.edge_soft, start,
+                    table.yarn[k], longest, rate,
                 )  # fmt: skip
             else:
                 if thread == 0:
-                    end = table.yarn[k + 1]
                     stretch_yarn(
-                        t, table, lengths, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, end, rate, run.sweeps
+                        t, table, lengths, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate
                     )
                 k += 1
             barrier(threads)

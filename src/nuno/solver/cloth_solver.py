@@ -24,7 +24,7 @@ from nuno.solver.lanes import LANES
 from nuno.solver.large import THREADS, LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.relaxation import relaxation, softening, stiffness_share, sweeps_for
+from nuno.solver.relaxation import RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.solver.shared import (
     FEW_FRAMES,
     FEW_THREADS,
@@ -138,7 +138,9 @@ class ClothSolver(ParticleSolver):
         rule = (down, frame, density, rigidity, self._softening, stiffness)
         self.substeps = int(substeps) if substeps else default_substeps(topology, *rule)
         # substeps that are given are taken as they are, one pass each
-        self.sweeps = 0 if substeps else sweeps_for(self._softening * (frame / self.substeps) ** 2)
+        self.sweeps = (
+            0 if substeps else sweeps_for(self._softening * (frame / self.substeps) ** 2, len(topology.triangles) > 0)
+        )
         self.resolution = self._resolution(bool(substeps), wanted_substeps(topology, *rule), soft, density, rigidity)
         self.self_contact = self_contact
         self.shared_memory = True
@@ -158,13 +160,12 @@ class ClothSolver(ParticleSolver):
         self, given: bool, wanted: int, soft: dict[str, float], density: float, rigidity: float
     ) -> Resolution:
         step = 1.0 / (self.frame_rate * self.substeps)
-        relax = relaxation(self._softening * step**2, self.sweeps)
-        share = {name: min(1.0, stiffness_share(q * step**2, self.sweeps, relax)) for name, q in soft.items()}
+        share = {name: min(1.0, stiffness_share(q * step**2, self.sweeps)) for name, q in soft.items()}
         bending = bending_share(self.topology, step, density, rigidity)
         capped = not given and wanted > self.substeps
         tension = None
         if len(self.topology.edges):
-            tension = bearable_tension(self.topology, step, density, self.sweeps > 0)
+            tension = bearable_tension(self.topology, step, density)
         parts = share["stretch"], share["shear"], bending
         return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
@@ -340,7 +341,7 @@ class ClothSolver(ParticleSolver):
         if self.plan in ("grid", "vector"):
             run.margin = WIDE_MARGIN * self._cell_size
         run.sweeps = self.sweeps
-        run.relax = relaxation(self._softening * dt**2, self.sweeps)
+        run.rise, run.onset = RELAXATIONS[self.sweeps]
         return run
 
     def _advance(self, run: Settings, substeps: int) -> None:

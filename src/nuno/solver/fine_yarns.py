@@ -78,13 +78,6 @@ auto solve = [&](auto kind) {
         const float length = sqrtf(dx * dx + dy * dy + dz * dz + 1.0e-20f);
         inverse[j] = 1.f / length;
         ex[j] = dx * inverse[j]; ey[j] = dy * inverse[j]; ez[j] = dz * inverse[j];
-        if (lean < 1.f) {
-            // nuno.solver.membrane.edge_way
-            const float ox = sx.data[a] - sx.data[b], oy = sy.data[a] - sy.data[b], oz = sz.data[a] - sz.data[b];
-            ex[j] = ox + (dx - ox) * lean; ey[j] = oy + (dy - oy) * lean; ez[j] = oz + (dz - oz) * lean;
-            const float way = 1.f / sqrtf(ex[j] * ex[j] + ey[j] * ey[j] + ez[j] * ez[j] + 1.0e-20f);
-            ex[j] *= way; ey[j] *= way; ez[j] *= way;
-        }
         pull[j] = own ? rest.data[e] - length : 0.f;
         inverse[j] = wa[j] + wb[j] + soft.data[which.data[e]] * (scale.data[e] * rate) + 1.0e-12f;
     }
@@ -150,9 +143,6 @@ def stretch_fine_yarns(
     y: wp.array(dtype=fine),
     z: wp.array(dtype=fine),
     w: wp.array(dtype=float),
-    sx: wp.array(dtype=fine),
-    sy: wp.array(dtype=fine),
-    sz: wp.array(dtype=fine),
     soft: wp.array(dtype=float),
     edge: wp.array(dtype=wp.vec2i),
     rest: wp.array(dtype=float),
@@ -163,7 +153,6 @@ def stretch_fine_yarns(
     start: int,
     stop: int,
     rate: float,
-    lean: float,
 ):
     """Solve the edges first to last, a yarn's, at once and move its vertices; those of two short yarns side by side.
 
@@ -172,9 +161,6 @@ def stretch_fine_yarns(
         y: See ``x``.
         z: See ``x``.
         w: Inverse masses [1/kg].
-        sx: Coordinates where the substep began; so are ``sy`` and ``sz`` [m].
-        sy: See ``sx``.
-        sz: See ``sx``.
         soft: The world's compliances.
         edge: Vertices of the edges.
         rest: Their lengths [m].
@@ -185,6 +171,5 @@ def stretch_fine_yarns(
         start: The same of another yarn of at most 32 edges, which shares no vertex with the first, as short a one.
         stop: See ``start``, and the same where there is no other.
         rate: 1 / dt^2 [1/s2].
-        lean: `nuno.solver.membrane.LEAN`, or 1 for the predicted directions.
     """
     ...

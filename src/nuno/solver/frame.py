@@ -21,7 +21,7 @@ from nuno.solver.fine_yarns import PAIR_EDGES, WARP_EDGES, stretch_fine_yarns
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
-from nuno.solver.membrane import LEAN, shear_cell, shear_triangle, stretch_triangle, stretch_yarn
+from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.sheet_strips import bend_in_strips, fits_strips
 from nuno.solver.state import (
     DAMPING,
@@ -97,7 +97,7 @@ def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, thread
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)
         d = corner(table.cell, k, 3, 4)
-        shear_cell(t, a, b, c, d, scale, alpha, fill(alpha, 0.0), 1.0)
+        shear_cell(t, a, b, c, d, scale, alpha, fill(alpha, 0.0), 0.0, 0.0)
 
 
 @wp.func
@@ -112,23 +112,17 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
         c = corner(table.triangle, k, 2, 3)
         alpha = scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale)
         zero = fill(alpha, 0.0)
-        shear_triangle(t, table, k, a, b, c, alpha, zero, 1.0)
+        shear_triangle(t, table, k, a, b, c, alpha, zero, 0.0, 0.0)
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
         ka = corner(table.triangle_v, k, 0, 3)
         kb = corner(table.triangle_v, k, 1, 3)
         kc = corner(table.triangle_v, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 1.0)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
         ka = corner(table.triangle_u, k, 0, 3)
         kb = corner(table.triangle_u, k, 1, 3)
         kc = corner(table.triangle_u, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 1.0)
-
-
-@wp.func
-def lean_of(run: Settings):
-    """How much of the predicted directions yarns take, for the kernels of CUDA's threads."""
-    return wp.where(run.sweeps > 0, LEAN, 1.0)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
 
 
 @wp.func
@@ -146,16 +140,13 @@ def stretch_yarns(
         count = table.yarn[first + 1] - table.yarn[first]
     if count > 0 and count <= YARN_EDGES:
         stretch_yarns_together(
-            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.stretch_soft, table.edge, rest, table.edge_scale,
-            table.edge_soft, table.yarn[first], count, last - first,
-            sweep > 0 or t.stretch_soft.shape[0] > STRETCH_KINDS, rate, lean_of(run), threads,
+            t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, table.yarn[first],
+            count, last - first, sweep > 0 or t.stretch_soft.shape[0] > STRETCH_KINDS, rate, threads,
         )  # fmt: skip
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(
-                t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
-            )
+            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
@@ -179,18 +170,16 @@ def stretch_yarns(
                 end = other
             if stop - start <= WARP_EDGES:
                 stretch_fine_yarns(
-                    t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.stretch_soft, table.edge, rest, table.edge_scale,
-                    table.edge_soft, start, stop, other, end, rate, lean_of(run),
+                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, start,
+                    stop, other, end, rate,
                 )  # fmt: skip
             elif thread % WARP == 0:
-                stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate, run.sweeps)
+                stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
             k += wp.where(end > other, 2 * warps, warps)
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(
-                t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
-            )
+            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
@@ -201,9 +190,7 @@ def stretch_yarns(
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         start = table.yarn[k]
-        stretch_yarn(
-            t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate, run.sweeps
-        )
+        stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func

@@ -10,8 +10,24 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, beside, fill, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, beside, fill, least, most, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.vector import at, corner, put, scaled, spread
+
+MOST_RELAXED = wp.constant(1.45)
+"""Bound of the over-relaxation: at 2 it would oscillate, and near it short waves take long to die down."""
+
+
+@wp.func
+def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
+    """The over-relaxation of a constraint by its denominator D + alpha: 1 + rise (sqrt(q) - onset), q = D / (2 alpha).
+
+    None where ``rise`` is 0. For the two see `nuno.solver.relaxation`.
+    """
+    if rise == 0.0:
+        return fill(weight, 1.0)
+    q = over(weight - alpha, alpha) * 0.5
+    relax = (root(q) - fill(weight, onset)) * rise + fill(weight, 1.0)
+    return least(most(relax, fill(weight, 1.0)), fill(weight, MOST_RELAXED))
 
 
 @wp.func
@@ -22,27 +38,10 @@ def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
     put(t.z, i, at(t.z, i) + times(dz, s))
 
 
-LEAN = wp.constant(0.3)
-"""How much of the predicted direction a swept yarn's edge takes; the rest is that of the substep's start. A taut yarn
-is a string: tension straightens it, and with a share of LEAN its swiftest wave is stable up to (omega dt)^2 =
-4 / (1 + 2 LEAN), which is a tension per width of rho h^2 / dt^2 / (1 + 2 LEAN). The predicted direction alone bears a
-third of rho h^2 / dt^2; with none of it waves do not die down."""
-
-
-@wp.func
-def edge_way(t: Any, i: Any, j: Any, dx: Any, dy: Any, dz: Any):
-    """An edge along which a swept yarn pulls, from the predicted d between its vertices i and j and the former one."""
-    ox = at(t.px, i) - at(t.px, j)
-    oy = at(t.py, i) - at(t.py, j)
-    oz = at(t.pz, i) - at(t.pz, j)
-    return ox + (dx - ox) * LEAN, oy + (dy - oy) * LEAN, oz + (dz - oz) * LEAN
-
-
 @wp.func
 def stretch_yarn(
-    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float,
-    swept: int,
-):  # fmt: skip
+    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
+):
     """All edges of a yarn at once: C_k = |x_k - x_k+1| - rest_k.
 
     Linear in its lambdas, a yarn has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and beside it -w_k times the
@@ -60,7 +59,6 @@ def stretch_yarn(
         first: The yarn's first edge.
         last: One past its last.
         rate: 1 / dt^2 [1/s2].
-        swept: Whether the substep makes sweeps: not 0 where edges pull along `edge_way`.
     """
     head = corner(table.edge, first, 0, 2)
     ax = at(t.x, head)
@@ -86,9 +84,6 @@ def stretch_yarn(
         dz = az - bz
         length = root(times(dx, dx) + times(dy, dy) + times(dz, dz) + tiny)
         inverse = over(one, length)
-        if swept != 0:
-            dx, dy, dz = edge_way(t, corner(table.edge, k, 0, 2), j, dx, dy, dz)
-            inverse = over(one, root(times(dx, dx) + times(dy, dy) + times(dz, dz) + tiny))
         dx = times(dx, inverse)
         dy = times(dy, inverse)
         dz = times(dz, inverse)
@@ -123,14 +118,9 @@ def stretch_yarn(
         by = at(t.y, i)
         bz = at(t.z, i)
         s = times(pull, at(inverses, k))
-        dx = bx - ax
-        dy = by - ay
-        dz = bz - az
-        if swept != 0:
-            dx, dy, dz = edge_way(t, i, j, dx, dy, dz)
-        dx = times(dx, s)
-        dy = times(dy, s)
-        dz = times(dz, s)
+        dx = times(bx - ax, s)
+        dy = times(by - ay, s)
+        dz = times(bz - az, s)
         wj = at(t.w, j)
         put(t.x, j, ax + times(wj, fx - dx))
         put(t.y, j, ay + times(wj, fy - dy))
@@ -145,10 +135,11 @@ def stretch_yarn(
 
 
 @wp.func
-def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, relax: float):
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
     """A rectangular cell: C = F_u . F_v = (|d1|^2 - |d2|^2) / (4 area), d1 and d2 its diagonals.
 
-    ``scale`` is 1 / (4 area). Returned is minus the change of lambda; ``past`` is the sum of those of this substep.
+    ``scale`` is 1 / (4 area). Returned is minus the change of lambda; ``past`` is the sum of those of this substep, and
+    the last two are `relaxation`'s.
     """
     ax = at(t.x, a)
     ay = at(t.y, a)
@@ -176,7 +167,8 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, p
     wd = at(t.w, d)
     gradient = times(wa + wd, q1) + times(wb + wc, q2)
     weight = scaled(gradient, scaled(scale * 4.0, scale)) + alpha + fill(q1, 1.0e-12)
-    gain = over(scaled(q1 - q2, scale) - times(alpha, past), weight) * relax
+    gain = over(scaled(q1 - q2, scale) - times(alpha, past), weight)
+    gain = times(gain, relaxation(weight, alpha, rise, onset))
     s = scaled(gain, scale * 2.0)
     sa = times(s, wa)
     sb = times(s, wb)
@@ -206,10 +198,12 @@ def slope(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
 
 
 @wp.func
-def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, relax: float):
+def stretch_triangle(
+    t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, rise: float, onset: float
+):
     """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i.
 
-    Returned is the change of lambda; ``past`` is the sum of those of this substep.
+    Returned is the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
     """
     fx = slope(t.x, a, b, c, ka, kb, kc)
     fy = slope(t.y, a, b, c, ka, kb, kc)
@@ -220,7 +214,8 @@ def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, 
     wc = scaled(at(t.w, c), kc)
     weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc)
     missing = fill(fx, 1.0) - length - times(alpha, past)
-    s = over(missing, times(weight + alpha + fill(fx, 1.0e-12), length)) * relax
+    weight = weight + alpha + fill(fx, 1.0e-12)
+    s = times(over(missing, times(weight, length)), relaxation(weight, alpha, rise, onset))
     shift(t, a, fx, fy, fz, times(s, wa))
     shift(t, b, fx, fy, fz, times(s, wb))
     shift(t, c, fx, fy, fz, times(s, wc))
@@ -234,8 +229,10 @@ def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
 
 
 @wp.func
-def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, relax: float):
-    """A triangle's shear: C = F_u . F_v; the last two and what is returned as in `stretch_triangle`."""
+def shear_triangle(
+    t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, rise: float, onset: float
+):
+    """A triangle's shear: C = F_u . F_v; the last three and what is returned as in `stretch_triangle`."""
     ua = corner(table.triangle_u, k, 0, 3)
     ub = corner(table.triangle_u, k, 1, 3)
     uc = corner(table.triangle_u, k, 2, 3)
@@ -258,7 +255,7 @@ def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: An
     weight = weight + times(wa, shear_gradient(ua, va, uu, vv, uv))
     weight = weight + times(wb, shear_gradient(ub, vb, uu, vv, uv))
     weight = weight + times(wc, shear_gradient(uc, vc, uu, vv, uv))
-    s = over(-uv - times(alpha, past), weight) * relax
+    s = times(over(-uv - times(alpha, past), weight), relaxation(weight, alpha, rise, onset))
     shift_sheared(t, a, ua, va, ux, uy, uz, vx, vy, vz, times(s, wa))
     shift_sheared(t, b, ub, vb, ux, uy, uz, vx, vy, vz, times(s, wb))
     shift_sheared(t, c, uc, vc, ux, uy, uz, vx, vy, vz, times(s, wc))

@@ -145,7 +145,7 @@ def solve(t: Any, run: Settings, kind: int, e: Element, rate: float, damping: fl
     elif kind == LINES:
         bend_line(t, e.a, e.b, e.c, product(e.soft, e.scale * rate), run.damped, damping)
     else:
-        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate), 0.0, 1.0)
+        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate), 0.0, 0.0, 0.0)
 
 
 @wp.func

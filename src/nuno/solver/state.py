@@ -181,7 +181,7 @@ class Settings:
     """What holds for the whole run, or while it goes by parts: ``first`` is the first substep's number.
 
     ``pulled`` says whether there are grips other than stiff ones on vertices; ``sweeps`` how often a substep goes
-    through shear and stretch, by ``relax`` over-relaxed (`nuno.solver.relaxation`), 0 for one plain pass.
+    through shear and stretch, 0 for one plain pass, over-relaxed by ``rise`` and ``onset`` (`nuno.solver.relaxation`).
     """
 
     dt: float
@@ -189,7 +189,8 @@ class Settings:
     pushed: int
     damped: int
     sweeps: int
-    relax: float
+    rise: float
+    onset: float
     touching: int
     margin: float
     reach: float

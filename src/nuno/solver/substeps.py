@@ -3,7 +3,6 @@
 import math
 
 from nuno.scene.cloth import ClothTopology
-from nuno.solver.membrane import LEAN
 from nuno.solver.relaxation import MOST_SOFTENED
 
 SAG, MESH_SAG = 0.01, 0.0025
@@ -12,7 +11,7 @@ BENDING_STEP = 1.8
 """The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
 PATCH_STEP = 0.75
 """The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
-TAUT, MOST_TAUT = 0.08, 300.0
+TAUT, MOST_TAUT = 0.055, 300.0
 """The strain of a sheet, and the tension [N/m], of which the default number of substeps bears the smaller."""
 FEWEST, MOST_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
@@ -63,14 +62,17 @@ def wanted_substeps(
         step = min(step, math.sqrt(MOST_SOFTENED / softening))
     if len(topology.edges) and stretch > 0.0:
         taut = min(TAUT * stretch, MOST_TAUT)
-        step = min(step, math.sqrt(bearable_tension(topology, 1.0, density, True) / taut))
+        step = min(step, math.sqrt(bearable_tension(topology, 1.0, density) / taut))
     return max(1, math.ceil(frame / step - 1e-9))
 
 
-def bearable_tension(topology: ClothTopology, step: float, density: float, swept: bool) -> float:
-    """The tension [N/m] from which on a sheet flutters in substeps of ``step`` [s]: see `nuno.solver.membrane.LEAN`."""
-    lean = float(LEAN) if swept else 1.0
-    return density * (topology.cell_size / step) ** 2 / (1.0 + 2.0 * lean)
+def bearable_tension(topology: ClothTopology, step: float, density: float) -> float:
+    """The tension [N/m] from which on a sheet flutters in substeps of ``step`` [s]: a third of rho h^2 / dt^2.
+
+    A taut yarn is a string, whose bends tension pulls straight along the predicted directions of its edges. That is
+    stable up to (omega dt)^2 = 4/3, and the swiftest wave has omega = 2 sqrt(T / rho) / h.
+    """
+    return density * (topology.cell_size / step) ** 2 / 3.0
 
 
 def bending_share(topology: ClothTopology, step: float, density: float, rigidity: float) -> float:

@@ -39,7 +39,7 @@ def shear_cells_again(
         c = corner(table.cell, k, 2, 4)
         d = corner(table.cell, k, 3, 4)
         past = past_of(sums, k, sweep, alpha)
-        put(sums, k, past + shear_cell(t, a, b, c, d, scale, alpha, past, run.relax))
+        put(sums, k, past + shear_cell(t, a, b, c, d, scale, alpha, past, run.rise, run.onset))
 
 
 @wp.func
@@ -56,19 +56,19 @@ def strain_triangles_again(
         c = corner(table.triangle, k, 2, 3)
         alpha = scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale)
         past = past_of(sums, 3 * k, sweep, alpha)
-        put(sums, 3 * k, past + shear_triangle(t, table, k, a, b, c, alpha, past, run.relax))
+        put(sums, 3 * k, past + shear_triangle(t, table, k, a, b, c, alpha, past, run.rise, run.onset))
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
         ka = corner(table.triangle_v, k, 0, 3)
         kb = corner(table.triangle_v, k, 1, 3)
         kc = corner(table.triangle_v, k, 2, 3)
         past = past_of(sums, 3 * k + 1, sweep, alpha)
-        put(sums, 3 * k + 1, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.relax))
+        put(sums, 3 * k + 1, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset))
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
         ka = corner(table.triangle_u, k, 0, 3)
         kb = corner(table.triangle_u, k, 1, 3)
         kc = corner(table.triangle_u, k, 2, 3)
         past = past_of(sums, 3 * k + 2, sweep, alpha)
-        put(sums, 3 * k + 2, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.relax))
+        put(sums, 3 * k + 2, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset))
 
 
 @wp.func

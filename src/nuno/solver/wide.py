@@ -162,7 +162,7 @@ def stretch_wide(t: Any, wide: Wide, rest: wp.array(dtype=lane), run: Settings, 
     for k in range(first, last):
         start = wide.yarn[k]
         end = wide.yarn[k + 1]
-        stretch_yarn(t, wide, rest, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, end, rate, run.sweeps)
+        stretch_yarn(t, wide, rest, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, end, rate)
 
 
 @wp.func

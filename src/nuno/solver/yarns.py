@@ -47,19 +47,11 @@ for (int begin = warp * each; begin < yarns; begin += warps * each) {
             alpha = soft.data[which.data[k]] * (scale.data[k] * rate);
             length = rest.data[k];
         }
-        float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
+        const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
         const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
-        float inverse = rsqrtf(square);
-        pull[r] = on ? length - square * inverse : 0.f;
-        if (lean < 1.f) {
-            // nuno.solver.membrane.edge_way
-            const int k = q * ROWS + r;
-            const int i = head + (k < count ? k : count) * step, j = head + (k + 1 < count ? k + 1 : count) * step;
-            const float ox = sx.data[i] - sx.data[j], oy = sy.data[i] - sy.data[j], oz = sz.data[i] - sz.data[j];
-            dx = ox + (dx - ox) * lean; dy = oy + (dy - oy) * lean; dz = oz + (dz - oz) * lean;
-            inverse = rsqrtf(dx * dx + dy * dy + dz * dz + 1.0e-20f);
-        }
+        const float inverse = rsqrtf(square);
         ex[r] = dx * inverse; ey[r] = dy * inverse; ez[r] = dz * inverse;
+        pull[r] = on ? length - square * inverse : 0.f;
         weight[r] = on ? vw[r] + vw[r + 1] + alpha + 1.0e-12f : 1.f;
     }
     // what links each row to the one before, and the last one to the next thread's first
@@ -149,9 +141,6 @@ def stretch_yarns_together(
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
     w: wp.array(dtype=float),
-    sx: wp.array(dtype=float),
-    sy: wp.array(dtype=float),
-    sz: wp.array(dtype=float),
     soft: wp.array(dtype=float),
     edge: wp.array(dtype=wp.vec2i),
     rest: wp.array(dtype=float),
@@ -162,7 +151,6 @@ def stretch_yarns_together(
     yarns: int,
     varied: bool,
     rate: float,
-    lean: float,
     threads: int,
 ):
     """Solve the edges of each yarn of one direction at once and move its vertices.
@@ -174,9 +162,6 @@ def stretch_yarns_together(
         y: See ``x``.
         z: See ``x``.
         w: Inverse masses [1/kg].
-        sx: Coordinates where the substep began; so are ``sy`` and ``sz`` [m].
-        sy: See ``sx``.
-        sz: See ``sx``.
         soft: The world's compliances.
         edge: Vertices of the edges, those of one yarn after those of another.
         rest: Their lengths [m].
@@ -187,7 +172,6 @@ def stretch_yarns_together(
         yarns: How many yarns.
         varied: Whether the edges of a yarn differ in compliance or length.
         rate: 1 / dt^2 [1/s2].
-        lean: `nuno.solver.membrane.LEAN`, or 1 for the predicted directions.
         threads: Threads of the block, whole warps.
     """
     ...
