@@ -17,7 +17,7 @@ def shear_under_traction(cells, h, stiffness, substeps=None):
     material = nuno.Cloth(shear_stiffness=stiffness, air_drag=20.0, bending_rigidity=1e-4)
     sheet = nuno.sheet((cells * h, cells * h), cells=(cells, cells), position=(0, 0, 1))
     world, body = attached(sheet, material, gravity=(0, 0, 0), substeps=substeps)
-    traction = 0.01 * stiffness  # [N/m]
+    traction = 0.001 * stiffness  # [N/m], so little that the square does not buckle
     share = np.full(cells + 1, traction * h)
     share[[0, -1]] *= 0.5
     force = np.zeros((cells + 1, cells + 1, 3))
@@ -26,7 +26,7 @@ def shear_under_traction(cells, h, stiffness, substeps=None):
     force[-1, :, 0] += share
     force[0, :, 0] -= share
     world.push(body, force.reshape(-1, 3))
-    world.run(1.5)
+    world.run(1.0)
     x = rows(body)[0].reshape(cells + 1, cells + 1, 3)
     u = 0.5 * (x[:-1, 1:] - x[:-1, :-1] + x[1:, 1:] - x[1:, :-1]) / h
     v = 0.5 * (x[1:, :-1] - x[:-1, :-1] + x[1:, 1:] - x[:-1, 1:]) / h
@@ -35,7 +35,7 @@ def shear_under_traction(cells, h, stiffness, substeps=None):
 
 @pytest.mark.parametrize(("cells", "h"), [(10, 0.02), (15, 0.02), (16, 0.01), (16, 0.005)])
 def test_a_sheet_shears_as_its_stiffness_says_at_default_substeps(cells, h):
-    """Closed form gamma = tau / S of pure shear, S = 300 N/m, without gravity, of which the old rule took 10 substeps."""
+    """Closed form gamma = tau / S of pure shear, S = 300 N/m, without gravity, which is no reason for few substeps."""
     found, body = shear_under_traction(cells, h, 300.0)
     assert found == pytest.approx(1.0, abs=0.05)  # as docs/physics.md promises
     assert not body.resolution.capped and body.resolution.shear > 0.95
@@ -43,9 +43,9 @@ def test_a_sheet_shears_as_its_stiffness_says_at_default_substeps(cells, h):
 
 @pytest.mark.parametrize("substeps", [20, 60])
 def test_one_plain_pass_shears_as_much_too_far_as_the_resolution_says(substeps):
-    """Derived: a compliance of alpha + dt^2 D / 2; the free rim, of half the mass, gives a little more."""
+    """Derived: a compliance of alpha + dt^2 D / 2 of elements with all neighbours; those at the rim are stiffer."""
     found, body = shear_under_traction(16, 0.02, 300.0, substeps)
-    assert 1.0 / found == pytest.approx(body.resolution.shear, rel=0.15)
+    assert 1.0 <= 1.0 / found / body.resolution.shear < 1.25
     assert body.resolution.given and body.resolution.sweeps == 1
 
 
@@ -84,9 +84,9 @@ def test_a_mesh_stretches_as_its_stiffness_says_at_default_substeps(angle, cell,
 
 
 def test_a_mesh_in_plain_passes_stretches_as_much_too_far_as_the_resolution_says():
-    """Derived: a compliance of alpha + dt^2 D / 2 in the mean over the triangles."""
+    """Derived: a compliance of alpha + dt^2 D / 2 in the mean over the triangles; those at the rim are stiffer."""
     found, body = pulled_mesh(0.0, substeps=60, cell=0.02)
-    assert 1.0 / found == pytest.approx(body.resolution.stretch, rel=0.1)
+    assert 1.0 <= 1.0 / found / body.resolution.stretch < 1.25
     assert body.resolution.stretch < 0.8
 
 
@@ -99,12 +99,14 @@ def test_a_sheet_bears_the_tension_that_the_resolution_says(share, bears):
     world, body = attached(sheet, material, gravity=(0, 0, 0), substeps=40)
     tension = share * body.resolution.tension
     start = rows(body)[0]
-    left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-9) for x in (-0.5 * length, 0.5 * length))
+    left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-6) for x in (-0.5 * length, 0.5 * length))
     world.grip(body, left, to=start[left].mean(axis=0))
     end = start[right].mean(axis=0)
-    path = nuno.Path([0.0, 0.3], [end, end + [length * tension / stiffness, 0, 0]], interpolation="minimum_jerk")
+    path = nuno.Path(
+        [0.0, 0.3], [end, end + np.array([length * tension / stiffness, 0, 0])], interpolation="minimum_jerk"
+    )
     grip = world.grip(body, right, to=path)
-    world.push(body, [0.0, 0.0, 1e-3], duration=0.1)
+    world.push(body, np.tile([0.0, 0.0, 1e-4], (len(start), 1)), duration=0.1)
     world.run(1.0)
     assert (abs(grip.wrench[0][0]) / 0.03 > 0.97 * tension) == bears
 
@@ -124,7 +126,7 @@ def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):
     world.ignore_contact(body, body)
     world.set_friction(body, drum, 0.02)
     start = rows(body)[0]
-    left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-9) for x in (-half, half))
+    left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-6) for x in (-half, half))
     times = np.linspace(0.0, 0.6, 41)
     angle = times / 0.6 * np.pi / 2
     x = radius * np.sin(angle) + (half - radius * angle) * np.cos(angle)
@@ -147,7 +149,7 @@ def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):
     pulls = []
     for _ in range(48):
         world.step()
-        pulls.append(-grip.wrench[0][2] / width)
+        pulls.append(abs(grip.wrench[0][2]) / width)
     assert np.mean(pulls[24:]) / tension == pytest.approx(np.exp(mu * np.pi), rel=0.05)
 
 
@@ -166,7 +168,7 @@ def test_resolution_says_what_was_chosen():
 
 
 def test_ordinary_bodies_are_not_warned_of(caplog):
-    """Promise: no warning at default substeps within 10 %: every preset, a mesh, a soft cube, with and without gravity."""
+    """Promise: none at default substeps of every preset, a mesh and a soft cube, with and without gravity."""
     with caplog.at_level(logging.WARNING, logger="nuno"):
         for gravity in (0.0, 9.81):
             world = nuno.World(device="cpu", gravity=(0, 0, -gravity))

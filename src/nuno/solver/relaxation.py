@@ -17,16 +17,15 @@ import numpy as np
 from nuno.scene.cloth import ClothTopology, Elements
 from nuno.solver.membrane import MOST_RELAXED
 
-FIRM = 0.05
-"""How much softer than nominal a cloth's plane may come out of one plain pass, before there are more sweeps."""
-RELAXATIONS = ((0.0, 0.0), (0.0, 0.0), (0.439, 0.34), (0.344, 0.36), (0.309, 0.38), (0.294, 0.41), (0.294, 0.46))
+RELAXATIONS = ((0.0, 0.0), (0.0, 0.0), (0.467, 0.473), (0.403, 0.609), (0.379, 0.725), (0.378, 0.858), (0.367, 0.966))
 """By the number of sweeps, rise and onset of the over-relaxation 1 + rise (sqrt(q) - onset), at least 1 and at most
-`nuno.solver.membrane.MOST_RELAXED`. Fitted so that a uniform stress meets 1.00 to 1.03 of the nominal stiffness by
-`stiffness_share`: near a rim that is held it is a few percent less. Each element takes its own q."""
-MOST_SWEEPS = 6
-"""Sweeps of a substep at most; what needs more has shorter substeps."""
-MOST_SOFTENED = 3.0
-"""The largest q that the rule for substeps allows: three sweeps, a mesh's four, are enough for it."""
+`nuno.solver.membrane.MOST_RELAXED`. Fitted so that a uniform stress meets 0.98 to 1.00 of the nominal stiffness by
+`stiffness_share`: near a rim it is some percent more where that is free, and less where it is held. Each element takes
+its own q."""
+MOST_SOFTENED = (0.05, 0.05, 1.0, 2.2, 3.0, 4.0)
+"""The largest q for which so many sweeps are enough, none meaning one plain pass."""
+SOFTEST_STEP = 3.0
+"""The largest q that the rule for substeps allows."""
 
 
 def softening(topology: ClothTopology, values: dict[str, np.ndarray]) -> dict[str, float]:
@@ -99,16 +98,14 @@ def stiffness_share(q: float, sweeps: int) -> float:
 
 
 def sweeps_for(q: float, mesh: bool) -> int:
-    """How many sweeps a substep needs, 0 for one plain pass; `MOST_SWEEPS` where none is enough.
+    """How many sweeps a substep needs, 0 for one plain pass.
 
     Args:
         q: The larger of what `softening` gives, times dt^2.
         mesh: Whether the cloth is a mesh: the three constraints of a triangle hinder each other besides, and from
             three sweeps on it takes one more.
     """
-    if stiffness_share(q, 0) >= 1.0 - FIRM:
-        return 0
-    for sweeps in range(2, MOST_SWEEPS):
-        if stiffness_share(q, sweeps) >= 1.0 - 0.6 * FIRM:
-            return sweeps + (mesh and sweeps > 2)
-    return MOST_SWEEPS
+    for sweeps, most in enumerate(MOST_SOFTENED):
+        if q <= most:
+            return min(sweeps + (mesh and sweeps > 2), len(RELAXATIONS) - 1)
+    return len(RELAXATIONS) - 1

@@ -3,7 +3,7 @@
 import math
 
 from nuno.scene.cloth import ClothTopology
-from nuno.solver.relaxation import MOST_SOFTENED
+from nuno.solver.relaxation import SOFTEST_STEP
 
 SAG, MESH_SAG = 0.01, 0.0025
 """Strain scale 2 g L dt^2 / h^2 that the default number of substeps allows a sheet and a cloth mesh."""
@@ -38,7 +38,7 @@ def wanted_substeps(
     it is 0.3 % above 0.4 %. A cloth mesh, whose triangles are not solved along yarns, needs twice as many for
     the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
     within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. Shear, and a mesh's stretch, have several sweeps
-    a substep: what `nuno.solver.relaxation.MOST_SOFTENED` says would need too many has shorter substeps. A sheet bears
+    a substep: what `nuno.solver.relaxation.SOFTEST_STEP` says would need too many has shorter substeps. A sheet bears
     the tension of the strain `TAUT`, but at most `MOST_TAUT` (see `bearable_tension`).
 
     Args:
@@ -59,7 +59,7 @@ def wanted_substeps(
         else:
             step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
     if softening > 0.0:
-        step = min(step, math.sqrt(MOST_SOFTENED / softening))
+        step = min(step, math.sqrt(SOFTEST_STEP / softening))
     if len(topology.edges) and stretch > 0.0:
         taut = min(TAUT * stretch, MOST_TAUT)
         step = min(step, math.sqrt(bearable_tension(topology, 1.0, density) / taut))
