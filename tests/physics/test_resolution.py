@@ -12,11 +12,11 @@ from nuno.solver.relaxation import stiffness_share, sweeps_for
 from nuno.solver.substeps import default_substeps, wanted_substeps
 
 
-def shear_under_traction(cells, h, stiffness, substeps=None):
+def shear_under_traction(cells, h, stiffness, substeps=None, frame_rate=60.0):
     """Return the mean shear angle over the nominal one of a free square under equal tractions along its sides."""
     material = nuno.Cloth(shear_stiffness=stiffness, air_drag=20.0, bending_rigidity=1e-4)
     sheet = nuno.sheet((cells * h, cells * h), cells=(cells, cells), position=(0, 0, 1))
-    world, body = attached(sheet, material, gravity=(0, 0, 0), substeps=substeps)
+    world, body = attached(sheet, material, gravity=(0, 0, 0), substeps=substeps, frame_rate=frame_rate)
     traction = 0.001 * stiffness  # [N/m], so little that the square does not buckle
     share = np.full(cells + 1, traction * h)
     share[[0, -1]] *= 0.5
@@ -49,15 +49,15 @@ def test_one_plain_pass_shears_as_much_too_far_as_the_resolution_says(substeps):
     assert body.resolution.given and body.resolution.sweeps == 1
 
 
-def pulled_mesh(angle, substeps=None, tension=12.5, cell=0.01, gravity=0.0, stiffness=1000.0, shear=300.0):
+def pulled_mesh(angle, substeps=None, tension=12.5, cell=0.01, gravity=0.0, stiffness=1000.0, frame_rate=60.0):
     """Return the strain over the nominal one in the middle of a pulled strip of jittered triangles, and the body."""
     length, width = 0.24, 0.08
     points, faces = rectangle("jittered", (length, width), cell)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     hung = np.stack([np.zeros(len(points)), points[:, 1], -points[:, 0]], axis=1)
     strip = nuno.cloth_mesh(hung, faces, rest=points @ turn.T)
-    material = nuno.Cloth(stretch_stiffness=stiffness, shear_stiffness=shear, air_drag=15.0)
-    world, body = attached(strip, material, gravity=(0, 0, -gravity), substeps=substeps)
+    material = nuno.Cloth(stretch_stiffness=stiffness, shear_stiffness=300.0, air_drag=15.0)
+    world, body = attached(strip, material, gravity=(0, 0, -gravity), substeps=substeps, frame_rate=frame_rate)
     start = rows(body)[0]
     top, low = (np.flatnonzero(np.abs(points[:, 0] - end) < 1e-6) for end in (0.0, length))
     world.grip(body, top, to=start[top].mean(axis=0))
@@ -71,7 +71,7 @@ def pulled_mesh(angle, substeps=None, tension=12.5, cell=0.01, gravity=0.0, stif
     middle = np.abs(points[:, 0] - 0.5 * length) < 0.3 * length
     strain = np.polyfit(start[middle, 2], (rows(body)[0] - start)[middle, 2], 1)[0]
     c, s = np.cos(angle) ** 2, np.sin(angle) ** 2
-    modulus = 1.0 / ((c**2 + s**2) / stiffness + c * s / shear)
+    modulus = 1.0 / ((c**2 + s**2) / stiffness + c * s / 300.0)
     return strain * modulus / (tension + 0.2 * gravity * 0.5 * length), body
 
 
@@ -81,6 +81,23 @@ def test_a_mesh_stretches_as_its_stiffness_says_at_default_substeps(angle, cell,
     found, body = pulled_mesh(angle, cell=cell, gravity=gravity)
     assert found == pytest.approx(1.0, abs=0.05)  # as docs/physics.md promises
     assert body.resolution.least > 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_a_stiffness_fitted_at_one_cell_size_predicts_at_others(kind):
+    """Promise: a value that fits what was seen at one cell size and step is the same cloth at others, within 10 %."""
+
+    def compliance(value, cell, frame_rate):
+        if kind == "sheet":
+            return shear_under_traction(round(0.2 / cell), cell, value, frame_rate=frame_rate)[0] / value
+        return pulled_mesh(0.0, cell=cell, stiffness=value, frame_rate=frame_rate)[0] / value
+
+    seen, value = 1.0 / 250.0 if kind == "sheet" else 1.0 / 800.0, 500.0
+    for _ in range(3):
+        value *= compliance(value, 0.02, 60.0) / seen
+    for cell, frame_rate in ((0.0125, 60.0), (0.01, 100.0)):
+        assert compliance(value, cell, frame_rate) == pytest.approx(seen, rel=0.1)
 
 
 def test_a_mesh_in_plain_passes_stretches_as_much_too_far_as_the_resolution_says():
