@@ -11,7 +11,7 @@ BENDING_STEP = 1.8
 """The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
 PATCH_STEP = 0.75
 """The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
-TAUT, MOST_TAUT = 0.055, 300.0
+TAUT, MOST_TAUT = 0.1, 300.0
 """The strain of a sheet, and the tension [N/m], of which the default number of substeps bears the smaller."""
 FEWEST, MOST_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
