@@ -60,6 +60,7 @@ from nuno.joints import ball_joint, fixed_joint, hinge, slider
 from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.path import Path
 from nuno.recording import Recording
+from nuno.resolution import Resolution
 from nuno.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 from nuno.snapshot import Snapshot
 from nuno.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra
@@ -186,6 +187,7 @@ __all__ = [
     "Readings",
     "Recording",
     "RefusedError",
+    "Resolution",
     "ResultsInUseError",
     "ResultsMismatchError",
     "Rigid",

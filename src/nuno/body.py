@@ -23,6 +23,7 @@ from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.dynamics import Dynamics
+    from nuno.resolution import Resolution
     from nuno.simulation import Simulation
 
 Color = str | tuple[float, float, float]
@@ -130,6 +131,11 @@ class Body(Quantities, Coordinates):
         solver = getattr(self._dynamics, "solver", None)
         missed = np.array(getattr(solver, "missed", np.zeros(1, dtype=bool)))
         return missed if len(missed) > 1 else bool(missed[0])
+
+    @property
+    def resolution(self) -> Resolution | None:
+        """What a cloth's or soft body's substeps make of its material, or None for a body that is static or rigid."""
+        return None if self._dynamics is None else self._dynamics.resolution
 
     @property
     def friction(self) -> Any:

@@ -20,6 +20,7 @@ from nuno.errors import InvalidInputError
 from nuno.given_velocity import GivenVelocity
 from nuno.grip import Grip
 from nuno.materials import Cloth, Material, Rigid, Soft
+from nuno.resolution import Resolution
 from nuno.shape import ClothMesh, Plane, Shape, Sheet
 from nuno.soft_shape import SoftShape
 from nuno.validation import finite_array, number
@@ -70,6 +71,11 @@ class Dynamics:
         self.collider_version = -1
 
     substeps: int
+
+    @property
+    def resolution(self) -> Resolution | None:
+        """Return what the substeps make of the material, or None where there is nothing to say."""
+        return None
 
     def vertices(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
@@ -169,6 +175,12 @@ class ParticleDynamics(Dynamics):
     def substeps(self) -> int:  # type: ignore[override]
         """Substeps of a frame, the solver's own."""
         return int(self.solver.substeps)
+
+    @property
+    def resolution(self) -> Resolution:
+        """Return what the substeps make of the material."""
+        found: Resolution = self.solver.resolution
+        return found
 
     def vertices(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""

@@ -53,6 +53,7 @@ class Simulation:
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
         self._family = uuid.uuid4().hex
+        self._quiet = False  # whether its materials are guesses, of whose resolution nobody is told
         self._bodies: dict[str, Body] = {}
         self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
         self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()

@@ -19,6 +19,7 @@ from nuno.joint import Joint, check_joined
 from nuno.materials import Material, Rigid
 from nuno.motion import arrive, path_for
 from nuno.path import Path
+from nuno.resolution import tell
 from nuno.running import Running
 from nuno.snapshot import Snapshot, apply, capture, check_world_index
 from nuno.tie import check_leader, check_weld, tie_to_leader
@@ -177,6 +178,7 @@ class World(Running):
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
+            tell(own, self)
         return own
 
     def detach(self, body: Body | str) -> Body:
@@ -234,6 +236,7 @@ class World(Running):
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
+            tell(own, self)
 
     def grip(
         self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,
@@ -475,7 +478,7 @@ class World(Running):
             futures = World(device=self._device if device is None else device)
             snapshot = capture(self)
         apply(snapshot.spread(worlds), futures)
-        futures._family = self._family
+        futures._family, futures._quiet = self._family, self._quiet
         return futures
 
     def adopt(self, futures: World, k: int) -> None:

@@ -39,14 +39,17 @@ class Grip:
 COARSE, FINE = 12, 36  # substeps a frame, with coordinates as floats and as doubles
 
 
-def solver(kind, plan, worlds=1, *, self_contact=False, device="cpu", damping=0.001, cells=CELLS, substeps=COARSE):
+def solver(
+    kind, plan, worlds=1, *, self_contact=False, device="cpu", damping=0.001, cells=CELLS, substeps=COARSE,
+    stretch=1000.0,
+):  # fmt: skip
     """A cloth over a ball and a table, held at two corners and pushed, its rest shape wrinkled."""
     cloth = topology(kind, cells)
     wrinkles = np.random.default_rng(1).normal(scale=0.003, size=cloth.rest.shape)
     positions = np.repeat((cloth.rest + wrinkles + [0, 0, 0.1])[None], worlds, axis=0)
     made = ClothSolver(
-        cloth, nuno.Cloth(damping=damping, thickness=0.004), positions, np.zeros_like(positions), device=device,
-        substeps=substeps, self_contact=self_contact, plan=plan,
+        cloth, nuno.Cloth(damping=damping, thickness=0.004, stretch_stiffness=stretch), positions,
+        np.zeros_like(positions), device=device, substeps=substeps, self_contact=self_contact, plan=plan,
     )  # fmt: skip
     shapes = [nuno.box((1, 1, 0.02), position=(0, 0, -0.01)), nuno.sphere(0.04, position=(0.05, 0, 0.03))]
     made.set_colliders(Colliders.from_bodies(shapes, worlds, device))
@@ -80,6 +83,18 @@ def test_the_large_plans_give_the_bits_of_the_fused_one(kind, worlds, plan, subs
     """Promise: without self-contact, whose sums are in fixed point, the colours' order is all that counts."""
     expected = outcome(solver(kind, "fused", worlds, substeps=substeps))
     np.testing.assert_array_equal(outcome(solver(kind, plan, worlds, substeps=substeps)), expected)
+
+
+@pytest.mark.parametrize("stretch", [1000.0, 4000.0])  # with coordinates as floats and, on a sheet too, as doubles
+@pytest.mark.parametrize("kind", ["sheet", "mesh"])
+def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
+    """Promise: a substep that goes through shear and stretch several times does so alike in every plan."""
+    made = solver(kind, "fused", substeps=None, stretch=stretch)
+    assert made.sweeps > 1
+    expected = outcome(made)
+    for plan, worlds in (("vector", 1), ("fused", 3), ("large", 1), ("grid", 3)):
+        found = outcome(solver(kind, plan, worlds, substeps=None, stretch=stretch))
+        np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
 @pytest.mark.parametrize("worlds", [1, 3])
@@ -177,9 +192,9 @@ def project_floats(t: StateFloat, which: int, tables: StateFloat):
         elif which == 1:
             bend_twist(t, a, b, c, d, alpha, 1, tables.y[k])
         elif which == 2:
-            shear_cell(t, a, b, c, d, 0.7, alpha)
+            shear_cell(t, a, b, c, d, 0.7, alpha, 0.0, 0.4, 0.5)
         else:
-            stretch_triangle(t, a, b, c, -1.3, 0.6, 0.7, alpha)
+            stretch_triangle(t, a, b, c, -1.3, 0.6, 0.7, alpha, 0.0, 0.4, 0.5)
 
 
 @wp.kernel(enable_backward=False)
@@ -193,9 +208,9 @@ def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int),
     elif which == 1:
         bend_twist(t, a, b, c, d, alpha, 1, gamma)
     elif which == 2:
-        shear_cell(t, a, b, c, d, lane(0.7), alpha)
+        shear_cell(t, a, b, c, d, lane(0.7), alpha, lane(0.0), 0.4, 0.5)
     else:
-        stretch_triangle(t, a, b, c, lane(-1.3), lane(0.6), lane(0.7), alpha)
+        stretch_triangle(t, a, b, c, lane(-1.3), lane(0.6), lane(0.7), alpha, lane(0.0), 0.4, 0.5)
 
 
 @wp.kernel(enable_backward=False)
@@ -208,9 +223,9 @@ def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
     elif which == 1:
         bend_twist(t, 0, 1, 2, 3, alpha, 1, gamma)
     elif which == 2:
-        shear_cell(t, 0, 1, 2, 3, 0.7, alpha)
+        shear_cell(t, 0, 1, 2, 3, 0.7, alpha, lane(0.0), 0.4, 0.5)
     else:
-        stretch_triangle(t, 0, 1, 2, -1.3, 0.6, 0.7, alpha)
+        stretch_triangle(t, 0, 1, 2, -1.3, 0.6, 0.7, alpha, lane(0.0), 0.4, 0.5)
 
 
 def filled(kind, values, dtype):

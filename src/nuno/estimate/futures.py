@@ -80,6 +80,7 @@ def table_world(
 ) -> tuple[World, Body]:
     """A world with the table, the floor and the cloth as it lay before; the cloth is static."""
     world = World(device=device, substeps=substeps)
+    world._quiet = True
     if table.half_extents is not None:
         half, centre = table.half_extents, table.centre or (0.0, 0.0)
         size = (2 * half[0], 2 * half[1], table.thickness)

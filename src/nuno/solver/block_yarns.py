@@ -116,8 +116,14 @@ def stretch_edges(
 
 
 @wp.func
-def stretch_yarns_of_block(t: Any, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The yarns first to last: on CUDA by a block, as many at once as it has threads for; else each by a thread."""
+def stretch_yarns_of_block(
+    t: Any, table: Topology, lengths: wp.array(dtype=float), run: Settings, first: int, last: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """The yarns first to last: on CUDA by a block, as many at once as it has threads for; else each by a thread.
+
+    ``lengths`` is ``rest`` as `nuno.solver.membrane.stretch_yarn` has it.
+    """
     if shares_work(threads):
         rate = 1.0 / (run.dt * run.dt)
         k = int(first)
@@ -129,13 +135,15 @@ def stretch_yarns_of_block(t: Any, table: Topology, run: Settings, first: int, l
                 k += 1
             if longest > 0:
                 stretch_edges(
-                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, table.edge_rest, table.edge_scale,
-                    table.edge_soft, start, table.yarn[k], longest, rate,
+                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, lengths, table.edge_scale, table.edge_soft, start,
+                    table.yarn[k], longest, rate,
                 )  # fmt: skip
             else:
                 if thread == 0:
-                    stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+                    stretch_yarn(
+                        t, table, lengths, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate
+                    )
                 k += 1
             barrier(threads)
     else:
-        stretch_yarns(t, table, run, first, last, thread, threads)
+        stretch_yarns(t, table, lengths, run, run.sweeps, first, last, thread, threads)

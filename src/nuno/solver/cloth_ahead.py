@@ -145,11 +145,11 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
             stop = table.cell_colour[wp.min(c + 2, colours)]
             ready = read_cell(table, start + thread, stop)
             if first + thread < last:
-                shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha)
+                shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha, 0.0, 0.0, 0.0)
             for k in range(first + thread + threads, last, threads):
                 element = read_cell(table, k, last)
                 alpha = product(t.shear_soft[element.soft], element.scale * 4.0 * rate)
-                shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha)
+                shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha, 0.0, 0.0, 0.0)
             soft = t.shear_soft[ready.soft]
             first = start
             last = stop

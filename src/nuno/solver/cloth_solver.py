@@ -11,6 +11,7 @@ import warp as wp
 from nuno.contact.nearness import GROUP
 from nuno.contact.team_listing import make_lists
 from nuno.contact.world_room import listing_room
+from nuno.resolution import Resolution
 from nuno.scene.cloth import ClothTopology
 from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
@@ -23,6 +24,7 @@ from nuno.solver.lanes import LANES
 from nuno.solver.large import THREADS, LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.relaxation import RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.solver.shared import (
     FEW_FRAMES,
     FEW_THREADS,
@@ -56,7 +58,7 @@ from nuno.solver.state import (
     StateLanes,
     Topology,
 )
-from nuno.solver.substeps import default_substeps
+from nuno.solver.substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
 from nuno.solver.upload import upload
 from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
@@ -95,15 +97,17 @@ class ClothSolver(ParticleSolver):
         device: "cpu" or "cuda:0" ...
         gravity: (3,) [m/s2].
         frame_rate: Frames a second.
-        substeps: Substeps a frame; None takes `default_substeps`.
+        substeps: Substeps a frame, of one pass each; None takes `default_substeps`, of as many sweeps through shear and
+            stretch as `nuno.solver.relaxation.sweeps_for` says.
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
         self_contact: Whether the cloth collides with itself.
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
             the CPU by sixteen elements at a time), "grid" (all blocks of a CUDA device together) or "large" (a launch
             per phase).
 
-    Limitations: one pass a substep, so that what is stiffer than m / dt^2 comes out softer than stated, except along
-    a sheet's yarns, which are solved exactly; damping acts on bending alone.
+    Limitations: one pass a substep, or a few, so that what is much stiffer than m / dt^2 comes out softer than stated,
+    by as much as ``resolution`` says, except along a sheet's yarns, which are solved exactly; damping acts on bending
+    alone.
     """
 
     def __init__(
@@ -127,8 +131,17 @@ class ClothSolver(ParticleSolver):
         down = float(np.linalg.norm(self.gravity))
         values = material.resolved(self.world_count, topology.element_count)
         rigidity = max(float(values[f"bending_rigidity_{side}"].max()) for side in ("warp", "weft"))
-        rule = (down, 1.0 / frame_rate, float(values["area_density"].min()), rigidity)
+        soft = softening(topology, values)
+        self._softening = max(soft.values())
+        frame, density = 1.0 / frame_rate, float(values["area_density"].min())
+        stiffness = max(float(values[f"stretch_stiffness_{side}"].max()) for side in ("warp", "weft"))
+        rule = (down, frame, density, rigidity, self._softening, stiffness)
         self.substeps = int(substeps) if substeps else default_substeps(topology, *rule)
+        # substeps that are given are taken as they are, one pass each
+        self.sweeps = (
+            0 if substeps else sweeps_for(self._softening * (frame / self.substeps) ** 2, len(topology.triangles) > 0)
+        )
+        self.resolution = self._resolution(bool(substeps), wanted_substeps(topology, *rule), soft, density, rigidity)
         self.self_contact = self_contact
         self.shared_memory = True
         if plan == "auto":
@@ -142,6 +155,19 @@ class ClothSolver(ParticleSolver):
         self._shared: tuple[Any, Any] | None = None
         self._build(values, friction)
         self._start(positions, velocities)
+
+    def _resolution(
+        self, given: bool, wanted: int, soft: dict[str, float], density: float, rigidity: float
+    ) -> Resolution:
+        step = 1.0 / (self.frame_rate * self.substeps)
+        share = {name: min(1.0, stiffness_share(q * step**2, self.sweeps)) for name, q in soft.items()}
+        bending = bending_share(self.topology, step, density, rigidity)
+        capped = not given and wanted > self.substeps
+        tension = None
+        if len(self.topology.edges):
+            tension = bearable_tension(self.topology, step, density)
+        parts = share["stretch"], share["shear"], bending
+        return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count
@@ -207,6 +233,12 @@ class ClothSolver(ParticleSolver):
         size.edges = max(1, len(self.topology.edges))
         for name in ("yarn_gain", "yarn_pull", "yarn_inverse"):
             setattr(state, name, empty(size.edges, self._number))
+        swept = self.sweeps > 0 and self.plan != "vector"  # which has rooms of its own
+        size.goals = size.edges if swept else 1
+        size.cells = max(1, len(self.topology.cells)) if swept else 1
+        size.triangles = max(1, 3 * len(self.topology.triangles)) if swept else 1
+        state.yarn_goal = empty(size.goals, self._number)
+        state.cell_sum, state.triangle_sum = empty(size.cells, self._number), empty(size.triangles, self._number)
         state.bounds = empty(size.blocks, self._number)
         state.listed = empty(size.listed, self._number)
         state.middle = empty(size.middle, self._number)
@@ -308,6 +340,8 @@ class ClothSolver(ParticleSolver):
         run = super().settings(time, dt, frame)
         if self.plan in ("grid", "vector"):
             run.margin = WIDE_MARGIN * self._cell_size
+        run.sweeps = self.sweeps
+        run.rise, run.onset = RELAXATIONS[self.sweeps]
         return run
 
     def _advance(self, run: Settings, substeps: int) -> None:
@@ -384,7 +418,7 @@ class ClothSolver(ParticleSolver):
     def _large_plan(self) -> LargePlan | GridPlan:
         grid = self.plan == "grid"
         teams, blocks = teams_of(self.world_count if grid else 1, cores_of(self.device), SHARED_OUT)
-        stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES)
+        stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES, self.sweeps)
         if self._shared is None:
             work = make_work(self.topology, self._soft, stages, self.device)
             self._shared = work, make_lists(self._topology, self.world_count, self.device)

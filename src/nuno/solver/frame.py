@@ -40,6 +40,7 @@ from nuno.solver.state import (
     Topology,
     view,
 )
+from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.solver.vector import at, corner, scaled, spread
 from nuno.solver.warps import WARP, in_warps
 from nuno.solver.yarns import YARN_EDGES, stretch_yarns_together
@@ -96,7 +97,7 @@ def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, thread
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)
         d = corner(table.cell, k, 3, 4)
-        shear_cell(t, a, b, c, d, scale, alpha)
+        shear_cell(t, a, b, c, d, scale, alpha, fill(alpha, 0.0), 0.0, 0.0)
 
 
 @wp.func
@@ -109,39 +110,50 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
         a = corner(table.triangle, k, 0, 3)
         b = corner(table.triangle, k, 1, 3)
         c = corner(table.triangle, k, 2, 3)
-        shear_triangle(t, table, k, a, b, c, scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale))
+        alpha = scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale)
+        zero = fill(alpha, 0.0)
+        shear_triangle(t, table, k, a, b, c, alpha, zero, 0.0, 0.0)
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
         ka = corner(table.triangle_v, k, 0, 3)
         kb = corner(table.triangle_v, k, 1, 3)
         kc = corner(table.triangle_v, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
         alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
         ka = corner(table.triangle_u, k, 0, 3)
         kb = corner(table.triangle_u, k, 1, 3)
         kc = corner(table.triangle_u, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha)
+        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
 
 
 @wp.func
-def stretch_yarns(t: StateFloat, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
-    """The yarns of one direction, which are equally long: on CUDA each by a few threads, else by one."""
+def stretch_yarns(
+    t: StateFloat, table: Topology, rest: wp.array(dtype=float), run: Settings, sweep: int, first: int, last: int,
+    thread: int, threads: int,
+):  # fmt: skip
+    """The yarns of one direction, which are equally long: on CUDA each by a few threads, else by one.
+
+    ``rest`` is as `nuno.solver.membrane.stretch_yarn` has it.
+    """
     rate = 1.0 / (run.dt * run.dt)
     count = int(0)
     if in_warps(threads) and first < last:
         count = table.yarn[first + 1] - table.yarn[first]
     if count > 0 and count <= YARN_EDGES:
         stretch_yarns_together(
-            t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, table.edge_rest, table.edge_scale, table.edge_soft,
-            table.yarn[first], count, last - first, t.stretch_soft.shape[0] > STRETCH_KINDS, rate, threads,
+            t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, table.yarn[first],
+            count, last - first, sweep > 0 or t.stretch_soft.shape[0] > STRETCH_KINDS, rate, threads,
         )  # fmt: skip
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
-def stretch_yarns(t: StateFine, table: Topology, run: Settings, first: int, last: int, thread: int, threads: int):
+def stretch_yarns(
+    t: StateFine, table: Topology, rest: wp.array(dtype=float), run: Settings, sweep: int, first: int, last: int,
+    thread: int, threads: int,
+):  # fmt: skip
     rate = 1.0 / (run.dt * run.dt)
     if in_warps(threads):
         warps = threads / WARP
@@ -158,38 +170,42 @@ def stretch_yarns(t: StateFine, table: Topology, run: Settings, first: int, last
                 end = other
             if stop - start <= WARP_EDGES:
                 stretch_fine_yarns(
-                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, table.edge_rest, table.edge_scale,
-                    table.edge_soft, start, stop, other, end, rate,
+                    t.x, t.y, t.z, t.w, t.stretch_soft, table.edge, rest, table.edge_scale, table.edge_soft, start,
+                    stop, other, end, rate,
                 )  # fmt: skip
             elif thread % WARP == 0:
-                stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
+                stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, stop, rate)
             k += wp.where(end > other, 2 * warps, warps)
     else:
         for k in range(first + thread, last, threads):
             start = table.yarn[k]
-            stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+            stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
-def stretch_yarns(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
+def stretch_yarns(
+    t: Any, table: Any, rest: Any, run: Settings, sweep: int, first: int, last: int,
+    thread: int, threads: int,
+):  # fmt: skip
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         start = table.yarn[k]
-        stretch_yarn(t, table, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
+        stretch_yarn(t, table, rest, t.yarn_gain, t.yarn_pull, t.yarn_inverse, start, table.yarn[k + 1], rate)
 
 
 @wp.func
 def bend_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
-    """A sheet's twists, bends and shears."""
+    """A sheet's twists, bends and, where they are not swept, shears."""
     for c in range(topo.twist_colour.shape[0] - 1):
         bend_twists(t, topo, run, topo.twist_colour[c], topo.twist_colour[c + 1], thread, threads)
         barrier(threads)
     for c in range(topo.line_colour.shape[0] - 1):
         bend_lines(t, topo, run, topo.line_colour[c], topo.line_colour[c + 1], thread, threads)
         barrier(threads)
-    for c in range(topo.cell_colour.shape[0] - 1):
-        shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], thread, threads)
-        barrier(threads)
+    if run.sweeps == 0:
+        for c in range(topo.cell_colour.shape[0] - 1):
+            shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], thread, threads)
+            barrier(threads)
 
 
 @wp.func
@@ -211,29 +227,61 @@ def bend_one_sheet(t: Any, topo: Topology, run: Settings, thread: int, threads: 
     if shares_work(threads):
         bend_twists_ahead(t, topo, run, thread, threads)
         bend_lines_ahead(t, topo, run, thread, threads)
-        shear_cells_ahead(t, topo, run, thread, threads)
+        if run.sweeps == 0:
+            shear_cells_ahead(t, topo, run, thread, threads)
     else:
         for c in range(topo.twist_colour.shape[0] - 1):
             bend_twists(t, topo, run, topo.twist_colour[c], topo.twist_colour[c + 1], 0, 1)
         for c in range(topo.line_colour.shape[0] - 1):
             bend_lines(t, topo, run, topo.line_colour[c], topo.line_colour[c + 1], 0, 1)
+        if run.sweeps == 0:
+            for c in range(topo.cell_colour.shape[0] - 1):
+                shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], 0, 1)
+
+
+@wp.func
+def sweep_membrane(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
+    """Shear and stretch in ``run.sweeps`` sweeps, yarns last in each."""
+    for sweep in range(run.sweeps):
         for c in range(topo.cell_colour.shape[0] - 1):
-            shear_cells(t, topo, run, topo.cell_colour[c], topo.cell_colour[c + 1], 0, 1)
+            first = topo.cell_colour[c]
+            shear_cells_again(t, topo, t.cell_sum, run, sweep, first, topo.cell_colour[c + 1], thread, threads)
+            barrier(threads)
+        for c in range(topo.triangle_colour.shape[0] - 1):
+            first = topo.triangle_colour[c]
+            last = topo.triangle_colour[c + 1]
+            strain_triangles_again(t, topo, t.triangle_sum, run, sweep, first, last, thread, threads)
+            barrier(threads)
+        for c in range(topo.yarn_kind.shape[0] - 1):
+            first = topo.yarn_kind[c]
+            last = topo.yarn_kind[c + 1]
+            if sweep == 0:
+                stretch_yarns(t, topo, topo.edge_rest, run, sweep, first, last, thread, threads)
+            else:
+                stretch_yarns(t, topo, t.yarn_goal, run, sweep, first, last, thread, threads)
+            barrier(threads)
+            if sweep + 1 < run.sweeps:
+                note_lengths(t, topo, t.yarn_goal, topo.yarn[first], topo.yarn[last], thread, threads)
+                barrier(threads)
 
 
 @wp.func
 def elastic(t: Any, topo: Topology, run: Settings, thread: int, threads: int):
-    """One pass over the elastic constraints, the stiffest last."""
+    """The elastic constraints, the stiffest last: one pass over all, or more over those in the cloth's plane."""
     for c in range(topo.patch_colour.shape[0] - 1):
         bend_patches(t, topo, run, topo.patch_colour[c], topo.patch_colour[c + 1], thread, threads)
         barrier(threads)
     bend_sheet(t, topo, run, thread, threads)
-    for c in range(topo.triangle_colour.shape[0] - 1):
-        strain_triangles(t, topo, run, topo.triangle_colour[c], topo.triangle_colour[c + 1], thread, threads)
-        barrier(threads)
-    for c in range(topo.yarn_kind.shape[0] - 1):
-        stretch_yarns(t, topo, run, topo.yarn_kind[c], topo.yarn_kind[c + 1], thread, threads)
-        barrier(threads)
+    if run.sweeps > 0:
+        sweep_membrane(t, topo, run, thread, threads)
+    else:
+        for c in range(topo.triangle_colour.shape[0] - 1):
+            strain_triangles(t, topo, run, topo.triangle_colour[c], topo.triangle_colour[c + 1], thread, threads)
+            barrier(threads)
+        for c in range(topo.yarn_kind.shape[0] - 1):
+            last = topo.yarn_kind[c + 1]
+            stretch_yarns(t, topo, topo.edge_rest, run, 0, topo.yarn_kind[c], last, thread, threads)
+            barrier(threads)
 
 
 @wp.func

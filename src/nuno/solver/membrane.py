@@ -1,16 +1,33 @@
 """In-plane elasticity: stretch along warp and weft, and shear (XPBD, Macklin et al. 2016).
 
-Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep
-and there is one pass, so that the update is d lambda = -C / (grad C . W grad C + alpha). An index may be an int, or a
-vector of sixteen where sixteen elements are projected at once (`nuno.solver.vector`).
+Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep,
+and the update is d lambda = -(C + alpha lambda) / (grad C . W grad C + alpha), times an over-relaxation where a substep
+makes several sweeps (`nuno.solver.sweeps`). An index may be an int, or a vector of sixteen where sixteen elements are
+projected at once (`nuno.solver.vector`).
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, beside, fill, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, beside, fill, least, most, mul, over, root, sub, times  # noqa: F401
 from nuno.solver.vector import at, corner, put, scaled, spread
+
+MOST_RELAXED = wp.constant(1.45)
+"""Bound of the over-relaxation: at 2 it would oscillate, and near it short waves take long to die down."""
+
+
+@wp.func
+def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
+    """The over-relaxation of a constraint by its denominator D + alpha: 1 + rise (sqrt(q) - onset), q = D / (2 alpha).
+
+    None where ``rise`` is 0. For the two see `nuno.solver.relaxation`.
+    """
+    if rise == 0.0:
+        return fill(weight, 1.0)
+    q = over(weight - alpha, alpha) * 0.5
+    relax = (root(q) - fill(weight, onset)) * rise + fill(weight, 1.0)
+    return least(most(relax, fill(weight, 1.0)), fill(weight, MOST_RELAXED))
 
 
 @wp.func
@@ -22,7 +39,9 @@ def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
 
 
 @wp.func
-def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float):
+def stretch_yarn(
+    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
+):
     """All edges of a yarn at once: C_k = |x_k - x_k+1| - rest_k.
 
     Linear in its lambdas, a yarn has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and beside it -w_k times the
@@ -33,6 +52,7 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
     Args:
         t: The world's state.
         table: The edges, each yarn's one after the other.
+        rest: Their lengths at rest [m]; in a later sweep those that the one before left them with (`note_lengths`).
         gains: Room for a number an edge; so are ``pulls`` and ``inverses``.
         pulls: See ``gains``.
         inverses: See ``gains``.
@@ -74,7 +94,7 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
             put(gains, k - 1, gain)
         alpha = scaled(at(t.stretch_soft, table.edge_soft[k]), table.edge_scale[k] * rate)
         pivot = over(one, wa + wb + alpha + fill(ax, 1.0e-12) - times(beside, gain))
-        pull = times(spread(ax, table.edge_rest[k]) - length + times(beside, pull), pivot)
+        pull = times(spread(ax, rest[k]) - length + times(beside, pull), pivot)
         put(pulls, k, pull)
         put(inverses, k, inverse)
         ax = bx
@@ -115,10 +135,11 @@ def stretch_yarn(t: Any, table: Any, gains: Any, pulls: Any, inverses: Any, firs
 
 
 @wp.func
-def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
     """A rectangular cell: C = F_u . F_v = (|d1|^2 - |d2|^2) / (4 area), d1 and d2 its diagonals.
 
-    ``scale`` is 1 / (4 area).
+    ``scale`` is 1 / (4 area). Returned is minus the change of lambda; ``past`` is the sum of those of this substep, and
+    the last two are `relaxation`'s.
     """
     ax = at(t.x, a)
     ay = at(t.y, a)
@@ -146,7 +167,9 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
     wd = at(t.w, d)
     gradient = times(wa + wd, q1) + times(wb + wc, q2)
     weight = scaled(gradient, scaled(scale * 4.0, scale)) + alpha + fill(q1, 1.0e-12)
-    s = scaled(over(scaled(q1 - q2, scale), weight), scale * 2.0)
+    gain = over(scaled(q1 - q2, scale) - times(alpha, past), weight)
+    gain = times(gain, relaxation(weight, alpha, rise, onset))
+    s = scaled(gain, scale * 2.0)
     sa = times(s, wa)
     sb = times(s, wb)
     sc = times(s, wc)
@@ -163,6 +186,7 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any):
     put(t.x, c, cx - times(d2x, sc))
     put(t.y, c, cy - times(d2y, sc))
     put(t.z, c, cz - times(d2z, sc))
+    return gain
 
 
 @wp.func
@@ -174,8 +198,13 @@ def slope(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
 
 
 @wp.func
-def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any):
-    """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i."""
+def stretch_triangle(
+    t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, rise: float, onset: float
+):
+    """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i.
+
+    Returned is the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
+    """
     fx = slope(t.x, a, b, c, ka, kb, kc)
     fy = slope(t.y, a, b, c, ka, kb, kc)
     fz = slope(t.z, a, b, c, ka, kb, kc)
@@ -184,10 +213,13 @@ def stretch_triangle(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, 
     wb = scaled(at(t.w, b), kb)
     wc = scaled(at(t.w, c), kc)
     weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc)
-    s = over(fill(fx, 1.0) - length, times(weight + alpha + fill(fx, 1.0e-12), length))
+    missing = fill(fx, 1.0) - length - times(alpha, past)
+    weight = weight + alpha + fill(fx, 1.0e-12)
+    s = times(over(missing, times(weight, length)), relaxation(weight, alpha, rise, onset))
     shift(t, a, fx, fy, fz, times(s, wa))
     shift(t, b, fx, fy, fz, times(s, wb))
     shift(t, c, fx, fy, fz, times(s, wc))
+    return times(s, length)
 
 
 @wp.func
@@ -197,8 +229,10 @@ def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
 
 
 @wp.func
-def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any):
-    """A triangle's shear: C = F_u . F_v."""
+def shear_triangle(
+    t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, rise: float, onset: float
+):
+    """A triangle's shear: C = F_u . F_v; the last three and what is returned as in `stretch_triangle`."""
     ua = corner(table.triangle_u, k, 0, 3)
     ub = corner(table.triangle_u, k, 1, 3)
     uc = corner(table.triangle_u, k, 2, 3)
@@ -221,10 +255,11 @@ def shear_triangle(t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: An
     weight = weight + times(wa, shear_gradient(ua, va, uu, vv, uv))
     weight = weight + times(wb, shear_gradient(ub, vb, uu, vv, uv))
     weight = weight + times(wc, shear_gradient(uc, vc, uu, vv, uv))
-    s = over(-uv, weight)
+    s = times(over(-uv - times(alpha, past), weight), relaxation(weight, alpha, rise, onset))
     shift_sheared(t, a, ua, va, ux, uy, uz, vx, vy, vz, times(s, wa))
     shift_sheared(t, b, ub, vb, ux, uy, uz, vx, vy, vz, times(s, wb))
     shift_sheared(t, c, uc, vc, ux, uy, uz, vx, vy, vz, times(s, wc))
+    return s
 
 
 @wp.func

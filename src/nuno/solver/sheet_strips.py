@@ -282,7 +282,7 @@ def fits_strips(table: Topology):
 
 @wp.func
 def bend_in_strips(t: StateFloat, table: Topology, run: Settings, threads: int):
-    """All twists, bends and shears of a sheet that `fits_strips`, in the order of `nuno.solver.frame.bend_sheet`."""
+    """All twists, bends and shears of a sheet that `fits_strips`, as `nuno.solver.frame.bend_sheet` has them."""
     columns = table.columns
     rows = table.particles / columns
     rate = 1.0 / (run.dt * run.dt)
@@ -306,6 +306,8 @@ def bend_in_strips(t: StateFloat, table: Topology, run: Settings, threads: int):
             table.line_colour, columns, rows, upright, give, varied, damped, gamma, rate, threads,
         )  # fmt: skip
         barrier(threads)
+    if run.sweeps > 0:
+        halves = 0
     for odd in range(halves):
         shear_strips(
             t.x, t.y, t.z, t.w, t.shear_soft, table.cell_scale, table.cell_soft,

@@ -11,6 +11,7 @@ import warp as wp
 
 from nuno.contact.sharp_queue import QUEUE, ROOM
 from nuno.contact.sharp_shapes import ROUND
+from nuno.resolution import Resolution
 from nuno.scene.soft import SoftTopology, edge_matrices, moduli, shape_gradients
 from nuno.scene.stars import ELEMENTS
 from nuno.solver.fine_places import FinePlaces
@@ -42,7 +43,7 @@ from nuno.solver.soft_state import (
     Tetrahedra,
     WideTetrahedra,
 )
-from nuno.solver.soft_substeps import soft_substeps, wave_speed
+from nuno.solver.soft_substeps import modulus_share, soft_substeps, wanted_substeps, wave_speed
 from nuno.solver.state import NOTES, SCALARS, Settings
 from nuno.solver.tetrahedron import COLUMNS
 
@@ -113,6 +114,10 @@ class SoftSolver(ParticleSolver):
         values = material.resolved(self.world_count, topology.element_count)
         self._speed = wave_speed(values)
         self.substeps = int(substeps) if substeps else soft_substeps(topology, 1.0 / frame_rate, self._speed)
+        share = modulus_share(topology, values, 1.0 / (frame_rate * self.substeps))
+        wanted = wanted_substeps(topology, 1.0 / frame_rate, self._speed)
+        capped = not substeps and wanted > self.substeps
+        self.resolution = Resolution(self.substeps, bool(substeps), wanted, capped, 1, share, share, share)
         self.self_contact = self_contact
         self.shared_memory = True
         if plan == "auto":

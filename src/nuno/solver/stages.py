@@ -22,10 +22,14 @@ from nuno.solver.integrate import predict
 from nuno.solver.lanes import barrier, product, window
 from nuno.solver.membrane import shear_cell
 from nuno.solver.state import DAMPING, Settings, Topology
+from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.solver.team import Team, meet
 
-PARTICLES, PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS = range(7)
-"""Kinds of elements in the order in which they are solved; particles are predicted first."""
+PARTICLES, PATCHES, TWISTS, LINES, CELLS, TRIANGLES, YARNS, SWEPT_CELLS, SWEPT_TRIANGLES, SWEPT_YARNS = range(10)
+"""Kinds of elements in the order in which they are solved; particles are predicted first. Those in the cloth's plane
+may be swept several times."""
+KINDS = 16
+"""A step's kind is one of these, plus so many times the number of its sweep."""
 SORTED = (TWISTS, LINES, CELLS)
 """Kinds whose elements are copied into a table in the order of the blocks' shares."""
 
@@ -41,9 +45,9 @@ class Work:
     soft: wp.array(dtype=float)  # of every world: what ``scale`` is multiplied with
 
 
-def divide(topology: ClothTopology, blocks: int) -> Stages:
-    """The stages of a cloth for so many blocks, made once."""
-    key = f"stages of {blocks} blocks"
+def divide(topology: ClothTopology, blocks: int, sweeps: int = 0) -> Stages:
+    """The stages of a cloth for so many blocks and sweeps (0 for one plain pass), made once."""
+    key = f"stages of {blocks} blocks and {sweeps} sweeps"
     found: Stages | None = topology.device_arrays.get(key)
     if found is not None:
         return found
@@ -59,15 +63,17 @@ def divide(topology: ClothTopology, blocks: int) -> Stages:
 
     for kind, elements in ((PATCHES, topology.patches), (TWISTS, topology.twists), (LINES, topology.lines)):
         add(kind, elements)
-    for kind, elements in ((CELLS, topology.cells), (TRIANGLES, topology.triangles)):
-        add(kind, elements)
     order, starts, kinds = string_yarns(topology.edges)
     ends = topology.edges.vertices[order]
-    for first, last in pairwise(kinds):
-        if last > first:
-            owner = np.repeat(np.arange(last - first), 2 * np.diff(starts[first : last + 1]))
-            vertices = ends[starts[first] : starts[last]].ravel()
-            colours.append(Colour(YARNS, int(first), int(last - first), owner, vertices))
+    cells, triangles, yarns = (SWEPT_CELLS, SWEPT_TRIANGLES, SWEPT_YARNS) if sweeps else (CELLS, TRIANGLES, YARNS)
+    for sweep in range(max(1, sweeps)):
+        add(cells + KINDS * sweep, topology.cells)
+        add(triangles + KINDS * sweep, topology.triangles)
+        for first, last in pairwise(kinds):
+            if last > first:
+                owner = np.repeat(np.arange(last - first), 2 * np.diff(starts[first : last + 1]))
+                vertices = ends[starts[first] : starts[last]].ravel()
+                colours.append(Colour(yarns + KINDS * sweep, int(first), int(last - first), owner, vertices))
     made = topology.device_arrays[key] = make_stages(colours, n, blocks, SORTED)
     return made
 
@@ -139,7 +145,7 @@ def solve(t: Any, run: Settings, kind: int, e: Element, rate: float, damping: fl
     elif kind == LINES:
         bend_line(t, e.a, e.b, e.c, product(e.soft, e.scale * rate), run.damped, damping)
     else:
-        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate))
+        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate), 0.0, 0.0, 0.0)
 
 
 @wp.func
@@ -169,6 +175,25 @@ def set_out(t: Any, run: Settings, grips: int, first: int, last: int, thread: in
 def steps_of(work: Work, block: int):
     """The steps of one block."""
     return window(work.step, 4 * block * work.steps, 4 * work.steps)
+
+
+@wp.func
+def sweep_share(
+    t: Any, topo: Topology, run: Settings, kind: int, sweep: int, first: int, last: int, thread: int, threads: int
+):
+    """A block's share of a step of `nuno.solver.frame.sweep_membrane`."""
+    if kind == SWEPT_CELLS:
+        shear_cells_again(t, topo, t.cell_sum, run, sweep, first, last, thread, threads)
+    elif kind == SWEPT_TRIANGLES:
+        strain_triangles_again(t, topo, t.triangle_sum, run, sweep, first, last, thread, threads)
+    else:
+        lengths = topo.edge_rest
+        if sweep > 0:
+            lengths = t.yarn_goal
+        stretch_yarns_of_block(t, topo, lengths, run, first, last, thread, threads)
+        if sweep + 1 < run.sweeps:
+            barrier(threads)
+            note_lengths(t, topo, t.yarn_goal, topo.yarn[first], topo.yarn[last], thread, threads)
 
 
 @wp.func
@@ -207,8 +232,10 @@ def go_through(
             bend_patches(t, topo, run, first, last, thread, threads)
         elif what == TRIANGLES:
             strain_triangles(t, topo, run, first, last, thread, threads)
+        elif what == YARNS:
+            stretch_yarns_of_block(t, topo, topo.edge_rest, run, first, last, thread, threads)
         else:
-            stretch_yarns_of_block(t, topo, run, first, last, thread, threads)
+            sweep_share(t, topo, run, what % KINDS, what / KINDS, first, last, thread, threads)
         if step + 1 < end:
             if steps[4 * step + 1] != 0:
                 meet(team)

@@ -50,7 +50,7 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
     """The fields of a State whose numbers are floats or lanes of floats, and ``place`` its coordinates."""
     numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz")
     numbers += ("stretch_soft", "shear_soft", "bend_soft", "scalars", "notes", "bounds", "box", "listed", "middle")
-    numbers += ("yarn_gain", "yarn_pull", "yarn_inverse")
+    numbers += ("yarn_gain", "yarn_pull", "yarn_inverse", "yarn_goal", "cell_sum", "triangle_sum")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_ghost", "grip_load")
     integers = (
         "grip_corner",
@@ -158,6 +158,9 @@ class Sizes:
     shear_soft: int
     bend_soft: int
     edges: int
+    goals: int
+    cells: int
+    triangles: int
     forces: int
     keys: int
     grips: int
@@ -177,13 +180,17 @@ class Sizes:
 class Settings:
     """What holds for the whole run, or while it goes by parts: ``first`` is the first substep's number.
 
-    ``pulled`` says whether there are grips other than stiff ones on vertices.
+    ``pulled`` says whether there are grips other than stiff ones on vertices; ``sweeps`` how often a substep goes
+    through shear and stretch, 0 for one plain pass, over-relaxed by ``rise`` and ``onset`` (`nuno.solver.relaxation`).
     """
 
     dt: float
     gravity: wp.vec3
     pushed: int
     damped: int
+    sweeps: int
+    rise: float
+    onset: float
     touching: int
     margin: float
     reach: float
@@ -257,6 +264,9 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.yarn_gain = window(s.yarn_gain, group * size.edges, size.edges)
     t.yarn_pull = window(s.yarn_pull, group * size.edges, size.edges)
     t.yarn_inverse = window(s.yarn_inverse, group * size.edges, size.edges)
+    t.yarn_goal = window(s.yarn_goal, group * size.goals, size.goals)
+    t.cell_sum = window(s.cell_sum, group * size.cells, size.cells)
+    t.triangle_sum = window(s.triangle_sum, group * size.triangles, size.triangles)
     t.grip_x = window(s.grip_x, group * size.keys, size.keys)
     t.grip_y = window(s.grip_y, group * size.keys, size.keys)
     t.grip_z = window(s.grip_z, group * size.keys, size.keys)

@@ -52,6 +52,7 @@ from nuno.solver.state import (
     Topology,
     view,
 )
+from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 
 
 @wp.struct
@@ -91,6 +92,9 @@ class Wide:
     yarn_gain: wp.array(dtype=lane)
     yarn_pull: wp.array(dtype=lane)
     yarn_inverse: wp.array(dtype=lane)
+    yarn_goal: wp.array(dtype=lane)
+    cell_sum: wp.array(dtype=lane)
+    triangle_sum: wp.array(dtype=lane)
     scalars: wp.array(dtype=lane)
     notes: wp.array(dtype=lane)
 
@@ -141,14 +145,45 @@ def elastic_wide(t: Any, wide: Wide, run: Settings):
         bend_twists(t, wide, run, wide.twist_colour[c], wide.twist_colour[c + 1], 0, 1)
     for c in range(wide.line_colour.shape[0] - 1):
         bend_lines(t, wide, run, wide.line_colour[c], wide.line_colour[c + 1], 0, 1)
-    for c in range(wide.cell_colour.shape[0] - 1):
-        shear_cells(t, wide, run, wide.cell_colour[c], wide.cell_colour[c + 1], 0, 1)
-    for c in range(wide.triangle_colour.shape[0] - 1):
-        strain_triangles(t, wide, run, wide.triangle_colour[c], wide.triangle_colour[c + 1], 0, 1)
+    if run.sweeps > 0:
+        sweep_wide(t, wide, run)
+    else:
+        for c in range(wide.cell_colour.shape[0] - 1):
+            shear_cells(t, wide, run, wide.cell_colour[c], wide.cell_colour[c + 1], 0, 1)
+        for c in range(wide.triangle_colour.shape[0] - 1):
+            strain_triangles(t, wide, run, wide.triangle_colour[c], wide.triangle_colour[c + 1], 0, 1)
+        stretch_wide(t, wide, wide.edge_rest, run, 0, wide.yarn_kind[wide.yarn_kind.shape[0] - 1])
+
+
+@wp.func
+def stretch_wide(t: Any, wide: Wide, rest: wp.array(dtype=lane), run: Settings, first: int, last: int):
+    """The groups of sixteen yarns first to last."""
     rate = 1.0 / (run.dt * run.dt)
-    for k in range(wide.yarn_kind[wide.yarn_kind.shape[0] - 1]):
+    for k in range(first, last):
         start = wide.yarn[k]
-        stretch_yarn(t, wide, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, wide.yarn[k + 1], rate)
+        end = wide.yarn[k + 1]
+        stretch_yarn(t, wide, rest, wide.yarn_gain, wide.yarn_pull, wide.yarn_inverse, start, end, rate)
+
+
+@wp.func
+def sweep_wide(t: Any, wide: Wide, run: Settings):
+    """`nuno.solver.frame.sweep_membrane` by sixteen."""
+    for sweep in range(run.sweeps):
+        for c in range(wide.cell_colour.shape[0] - 1):
+            last = wide.cell_colour[c + 1]
+            shear_cells_again(t, wide, wide.cell_sum, run, sweep, wide.cell_colour[c], last, 0, 1)
+        for c in range(wide.triangle_colour.shape[0] - 1):
+            last = wide.triangle_colour[c + 1]
+            strain_triangles_again(t, wide, wide.triangle_sum, run, sweep, wide.triangle_colour[c], last, 0, 1)
+        for c in range(wide.yarn_kind.shape[0] - 1):
+            first = wide.yarn_kind[c]
+            last = wide.yarn_kind[c + 1]
+            if sweep == 0:
+                stretch_wide(t, wide, wide.edge_rest, run, first, last)
+            else:
+                stretch_wide(t, wide, wide.yarn_goal, run, first, last)
+            if sweep + 1 < run.sweeps:
+                note_lengths(t, wide, wide.yarn_goal, wide.yarn[first], wide.yarn[last], 0, 1)
 
 
 @wp.func
@@ -249,6 +284,9 @@ def widen_topology(topology: Any, arrays: Any) -> Any:
             # a flat table has the elements' rows one after the other
             setattr(wide, full, gathered(values.reshape(len(elements), -1) if len(elements) else values[:0], rows))
     _widen_yarns(wide, arrays, gathered)
+    wide.yarn_goal = wp.zeros(wide.yarn_pull.shape, dtype=lane, device="cpu")
+    wide.cell_sum = wp.zeros(max(1, wide.cell_scale.shape[0]), dtype=lane, device="cpu")
+    wide.triangle_sum = wp.zeros(max(1, 3 * wide.triangle_area.shape[0]), dtype=lane, device="cpu")
     wide.scalars = wp.zeros(SCALARS, dtype=lane, device="cpu")
     wide.notes = wp.zeros(NOTES, dtype=lane, device="cpu")
     return wide

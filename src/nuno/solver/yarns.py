@@ -28,7 +28,7 @@ for (int begin = warp * each; begin < yarns; begin += warps * each) {
     const int start = first + (own < yarns ? own : begin) * count;
     const int here = own < yarns ? count : 0;
     const int head = edge.data[start][0], step = edge.data[start][1] - head;
-    const float length = rest.data[start];
+    float length = rest.data[start];
     float alpha = soft.data[which.data[start]] * (scale.data[start] * rate);
     // the thread's rows, and the vertices at both ends of each
     float vx[ROWS + 1], vy[ROWS + 1], vz[ROWS + 1], vw[ROWS + 1];
@@ -45,6 +45,7 @@ for (int begin = warp * each; begin < yarns; begin += warps * each) {
         if (__builtin_expect(varied, false) && on) {
             const int k = start + q * ROWS + r;
             alpha = soft.data[which.data[k]] * (scale.data[k] * rate);
+            length = rest.data[k];
         }
         const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
         const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
@@ -154,7 +155,7 @@ def stretch_yarns_together(
 ):
     """Solve the edges of each yarn of one direction at once and move its vertices.
 
-    The yarns are equally long, their vertices equally far apart in memory, and their edges have one rest length.
+    The yarns are equally long, and their vertices equally far apart in memory.
 
     Args:
         x: Coordinates; so are ``y`` and ``z`` [m].
@@ -169,7 +170,7 @@ def stretch_yarns_together(
         first: The first edge of the first yarn.
         count: Edges of a yarn, `YARN_EDGES` at most.
         yarns: How many yarns.
-        varied: Whether the edges of a yarn differ in compliance.
+        varied: Whether the edges of a yarn differ in compliance or length.
         rate: 1 / dt^2 [1/s2].
         threads: Threads of the block, whole warps.
     """
