@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno import quaternion as quat
 from nuno.body_motion import BodyMotion, motion_of_rigid
-from nuno.coordinates import Pose, apply, compose, invert
+from nuno.coordinates import Pose, compose, invert
 from nuno.dynamics import Dynamics, State, check_material
 from nuno.given_velocity import GivenVelocity
 from nuno.mass_properties import mass_properties
