@@ -130,8 +130,8 @@ class World(Running):
                 to keep, also where it was detached at this instant: it starts at rest.
 
         Raises:
-            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, it follows another frame or a
-                path, or it would deform while it holds a rigid body.
+            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path,
+                or would deform while it holds a rigid body.
             InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
             MeshError: a rigid body without volume.
         """
