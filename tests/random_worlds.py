@@ -175,6 +175,22 @@ def attach_as_another(scene):
         scene.world.attach(body, material_for(scene, body))
 
 
+@operation(2)
+def attach_and_keep_velocity(scene):
+    """A dynamic body, with another material, also of another kind, as it moves."""
+    body = scene.pick(scene.dynamic())
+    if body is not None:
+        scene.world.attach(body, material_for(scene, body), keep_velocity=True)
+
+
+@operation(2)
+def set_velocity(scene):
+    """Another velocity of a dynamic body, also a turn."""
+    body = scene.pick(scene.dynamic())
+    if body is not None:
+        scene.world.set_velocity(body, scene.random.normal(0.0, 0.3, 3), scene.random.normal(0.0, 1.0, 3))
+
+
 @operation(1)
 def set_material(scene):
     """Another material of the same kind, as the body moves."""

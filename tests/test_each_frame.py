@@ -69,6 +69,7 @@ CALLS = {
     "grip": lambda world, cube, grip, saved: world.grip(cube, 0, to=(0.0, 0.0, 1.0)),
     "release": lambda world, cube, grip, saved: grip.release(),
     "push": lambda world, cube, grip, saved: world.push(cube, (1.0, 0.0, 0.0), duration=0.1),
+    "set_velocity": lambda world, cube, grip, saved: world.set_velocity(cube, (0.0, 0.0, 1.0)),
     "set_friction": lambda world, cube, grip, saved: world.set_friction(cube, "plate", 0.1),
     "ignore_contact": lambda world, cube, grip, saved: world.ignore_contact(cube, "plate"),
     "pose": lambda world, cube, grip, saved: world.find("box").translate((0.0, 0.0, 0.1)),

@@ -343,7 +343,7 @@ class World(Running):
             BodyStateError: the body is static.
             InvalidInputError: not finite, of another shape, or an angular velocity on top of those of vertices.
         """
-        with self._call():
+        with self._change("set_velocity"):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it with a velocity")
