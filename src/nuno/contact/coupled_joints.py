@@ -14,7 +14,7 @@ import warp as wp
 from nuno.contact.coupled_ties import CATCH_UP, UNMET, left_over, stand_on, within
 from nuno.contact.joint_block import BALL, FIXED, HINGE, SLIDER, Joints, apply_joint, arm_of, block_of, respond
 from nuno.contact.joint_drives import project_axis, project_ball
-from nuno.solver.rigid_body import RigidState, in_world, point_before, point_of, turn_angle, turn_between
+from nuno.solver.rigid_body import RigidState, in_world, point_before, point_of, turn_between
 
 JOINT_SWEEPS = wp.constant(8)
 """Times that joints are gone through in a pass, where there are several: a chain of six links of 20 g on which 5 kg
@@ -147,7 +147,7 @@ def settle_spin(rigid: RigidState, i: int, dt: float):
         # differences, for products of the inertia and its inverse are 1 but for rounding, always alike
         there = in_world(free, rigid.inverse_inertia[i]) * momentum + rigid.give[i] * torque
         change = in_world(now, rigid.inverse_inertia[i]) * (momentum + torque) - there
-        read = (turn_angle(turn_between(start, now)) - turn_angle(turn_between(start, free))) / dt
+        read = (turn_between(start, now) - turn_between(start, free)) / dt  # as `read_velocity` will
         rigid.spin[i] = rigid.spin[i] + (change + (gained - read))
 
 
