@@ -87,6 +87,18 @@ def test_a_joint_goes_with_its_bodies():
             world.run(0.1)
 
 
+def test_a_joint_ends_where_its_other_body_becomes_a_cloth():
+    """Attached as another kind, a dynamic body is detached first: the joint with it is released."""
+    world = nuno.World(device="cpu")
+    sheet = world.add(nuno.sheet((0.1, 0.1), (2, 2), position=(0.2, 0.0, 1.0)))
+    world.attach(sheet, nuno.Rigid())
+    joint = nuno.hinge(bar(world, (0.0, 0.0, 1.0)), sheet, point=(0.1, 0.0, 1.0), axis=(0.0, 1.0, 0.0))
+    world.run(0.1)
+    world.attach(sheet, nuno.Cloth(), keep_velocity=True)
+    assert not joint.active
+    world.run(0.1)
+
+
 def test_joined_bodies_pass_through_each_other_unless_asked():
     """Two overlapping bars rest on their hinge; with contact they push each other, and when it is released they do."""
     for contact in (False, True):

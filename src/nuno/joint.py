@@ -236,7 +236,7 @@ def check_joined(body: Body, material: Any, world: Simulation) -> None:
     Raises:
         BodyStateError: it would.
     """
-    if isinstance(material, Rigid):
+    if isinstance(material, Rigid) or body.is_dynamic:  # a joint with a dynamic body ends as that is detached
         return
     for dynamics in world._attached():
         for grip in dynamics.grips:

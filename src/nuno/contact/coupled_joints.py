@@ -147,7 +147,7 @@ def settle_spin(rigid: RigidState, i: int, dt: float):
         # differences, for products of the inertia and its inverse are 1 but for rounding, always alike
         there = in_world(free, rigid.inverse_inertia[i]) * momentum + rigid.give[i] * torque
         change = in_world(now, rigid.inverse_inertia[i]) * (momentum + torque) - there
-        read = (turn_between(start, now) - turn_between(start, free)) / dt
+        read = (turn_between(start, now) - turn_between(start, free)) / dt  # as `read_velocity` will
         rigid.spin[i] = rigid.spin[i] + (change + (gained - read))
 
 

@@ -157,7 +157,7 @@ def sum_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: 
 
 
 @wp.func
-def hold_pose(rigid: RigidState, holds: Holds, world: int, k: int, fraction: float):
+def hold_pose(holds: Holds, world: int, k: int, fraction: float):
     """Where a hold leads its body at a fraction of the frame: place and turn, or those in its leader's frame."""
     key = 2 * (world * holds.count + k)
     place = holds.place[key] + (holds.place[key + 1] - holds.place[key]) * fraction
@@ -170,7 +170,7 @@ def hold_apart(rigid: RigidState, holds: Holds, world: int, k: int, dt: float, f
     """How far a held body is from its frame, place and turn, beyond what the hold may mend in a substep."""
     r = world * holds.count + k
     i = world * rigid.capacity + holds.slot[k]
-    place, turn = hold_pose(rigid, holds, world, k, fraction)
+    place, turn = hold_pose(holds, world, k, fraction)
     leader = holds.leader[k]
     j = world * rigid.capacity + leader
     if leader >= 0:
@@ -180,7 +180,7 @@ def hold_apart(rigid: RigidState, holds: Holds, world: int, k: int, dt: float, f
     off = turn_between(turn, rigid.rotation[i])
     free = holds.free[r]
     if holds.compliance[k] == 0.0:
-        place, turn = hold_pose(rigid, holds, world, k, fraction - holds.step)
+        place, turn = hold_pose(holds, world, k, fraction - holds.step)
         if leader >= 0:
             place = point_before(rigid, j, place)
             turn = rigid.rotation_before[j] * turn
@@ -199,7 +199,7 @@ def project_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float,
     j = world * rigid.capacity + leader
     arm = wp.vec3(0.0, 0.0, 0.0)
     if leader >= 0:
-        place, _turn = hold_pose(rigid, holds, world, k, fraction)
+        place, _turn = hold_pose(holds, world, k, fraction)
         arm = wp.quat_rotate(rigid.rotation[j], place)
     alpha = holds.compliance[k] / (dt * dt)
     most = holds.limit[r] * dt * dt

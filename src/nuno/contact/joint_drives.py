@@ -23,7 +23,17 @@ from nuno.contact.joint_block import (
     inverted,
     respond,
 )
-from nuno.solver.rigid_body import RigidState, point_before, point_of, turn_angle, turn_between
+from nuno.solver.rigid_body import RigidState, point_before, point_of, turn_between
+
+
+@wp.func
+def turn_angle(turn: wp.vec3):
+    """The rotation vector [rad] of a `turn_between`."""
+    half = 0.5 * wp.length(turn)
+    scale = float(1.0)
+    if half > 1.0e-4:
+        scale = wp.atan(half) / half
+    return scale * turn
 
 
 @wp.func
