@@ -5,7 +5,8 @@ boundary. Where the tetrahedra are made from a surface, the surface is the skin:
 ``Body.skin`` has it.
 
 ``tetrahedraliser`` is "fitted" for tetrahedra whose boundary follows the surface, or "lattice" for whole voxels around
-it; a shape that does not say is a lattice, as those in files of earlier versions are.
+it; a shape that does not say is a lattice, as those in files of earlier versions are. With ``mean_strain`` the five
+tetrahedra of a whole voxel share three quarters of their stiffness, which acts on their mean deformation.
 """
 
 from __future__ import annotations
@@ -55,10 +56,12 @@ class SoftBox(SoftShape):
 
     size: tuple[float, float, float]
     cells: tuple[int, int, int]
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_box"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", lengths("size", self.size, 3))
+        object.__setattr__(self, "mean_strain", bool(self.mean_strain))
         try:
             nx, ny, nz = self.cells
         except (TypeError, ValueError) as error:
@@ -75,6 +78,7 @@ class SoftSphere(SoftShape):
     radius: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_sphere"
 
     def __post_init__(self) -> None:
@@ -90,6 +94,7 @@ class SoftCylinder(SoftShape):
     height: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_cylinder"
 
     def __post_init__(self) -> None:
@@ -105,6 +110,7 @@ class SoftCapsule(SoftShape):
     height: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_capsule"
 
     def __post_init__(self) -> None:
@@ -121,6 +127,7 @@ class SoftMesh(SoftShape):
         faces: (m, 3) int, closed, counterclockwise from outside.
         cell: Longest edge of a voxel [m].
         tetrahedraliser: "fitted" or "lattice".
+        mean_strain: Whether whole voxels share their mean deformation.
 
     Raises:
         MeshError: the surface is open, inside out or intersects itself, or the cell is too small.
@@ -130,6 +137,7 @@ class SoftMesh(SoftShape):
     faces: np.ndarray
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_mesh"
 
     def __post_init__(self) -> None:
@@ -198,6 +206,7 @@ def closed_mesh(vertices: Any, faces: Any) -> MeshArrays:
 def _set_lengths(shape: SoftShape, *names: str) -> None:
     for name in names:
         object.__setattr__(shape, name, number(name, getattr(shape, name), above=0.0))
+    object.__setattr__(shape, "mean_strain", bool(getattr(shape, "mean_strain", False)))
     kind = getattr(shape, "tetrahedraliser", LATTICE)
     if kind not in (FITTED, LATTICE):
         raise InvalidInputError(f'tetrahedraliser must be "fitted" or "lattice", got {kind!r}')
