@@ -21,7 +21,6 @@ import numpy as np
 from nuno.errors import InvalidInputError, MeshError
 from nuno.mesh import primitives
 from nuno.mesh.closed import check_closed
-from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra
 from nuno.mesh.lattice import MOST_VOXELS, lattice_tetrahedra
 from nuno.mesh.primitives import MeshArrays
 from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra, volumes
@@ -245,6 +244,8 @@ def _voxels(
     mean: tuple[float, float, float] | None = None,
 ) -> Tetrahedra:  # fmt: skip
     if shape.tetrahedraliser == FITTED:
+        from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra  # scipy: loaded where it is used
+
         try:
             return fitted_tetrahedra(vertices, faces, shape.cell, skin, mean)
         except UnresolvedMeshError as error:
