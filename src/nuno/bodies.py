@@ -92,46 +92,50 @@ def cloth_mesh(
     return Body(ClothMesh(source, faces, rest), **options)  # type: ignore[arg-type]
 
 
-def soft_box(size: ArrayLike, cells: tuple[int, int, int], **options: Unpack[BodyOptions]) -> Body:
+def soft_box(
+    size: ArrayLike, cells: tuple[int, int, int], *, mean_strain: bool = False, **options: Unpack[BodyOptions]
+) -> Body:
     """Return a soft box with edges ``size`` (3,) [m] in ``cells`` (nx, ny, nz) voxels; options as for ``Body``.
 
     Each voxel is five tetrahedra, alternating so that their faces match; ``vertices`` are the corners of the voxels,
-    those inside the box included, vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i.
+    those inside the box included, vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i. With few voxels across, tetrahedra
+    are too stiff in bending and torsion; with ``mean_strain`` the five of a voxel share their mean deformation, and
+    are not (docs/soft-bodies.md).
     """
-    return Body(SoftBox(size, cells), **options)  # type: ignore[arg-type]
+    return Body(SoftBox(size, cells, mean_strain), **options)  # type: ignore[arg-type]
 
 
 def soft_sphere(
     radius: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
-    **options: Unpack[BodyOptions],
+    mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
     """Return a soft sphere of ``radius`` [m], from voxels of at most ``cell`` [m].
 
     ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``. The tetrahedra are made as
     by ``soft_mesh``, and so are those of ``soft_cylinder`` and ``soft_capsule``; options as for ``Body``.
     """
-    return Body(SoftSphere(radius, cell, tetrahedraliser), **options)
+    return Body(SoftSphere(radius, cell, tetrahedraliser, mean_strain), **options)
 
 
 def soft_cylinder(
     radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
-    **options: Unpack[BodyOptions],
+    mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
     """Return a soft cylinder of ``radius`` and ``height`` [m] along z; otherwise as ``soft_sphere``."""
-    return Body(SoftCylinder(radius, height, cell, tetrahedraliser), **options)
+    return Body(SoftCylinder(radius, height, cell, tetrahedraliser, mean_strain), **options)
 
 
 def soft_capsule(
     radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
-    **options: Unpack[BodyOptions],
+    mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
     """Return a soft capsule along z, ``height`` [m] between its half spheres; otherwise as ``soft_sphere``."""
-    return Body(SoftCapsule(radius, height, cell, tetrahedraliser), **options)
+    return Body(SoftCapsule(radius, height, cell, tetrahedraliser, mean_strain), **options)
 
 
 def soft_mesh(
     source: MeshSource, cell: float, *, tetrahedraliser: Literal["fitted", "lattice", "pytetwild"] = "fitted",
-    **options: Unpack[BodyOptions],
+    mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
     """Return the inside of a closed surface as a soft body.
 
@@ -145,6 +149,8 @@ def soft_mesh(
         source: A path, a trimesh or (vertices, faces) [m].
         cell: Longest edge of a voxel [m], or the length of an edge that pytetwild aims at.
         tetrahedraliser: "fitted", "lattice" or "pytetwild".
+        mean_strain: Whether whole voxels share their mean deformation, as in ``soft_box``; elements beside a
+            surface that is not aligned are in none.
         options: Those of ``Body``.
 
     Raises:
@@ -154,9 +160,11 @@ def soft_mesh(
     """
     vertices, faces = load_mesh(source)
     if tetrahedraliser in ("fitted", "lattice"):
-        return Body(SoftMesh(vertices, faces, cell, tetrahedraliser), **options)
+        return Body(SoftMesh(vertices, faces, cell, tetrahedraliser, mean_strain), **options)
     if tetrahedraliser != "pytetwild":
         raise InvalidInputError(f'tetrahedraliser must be "fitted", "lattice" or "pytetwild", got {tetrahedraliser!r}')
+    if mean_strain:
+        raise InvalidInputError("mean_strain is for voxels, and pytetwild makes none; leave it out")
     from nuno.mesh.tetrahedraliser import fitted_tetrahedra
 
     points, triangles = closed_mesh(vertices, faces)

@@ -418,7 +418,7 @@ def _soft_topology(shape: SoftShape) -> Any:
     from nuno.scene.soft import SoftTopology
 
     made = shape.tetrahedra()
-    return SoftTopology.of(made.vertices, made.tets, made.fraction)
+    return SoftTopology.of(made.vertices, made.tets, made.fraction, getattr(shape, "mean_strain", False))
 
 
 @lru_cache(maxsize=64)

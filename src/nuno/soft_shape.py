@@ -5,7 +5,8 @@ boundary. Where the tetrahedra are made from a surface, the surface is the skin:
 ``Body.skin`` has it.
 
 ``tetrahedraliser`` is "fitted" for tetrahedra whose boundary follows the surface, or "lattice" for whole voxels around
-it; a shape that does not say is a lattice, as those in files of earlier versions are.
+it; a shape that does not say is a lattice, as those in files of earlier versions are. With ``mean_strain`` the five
+tetrahedra of a whole voxel share three quarters of their stiffness, which acts on their mean deformation.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ import numpy as np
 from nuno.errors import InvalidInputError, MeshError
 from nuno.mesh import primitives
 from nuno.mesh.closed import check_closed
-from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra
 from nuno.mesh.lattice import MOST_VOXELS, lattice_tetrahedra
 from nuno.mesh.primitives import MeshArrays
 from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra, volumes
@@ -55,10 +55,12 @@ class SoftBox(SoftShape):
 
     size: tuple[float, float, float]
     cells: tuple[int, int, int]
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_box"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", lengths("size", self.size, 3))
+        object.__setattr__(self, "mean_strain", bool(self.mean_strain))
         try:
             nx, ny, nz = self.cells
         except (TypeError, ValueError) as error:
@@ -75,6 +77,7 @@ class SoftSphere(SoftShape):
     radius: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_sphere"
 
     def __post_init__(self) -> None:
@@ -90,6 +93,7 @@ class SoftCylinder(SoftShape):
     height: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_cylinder"
 
     def __post_init__(self) -> None:
@@ -105,6 +109,7 @@ class SoftCapsule(SoftShape):
     height: float
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_capsule"
 
     def __post_init__(self) -> None:
@@ -121,6 +126,7 @@ class SoftMesh(SoftShape):
         faces: (m, 3) int, closed, counterclockwise from outside.
         cell: Longest edge of a voxel [m].
         tetrahedraliser: "fitted" or "lattice".
+        mean_strain: Whether whole voxels share their mean deformation.
 
     Raises:
         MeshError: the surface is open, inside out or intersects itself, or the cell is too small.
@@ -130,6 +136,7 @@ class SoftMesh(SoftShape):
     faces: np.ndarray
     cell: float
     tetrahedraliser: str = LATTICE
+    mean_strain: bool = False
     kind: ClassVar[str] = "soft_mesh"
 
     def __post_init__(self) -> None:
@@ -198,6 +205,7 @@ def closed_mesh(vertices: Any, faces: Any) -> MeshArrays:
 def _set_lengths(shape: SoftShape, *names: str) -> None:
     for name in names:
         object.__setattr__(shape, name, number(name, getattr(shape, name), above=0.0))
+    object.__setattr__(shape, "mean_strain", bool(getattr(shape, "mean_strain", False)))
     kind = getattr(shape, "tetrahedraliser", LATTICE)
     if kind not in (FITTED, LATTICE):
         raise InvalidInputError(f'tetrahedraliser must be "fitted" or "lattice", got {kind!r}')
@@ -236,6 +244,8 @@ def _voxels(
     mean: tuple[float, float, float] | None = None,
 ) -> Tetrahedra:  # fmt: skip
     if shape.tetrahedraliser == FITTED:
+        from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra  # scipy: loaded where it is used
+
         try:
             return fitted_tetrahedra(vertices, faces, shape.cell, skin, mean)
         except UnresolvedMeshError as error:

@@ -17,14 +17,14 @@ GRAVITY = 9.81  # [m/s2], the default of the solver
 FOAM = nuno.Soft(density=1000.0, youngs_modulus=5e4, poisson_ratio=0.3, damping=0.02)
 
 
-def block(size, cells, irregular: float = 0.0, seed: int = 1) -> SoftTopology:
+def block(size, cells, irregular: float = 0.0, seed: int = 1, mean_strain: bool = False) -> SoftTopology:
     """A box about the origin; its inner vertices are displaced at random by ``irregular`` cells."""
     vertices, tets = box_tetrahedra(size, cells)
     if irregular:
         inner = (np.abs(vertices) < np.array(size) / 2 - 1e-9).all(axis=1)
         cell = np.array(size) / cells
         vertices[inner] += np.random.default_rng(seed).uniform(-irregular, irregular, (inner.sum(), 3)) * cell
-    return SoftTopology.of(vertices, tets)
+    return SoftTopology.of(vertices, tets, mean_strain=mean_strain)
 
 
 def solver(topology: SoftTopology, material: nuno.Soft = FOAM, *others: nuno.Body, **options: Any) -> SoftSolver:

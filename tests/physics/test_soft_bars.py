@@ -8,6 +8,7 @@ from soft_with import GRAVITY, block, hold, solver, traction
 
 import nuno
 from nuno.dynamics import topology_of
+from nuno.scene.soft import OWN_SHARE
 from nuno.soft_measures import deformation_gradients, elastic_energy, element_volumes, strains, stresses
 
 YOUNG, NU = 5e4, 0.3
@@ -88,14 +89,14 @@ def test_a_pull_from_all_sides_is_the_bulk_modulus():
     assert np.abs(ratio - ratio.mean()).max() < 0.08 * 0.003
 
 
-def twist(across):
+def twist(across, **options):
     """Return a clamped square bar's torque over G J theta / L, J = 0.1406 a^4 [Timoshenko and Goodier].
 
     By both grips, by twice the elastic energy over the angle, and by linear elements on the same mesh.
     """
     a, length, theta = 0.05, 0.25, 0.1
     world = nuno.World(gravity=(0.0, 0.0, 0.0), device="cpu")
-    bar = world.add(nuno.soft_box((a, a, length), cells=(across, across, 5 * across)))
+    bar = world.add(nuno.soft_box((a, a, length), cells=(across, across, 5 * across), **options))
     x = bar.vertices.copy()
     foot, head = (np.flatnonzero(side * x[:, 2] > length / 2 - 1e-9) for side in (-1, 1))
     world.attach(bar, FOAM)
@@ -107,7 +108,9 @@ def twist(across):
     world.run(1.5)
     energy = elastic_energy(topology_of(bar.shape), bar.vertices, FOAM)
     moved = np.concatenate([0.0 * x[foot], theta * np.stack([-x[head, 1], x[head, 0], 0.0 * x[head, 0]], axis=1)])
-    force = reactions(stiffness(x, bar.shape.tetrahedra().tets, YOUNG, NU), np.concatenate([foot, head]), moved)[head]
+    own = OWN_SHARE if bar.shape.mean_strain else 1.0
+    matrix = stiffness(x, bar.shape.tetrahedra().tets, YOUNG, NU, own)
+    force = reactions(matrix, np.concatenate([foot, head]), moved)[head]
     linear = (x[head, 0] * force[:, 1] - x[head, 1] * force[:, 0]).sum()
     found = np.array([-upper.wrench[1][2], lower.wrench[1][2], 2.0 * energy / theta, linear])
     return found / (MU * 0.1406 * a**4 * theta / length)
@@ -153,10 +156,10 @@ def test_stresses_against_the_force_that_bears_them():
     assert abs(excess[2]) < 0.005  # 0.3 %
 
 
-def bend(across):
+def bend(across, mean_strain=False):
     """Return the tip's deflection of a cantilever over the closed form, under its own weight and under a load."""
     a, length, young = 0.05, 0.25, 2e5
-    body = block((length, a, a), (5 * across, across, across))
+    body = block((length, a, a), (5 * across, across, across), mean_strain=mean_strain)
     inertia, area, shear = a**4 / 12, a * a, young / (2 * (1 + NU))
     made = solver(body, nuno.Soft(density=1000.0, youngs_modulus=young, poisson_ratio=NU, damping=0.002, air_drag=20.0))
     x = body.rest

@@ -53,7 +53,7 @@ def relaxed(
         targets = targets.loosened(np.unique(tets[low & ~skin]))
         tets, shape, whole = tets[~skin], shape[~skin], whole[~skin]
         placed = _iterated(placed, tets, shape, whole, targets, deep, AGAIN)
-    return (placed, tets) if heights(placed, tets).min() > WORST_HEIGHT * edge else None
+    return (placed, tets) if heights(placed, tets).min(initial=np.inf) > WORST_HEIGHT * edge else None
 
 
 def heights(vertices: np.ndarray, tets: np.ndarray) -> np.ndarray:
@@ -69,6 +69,8 @@ def _iterated(
     deep: np.ndarray, count: int,
 ) -> np.ndarray:  # fmt: skip
     """Return the vertices after ``count`` iterations; ``shape`` (m, 4, 3) has the norm 1, ``whole`` is its size."""
+    near = ~deep[tets].all(axis=1)
+    tets, shape, whole = tets[near], shape[near], whole[near]
     flat = tets.ravel()
     for _ in range(count):
         corners = placed[tets]

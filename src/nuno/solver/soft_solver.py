@@ -318,6 +318,7 @@ def rest_shapes(topology: SoftTopology) -> tuple[np.ndarray, np.ndarray]:
     products = (inverse @ inverse.transpose(0, 2, 1) * volume[:, None, None]).reshape(-1, 9)[:, [0, 4, 8, 1, 2, 5]]
     numbers = np.zeros((*there.shape, COLUMNS))
     numbers[there] = np.column_stack([products, 1.0 / (6.0 * volume), topology.fraction[element]])
+    numbers[topology.voxels, 0, -1] *= -1.0  # a voxel with a mean
     # products have the size of the largest of a star, the rest their own
     size = np.abs(numbers)
     size[..., :6] = size[..., :6].max(axis=(1, 2), keepdims=True)

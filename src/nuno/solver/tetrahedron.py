@@ -27,7 +27,8 @@ from nuno.solver.vector import scaled, spread
 
 COLUMNS = 8
 """Numbers of an element: with B the inverse rest matrix and v the rest volume, v B B^T as 11, 22, 33, 12, 13, 23; then
-1 / (6 v), and the filled fraction."""
+1 / (6 v), and the filled fraction, which is negative in the inner element of a voxel that has a mean
+(`nuno.solver.mean_strain`)."""
 
 SHARE, SHARE_STIFF = wp.constant(0.4), wp.constant(1.0)
 VOLUME_SHARE, VOLUME_STIFF = wp.constant(0.5), wp.constant(0.5)
@@ -67,6 +68,100 @@ def cross(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
 def add_dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any, c: Any):
     """The scalar product plus c."""
     return fused(az, bz, fused(ay, by, fused(ax, bx, c)))
+
+
+@wp.func
+def element_reply(
+    ex: Any,
+    ey: Any,
+    ez: Any,
+    fx: Any,
+    fy: Any,
+    fz: Any,
+    gx: Any,
+    gy: Any,
+    gz: Any,
+    wa: Any,
+    wb: Any,
+    wc: Any,
+    wd: Any,
+    m11: Any,
+    m22: Any,
+    m33: Any,
+    m12: Any,
+    m13: Any,
+    m23: Any,
+    inverse: Any,
+    mu: Any,
+    bulk: Any,
+):
+    """The work of `solve_tetrahedron` on edges e, f and g from the first corner to the others, for any element.
+
+    Returns:
+        The corners' steps -dx / (sigma w) of b, c and d, and dx / (sigma w) of a: x, y and z of a, b, c and d; sigma;
+        J; and a number that is positive where the element is inside out or stretched beyond `STRETCHED`.
+    """
+    # the gradient of six times the volume by b, c and d
+    nbx, nby, nbz = cross(fx, fy, fz, gx, gy, gz)
+    ncx, ncy, ncz = cross(gx, gy, gz, ex, ey, ez)
+    ndx, ndy, ndz = cross(ex, ey, ez, fx, fy, fz)
+    one = fill(ex, 1.0)
+    j = scaled(dot(ex, ey, ez, nbx, nby, nbz), inverse)
+    maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
+    reply = fused(wd, spread(wd, m33), fused(wc, spread(wc, m22), fused(wb, spread(wb, m11), scaled(wa, maa))))
+    most_stiff = over(fill(one, CARRIED), reply + fill(one, 1.0e-30))
+    mu = least(mu, most_stiff)
+    bulk = least(bulk, most_stiff)
+    pressure = (times(bulk, j - one) - mu) * (1.0 / 6.0)
+    k11 = scaled(mu, m11)
+    k22 = scaled(mu, m22)
+    k33 = scaled(mu, m33)
+    k12 = scaled(mu, m12)
+    k13 = scaled(mu, m13)
+    k23 = scaled(mu, m23)
+    kbx, kby, kbz = combine(k11, k12, k13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    kcx, kcy, kcz = combine(k12, k22, k23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    kdx, kdy, kdz = combine(k13, k23, k33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    # |F|^2 mu v = e k: k is the gradient of half of it
+    squares = add_dot(ex, ey, ez, kbx, kby, kbz, add_dot(fx, fy, fz, kcx, kcy, kcz, dot(gx, gy, gz, kdx, kdy, kdz)))
+    # |F|^2 mu
+    stretched = scaled(squares, inverse) * 6.0
+    kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz = weakened(mu, stretched, kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz)
+    # W n: how the edges go where the corners follow the volume's gradient
+    ux = times(wa, nbx + ncx + ndx)
+    uy = times(wa, nby + ncy + ndy)
+    uz = times(wa, nbz + ncz + ndz)
+    ubx = fused(wb, nbx, ux)
+    uby = fused(wb, nby, uy)
+    ubz = fused(wb, nbz, uz)
+    ucx = fused(wc, ncx, ux)
+    ucy = fused(wc, ncy, uy)
+    ucz = fused(wc, ncz, uz)
+    udx = fused(wd, ndx, ux)
+    udy = fused(wd, ndy, uy)
+    udz = fused(wd, ndz, uz)
+    uk = add_dot(ubx, uby, ubz, kbx, kby, kbz, add_dot(ucx, ucy, ucz, kcx, kcy, kcz, dot(udx, udy, udz, kdx, kdy, kdz)))
+    un = add_dot(ubx, uby, ubz, nbx, nby, nbz, add_dot(ucx, ucy, ucz, ncx, ncy, ncz, dot(udx, udy, udz, ndx, ndy, ndz)))
+    shear = times(mu, reply)
+    sigma = over(one, fused(shear, fused(shear, fill(one, SHARE_STIFF), fill(one, SHARE)), one))
+    h = scaled(bulk, inverse) * (1.0 / 6.0)
+    volume = times(times(sigma, h), un)
+    replied = fused(volume, fused(volume, fill(one, VOLUME_STIFF), fill(one, VOLUME_SHARE)), one)
+    p = lessened(h, over(times(sigma, fused(pressure, un, uk)), replied), pressure)
+    rbx = fused(p, nbx, kbx)
+    rby = fused(p, nby, kby)
+    rbz = fused(p, nbz, kbz)
+    rcx = fused(p, ncx, kcx)
+    rcy = fused(p, ncy, kcy)
+    rcz = fused(p, ncz, kcz)
+    rdx = fused(p, ndx, kdx)
+    rdy = fused(p, ndy, kdy)
+    rdz = fused(p, ndz, kdz)
+    rax = rbx + rcx + rdx
+    ray = rby + rcy + rdy
+    raz = rbz + rcz + rdz
+    bad = most(fill(one, 0.0) - j, stretched - mu * STRETCHED)
+    return rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad
 
 
 @wp.func
@@ -170,70 +265,14 @@ def solve_tetrahedron(
     gx = dx - ax
     gy = dy - ay
     gz = dz - az
-    # the gradient of six times the volume by b, c and d
-    nbx, nby, nbz = cross(fx, fy, fz, gx, gy, gz)
-    ncx, ncy, ncz = cross(gx, gy, gz, ex, ey, ez)
-    ndx, ndy, ndz = cross(ex, ey, ez, fx, fy, fz)
-    one = fill(ax, 1.0)
-    j = scaled(dot(ex, ey, ez, nbx, nby, nbz), inverse)
-    maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
-    reply = fused(wd, spread(wd, m33), fused(wc, spread(wc, m22), fused(wb, spread(wb, m11), scaled(wa, maa))))
-    most_stiff = over(fill(one, CARRIED), reply + fill(one, 1.0e-30))
-    mu = least(mu, most_stiff)
-    bulk = least(bulk, most_stiff)
-    pressure = (times(bulk, j - one) - mu) * (1.0 / 6.0)
-    k11 = scaled(mu, m11)
-    k22 = scaled(mu, m22)
-    k33 = scaled(mu, m33)
-    k12 = scaled(mu, m12)
-    k13 = scaled(mu, m13)
-    k23 = scaled(mu, m23)
-    kbx, kby, kbz = combine(k11, k12, k13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    kcx, kcy, kcz = combine(k12, k22, k23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    kdx, kdy, kdz = combine(k13, k23, k33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    # |F|^2 mu v = e k: k is the gradient of half of it
-    squares = add_dot(ex, ey, ez, kbx, kby, kbz, add_dot(fx, fy, fz, kcx, kcy, kcz, dot(gx, gy, gz, kdx, kdy, kdz)))
-    # |F|^2 mu
-    stretched = scaled(squares, inverse) * 6.0
-    kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz = weakened(mu, stretched, kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz)
-    # W n: how the edges go where the corners follow the volume's gradient
-    ux = times(wa, nbx + ncx + ndx)
-    uy = times(wa, nby + ncy + ndy)
-    uz = times(wa, nbz + ncz + ndz)
-    ubx = fused(wb, nbx, ux)
-    uby = fused(wb, nby, uy)
-    ubz = fused(wb, nbz, uz)
-    ucx = fused(wc, ncx, ux)
-    ucy = fused(wc, ncy, uy)
-    ucz = fused(wc, ncz, uz)
-    udx = fused(wd, ndx, ux)
-    udy = fused(wd, ndy, uy)
-    udz = fused(wd, ndz, uz)
-    uk = add_dot(ubx, uby, ubz, kbx, kby, kbz, add_dot(ucx, ucy, ucz, kcx, kcy, kcz, dot(udx, udy, udz, kdx, kdy, kdz)))
-    un = add_dot(ubx, uby, ubz, nbx, nby, nbz, add_dot(ucx, ucy, ucz, ncx, ncy, ncz, dot(udx, udy, udz, ndx, ndy, ndz)))
-    shear = times(mu, reply)
-    sigma = over(one, fused(shear, fused(shear, fill(one, SHARE_STIFF), fill(one, SHARE)), one))
-    h = scaled(bulk, inverse) * (1.0 / 6.0)
-    volume = times(times(sigma, h), un)
-    replied = fused(volume, fused(volume, fill(one, VOLUME_STIFF), fill(one, VOLUME_SHARE)), one)
-    p = lessened(h, over(times(sigma, fused(pressure, un, uk)), replied), pressure)
-    rbx = fused(p, nbx, kbx)
-    rby = fused(p, nby, kby)
-    rbz = fused(p, nbz, kbz)
-    rcx = fused(p, ncx, kcx)
-    rcy = fused(p, ncy, kcy)
-    rcz = fused(p, ncz, kcz)
-    rdx = fused(p, ndx, kdx)
-    rdy = fused(p, ndy, kdy)
-    rdz = fused(p, ndz, kdz)
-    rax = rbx + rcx + rdx
-    ray = rby + rcy + rdy
-    raz = rbz + rcz + rdz
+    rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad = element_reply(
+        ex, ey, ez, fx, fy, fz, gx, gy, gz, wa, wb, wc, wd, m11, m22, m33, m12, m13, m23, inverse, mu, bulk
+    )
+    one = fill(sigma, 1.0)
     ha = times(sigma, wa)
     hb = times(sigma, wb)
     hc = times(sigma, wc)
     hd = times(sigma, wd)
-    bad = most(fill(one, 0.0) - j, stretched - mu * STRETCHED)
     if anywhere(bad):
         zero = fill(one, 0.0)
         note_crumpled(t.notes, choose(zero - j, one, zero))
