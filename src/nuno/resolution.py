@@ -27,7 +27,7 @@ class Resolution:
     Attributes:
         substeps: Substeps of a frame.
         given: Whether ``World(substeps=...)`` gave them; else the rule chose them.
-        wanted: What the rule asks for.
+        wanted: What the rule asks for; where that is capped, as many as plain passes need, as those are that are given.
         capped: Whether the rule chose fewer than it asked for, for they have a bound.
         sweeps: How often a substep goes through a cloth's shear and stretch: once where substeps are given.
         stretch: The share of a cloth's stretch stiffness, of a soft body's modulus.

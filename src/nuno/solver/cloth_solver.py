@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ from nuno.solver.lanes import LANES
 from nuno.solver.large import THREADS, LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
-from nuno.solver.relaxation import RELAXATIONS, softening, stiffness_share, sweeps_for
+from nuno.solver.relaxation import PLAIN, RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.solver.shared import (
     FEW_FRAMES,
     FEW_THREADS,
@@ -163,6 +164,8 @@ class ClothSolver(ParticleSolver):
         share = {name: min(1.0, stiffness_share(q * step**2, self.sweeps)) for name, q in soft.items()}
         bending = bending_share(self.topology, step, density, rigidity)
         capped = not given and wanted > self.substeps
+        if capped:  # so many may be given, but then each is one plain pass
+            wanted = max(wanted, math.ceil(math.sqrt(self._softening / PLAIN) / self.frame_rate))
         tension = None
         if len(self.topology.edges):
             tension = bearable_tension(self.topology, step, density)

@@ -24,6 +24,8 @@ RELAXATIONS = ((0.0, 0.0), (0.0, 0.0), (0.467, 0.473), (0.403, 0.609), (0.379, 0
 its own q."""
 MOST_SOFTENED = (0.05, 0.05, 1.15, 2.2, 3.0, 4.0)
 """The largest q for which so many sweeps are enough, none meaning one plain pass."""
+PLAIN = 0.1
+"""The q that leaves a plain pass within a tenth of nominal."""
 SOFTEST_STEP = 3.0
 """The largest q that the rule for substeps allows."""
 
