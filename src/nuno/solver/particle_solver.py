@@ -194,9 +194,8 @@ class ParticleSolver:
         notes[:, TRAVEL] = 1.0e9
         speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
         notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
-        local = (positions - origin[:, None]).astype(np.float32)
-        origin, velocities = origin.astype(np.float32), velocities.astype(np.float32)
-        self.load_state(dict(local=local, origin=origin, velocities=velocities, notes=notes))
+        local, origin = (positions - origin[:, None]).astype(np.float32), origin.astype(np.float32)
+        self.load_state(dict(local=local, origin=origin, velocities=velocities.astype(np.float32), notes=notes))
 
     def save_state(self) -> dict[str, np.ndarray]:
         """All that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
