@@ -127,7 +127,10 @@ class Body(Quantities, Coordinates):
 
     @property
     def missed_contacts(self) -> Any:
-        """Whether contacts of a cloth with itself were passed over, as memory ran out: a bool, in a batch (worlds,)."""
+        """Whether contacts of a cloth with itself were missed: a bool, in a batch (worlds,).
+
+        Memory ran out, or it passed through itself in spite of all substeps; a warning told which.
+        """
         solver = getattr(self._dynamics, "solver", None)
         missed = np.array(getattr(solver, "missed", np.zeros(1, dtype=bool)))
         return missed if len(missed) > 1 else bool(missed[0])

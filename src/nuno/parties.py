@@ -42,8 +42,15 @@ class Parties:
         return np.where(self.substeps == substeps, self.first, np.arange(len(self.first))[:, None])
 
 
-def find_parties(world: Simulation, moving: list[Body], duration: float) -> Parties:
-    """Return the parties of dynamic bodies for the next ``duration`` [s], at most a frame."""
+def find_parties(world: Simulation, moving: list[Body], duration: float, substeps: np.ndarray | None = None) -> Parties:
+    """Return the parties of dynamic bodies for the next ``duration`` [s], at most a frame.
+
+    Args:
+        world: Whose bodies.
+        moving: The bodies.
+        duration: [s].
+        substeps: (bodies, worlds) int, how many of a frame each needs; None takes the bodies' own.
+    """
     low, high = (np.stack(corner) for corner in zip(*(_box(world, body, duration) for body in moving), strict=True))
     near = np.asarray((low[:, None] <= high[None]).all(axis=-1) & (low[None] <= high[:, None]).all(axis=-1))
     joined = np.zeros_like(near)  # (bodies, bodies, worlds)
@@ -57,9 +64,10 @@ def find_parties(world: Simulation, moving: list[Body], duration: float) -> Part
                 a, b = sorted((place[body], place[grip.target]))
                 joined[a, b] |= holding(grip, world.world_count)
     first = _connected(joined)
-    own = np.array([body._dynamics.substeps for body in moving])  # type: ignore[union-attr]
+    if substeps is None:
+        substeps = np.array([body._dynamics.substeps for body in moving])[:, None]  # type: ignore[union-attr]
     most, column = np.zeros_like(first), np.arange(world.world_count)
-    np.maximum.at(most, (first, column), np.broadcast_to(own[:, None], first.shape))
+    np.maximum.at(most, (first, column), np.broadcast_to(substeps, first.shape))
     return Parties(first, most[first, column])
 
 

@@ -21,6 +21,7 @@ from nuno.device import checked_device, found_device
 from nuno.dynamics import SOON, Dynamics, ParticleDynamics, make_colliders, make_dynamics
 from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
 from nuno.grip import Grip
+from nuno.impacts import are_fast
 from nuno.motion import Schedule, arrive, convoys_of, is_led, make_schedule
 from nuno.run_start import RunStart
 from nuno.stepping import Stepping
@@ -328,28 +329,39 @@ class Simulation:
                 self._schedule_led(now, stop - now)
             if look is None:
                 self._stepping.run(now, stop)
-            elif not self._run_looking(now, stop, look, instants, careful):
+            elif not self._run_looking(now, stop, look, instants, moving if careful else None):
                 return False
             now = stop
         broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
-        if self._make_room():
+        if self._must_repeat(moving):
             return False
+        self._stepping.careful = are_fast(moving)
         for body, finite in broken:
             if not finite.all():
                 raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
         return True
+
+    def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
+        """Return whether the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
+        longer = self._make_room()
+        if not self._stepping.careful and are_fast(moving):
+            self._stepping.careful = True
+            return True
+        return longer
 
     def _make_room(self) -> bool:
         """Make lists longer that were too short since this was asked last; return whether any is."""
         return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := b._dynamics, ParticleDynamics)])
 
     def _run_looking(
-        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None, careful: bool
-    ) -> bool:
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,
+        careful: dict[Body, Dynamics] | None,
+    ) -> bool:  # fmt: skip
         """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each.
 
         Returns:
-            Whether no list was too short, as far as this was looked at: ``careful``, before each instant.
+            Whether nothing must be repeated, as far as this was looked at: of ``careful``, all that moves, before each
+            instant.
         """
         if instants is None:
             frame = 1.0 / self.frame_rate
@@ -362,7 +374,7 @@ class Simulation:
         for end in ends.tolist():
             self._stepping.run(now, end)
             if end > self._told + SOON:
-                if careful and self._make_room():
+                if careful is not None and self._must_repeat(careful):
                     return False
                 self._telling = True
                 try:

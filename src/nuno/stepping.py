@@ -14,6 +14,7 @@ import numpy as np
 
 from nuno.dynamics import SOON, touches_itself
 from nuno.frame_runs import FrameRuns
+from nuno.impacts import PASSES, Impacts
 from nuno.parties import Parties, find_parties
 from nuno.path import Path
 
@@ -39,6 +40,7 @@ class Stepping:
         self._couplings: dict[Any, Any] = {}
         self._version = -1
         self.last: list[Any] = []  # the couplings of the last frame, for the forces that they tell
+        self.careful = False  # whether a cloth may be so fast that it passes through itself: see `nuno.impacts`
 
     def run(self, time: float, stop: float) -> None:
         """Advance all dynamic bodies from ``time`` to ``stop`` [s]."""
@@ -52,27 +54,30 @@ class Stepping:
             self._couplings.clear()
             self._version = world._collider_version
         self.last = []
-        if not self._may_meet(moving, rigid) and not (rigid and world._led_bodies()):
+        apart = not self._may_meet(moving, rigid) and not (rigid and world._led_bodies())
+        if apart:
             self._prepare(moving, time)
-            self._run_apart(moving, time, stop - time)
-            return
+            if not self.careful:
+                self._run_apart(moving, time, stop - time)
+                return
         now = time
         while now < stop - SOON:
             # the same instants whether a span is gone through at once or in pieces
             duration = min(frame, stop - now)
             self.last = []
-            self._prepare(moving, now)
+            if not apart:
+                self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
 
-    def _run_apart(self, moving: list[Body], time: float, duration: float) -> None:
+    def _run_apart(self, moving: list[Body], time: float, duration: float, substeps: int | None = None) -> None:
         slots = []
         for body in moving:
             dynamics: Any = body._dynamics
             if dynamics.is_rigid:
                 slots.append(dynamics.slot)
             else:
-                dynamics.solver.run(time, duration)
+                dynamics.solver.run(time, duration, substeps)
         if slots:
             scene = self._world._rigid
             assert scene is not None
@@ -94,16 +99,27 @@ class Stepping:
         return any(rules.touch(a, b) for k, a in enumerate(particles) for b in (*particles[k + 1 :], *rigid))
 
     def _run_frame(self, moving: list[Body], time: float, duration: float) -> None:
-        parties = find_parties(self._world, moving, duration)
-        counts = np.unique(parties.substeps)
-        runs = FrameRuns(self._world, [body for body, own in zip(moving, parties.substeps, strict=True) if np.ptp(own)])
-        for count in counts:
-            its = parties.substeps == count
-            kept = {body: own for body, own in zip(moving, its, strict=True) if own.any()}
-            runs.begin(kept)
-            self._run_with(moving, parties, int(count), kept, time, duration)
-            runs.end(kept)
-        runs.settle()
+        world = self._world
+        impacts = Impacts(moving, world.world_count, 1.0 / world.frame_rate) if self.careful else None
+        parties = find_parties(world, moving, duration, None if impacts is None else impacts.substeps)
+        several = [self.careful or bool(np.ptp(own)) for own in parties.substeps]
+        runs = FrameRuns(world, [body for body, more in zip(moving, several, strict=True) if more])
+        due = np.ones_like(parties.substeps, dtype=bool)
+        try:
+            while due.any():
+                for count in np.unique(parties.substeps[due]):
+                    its = due & (parties.substeps == count)
+                    kept = {body: own for body, own in zip(moving, its, strict=True) if own.any()}
+                    runs.begin(kept)
+                    self._run_with(moving, parties, int(count), kept, time, duration)
+                    runs.end(kept)
+                runs.settle()
+                due[:] = False
+                if impacts is not None:
+                    parties, due = impacts.again(parties)
+        finally:
+            if impacts is not None:
+                impacts.set_passes(PASSES)
 
     def _run_with(
         self, moving: list[Body], parties: Parties, count: int, kept: dict[Body, np.ndarray], time: float,
@@ -121,7 +137,7 @@ class Stepping:
             else:
                 party = np.searchsorted(group, first[group])
                 self._run_together(bodies, party, count, {body: kept[body] for body in bodies}, time, duration)
-        self._run_apart(alone, time, duration)
+        self._run_apart(alone, time, duration, count)
 
     def _run_together(
         self, group: list[Body], party: np.ndarray, substeps: int, kept: dict[Body, np.ndarray], time: float,
@@ -142,6 +158,8 @@ class Stepping:
         while len(self._couplings) >= KEPT:
             self._couplings.pop(next(iter(self._couplings)))
         self._couplings[key, ties] = found
+        if found in self.last:
+            self.last.remove(found)  # it goes through the frame once more, and tells of that
         found.run_frame(time, duration, (count, substeps), dict(zip(group, party, strict=True)), kept)
         self.last.append(found)
 

@@ -31,14 +31,11 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
     within,
 )
-from nuno.solver.state import FRICTION, THICKNESS, Settings
+from nuno.solver.state import DEEPEST, FRICTION, THICKNESS, Settings
 from nuno.solver.vector import at
 
 LEAVE_SPEED = wp.constant(0.5)
 """[m/s] Layers found too close part no faster than this."""
-PASSES = wp.constant(2)
-"""Times that contacts are solved in a substep. Once leaves some of an approach undone where a particle has several: a
-pair that is pressed on comes through bit by bit, and what is left over turns into spin."""
 UNIT = wp.constant(1.0e-8)
 """[m] Step of the fixed-point sums: integers add up to the same whatever the order of threads."""
 HEED = wp.constant(63.0)
@@ -87,6 +84,21 @@ def heed(t: Any, gap: Any):
 
 
 @wp.func
+def note_depth(notes: wp.array(dtype=float), far: float, threads: int):
+    """Keep how far a pair was within its thickness: what is on the other side may stay there (see `nuno.impacts`)."""
+    if far > notes[DEEPEST]:
+        if threads > 1:
+            wp.atomic_max(notes, DEEPEST, far)
+        else:
+            notes[DEEPEST] = far
+
+
+@wp.func
+def note_depth(notes: wp.array(dtype=Any), far: Any, threads: int):
+    notes[DEEPEST] = most(notes[DEEPEST], far)
+
+
+@wp.func
 def span(x: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any):
     """The sum of k_i x_i, the k adding up to zero."""
     base = gather(x, a)
@@ -124,6 +136,7 @@ def part(
     gap = times(gx, nx) + times(gy, ny) + times(gz, nz) - t.scalars[THICKNESS]
     on = least(on, -gap)
     if anywhere(on):
+        note_depth(t.notes, choose(on, -gap, zero), threads)
         ux = gx - pxs
         uy = gy - pys
         uz = gz - pzs

@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.renewal import renew_lists, shares_work
-from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes, touch_shapes
 from nuno.contact.sharp_shapes import GONE, SOONEST, forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_awake, touch_sharp, travel
@@ -374,8 +374,7 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
             pull_points(t, run, thread, threads)
             barrier(threads)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            passes = int(PASSES)  # a variable: the loop stays a loop, and there is less code to fetch
-            for _again in range(passes):
+            for _again in range(run.passes):
                 touch_edge_edge(t, n, run, thread, threads)
                 touch_vertex_triangle(t, n, run, thread, threads)
                 barrier(threads)

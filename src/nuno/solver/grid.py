@@ -10,7 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_sharp
@@ -21,7 +21,7 @@ from nuno.solver.lanes import barrier
 from nuno.solver.large import THREADS, come_to_rest
 from nuno.solver.shared_memory import MOST_STEPS, figures, program
 from nuno.solver.stages import Work, go_through, grips_on, steps_of
-from nuno.solver.state import SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
+from nuno.solver.state import NOTES, SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
 from nuno.solver.team import Team, begin_to_meet, call_roll, meet, team_of
 from nuno.solver.warps import in_warps
 
@@ -92,8 +92,7 @@ def advance_by_team(
             pull_points(t, run, team.turn, 1)
             meet(team)
         if run.touching != 0:
-            passes = int(PASSES)  # a variable: the loop stays a loop, and there is less code to fetch
-            for again in range(passes):
+            for again in range(run.passes):
                 if again > 0:
                     for i in range(first + team.thread, last, team.threads):
                         take_moves(t, n, i, n)
@@ -153,13 +152,13 @@ def run_teams(
             if team.thread == 0:
                 for k in range(7):
                     t.scalars[k] = scalars[k]
-                for k in range(6):
+                for k in range(NOTES):
                     t.notes[k] = notes[k]
         barrier(threads)
         near = near_of(t, floats, world, topo.particles, size)
         advance_by_team(t, near, topo, work, steps, run, shapes, lists, speeds, world, substeps, team)
         if team.turn == 0:
-            for k in range(6):
+            for k in range(NOTES):
                 notes[k] = t.notes[k]
         barrier(threads)
 

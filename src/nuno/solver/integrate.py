@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.lanes import add, choose, fill, most, mul, over, root, rough, sub, times  # noqa: F401
-from nuno.solver.state import CLOCK, DRAG, PICKED, SPEED, TRAVEL, Settings, StateFloat, StateLanes
+from nuno.solver.state import CLOCK, DRAG, FASTEST, PICKED, SPEED, TRAVEL, Settings, StateFloat, StateLanes
 from nuno.solver.vector import at, put
 from nuno.solver.warps import leads_warp, most_of_warp
 
@@ -117,3 +117,4 @@ def tick(t: Any, run: Settings, thread: int):
         t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], 1.0)
         t.notes[PICKED] = t.notes[PICKED] + root(t.notes[SPEED]) * run.dt
         t.notes[TRAVEL] = t.notes[TRAVEL] + root(t.notes[SPEED]) * run.dt
+        t.notes[FASTEST] = most(t.notes[FASTEST], t.notes[SPEED])

@@ -15,7 +15,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.distances import PLANE
-from nuno.contact.self_contact import PASSES, take_moves, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shapes
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_sharp
@@ -302,6 +302,7 @@ class LargePlan:
         key: tuple[Any, ...] = (run.dt, tuple(run.gravity), run.pushed, run.damped, run.touching, run.margin)
         key += (
             run.reach,
+            run.passes,
             run.frame,
             run.parts,
             run.grips,
@@ -364,7 +365,7 @@ class LargePlan:
             inputs = [state, self._topology, self._size, run]
             wp.launch(pull if coarse else pull_fine, dim=self._worlds, inputs=inputs, device=self._device)
         if run.parts & LAYERS and run.touching:
-            for again in range(PASSES):
+            for again in range(run.passes):
                 if again:
                     kernel = settle if coarse else settle_fine
                     self._launch(kernel, self._topology.particles, run, state=state)

@@ -51,8 +51,8 @@ def pack_lanes(
 
 
 @wp.kernel(enable_backward=False)
-def zero_clock(notes: wp.array(dtype=Any), stride: int, entry: int):
-    """Set the clock of each world or group to zero."""
+def zero_note(notes: wp.array(dtype=Any), stride: int, entry: int):
+    """Set a note of each world or group to zero."""
     i = wp.tid() * stride + entry
     notes[i] = notes[i] * 0.0
 
@@ -68,8 +68,8 @@ wp.overload(
         wp.array2d(dtype=wp.vec3),
     ],
 )
-wp.overload(zero_clock, [wp.array(dtype=float), int, int])
-wp.overload(zero_clock, [wp.array(dtype=lane), int, int])
+wp.overload(zero_note, [wp.array(dtype=float), int, int])
+wp.overload(zero_note, [wp.array(dtype=lane), int, int])
 
 
 # A module of its own: only CUDA asks it.
@@ -123,6 +123,11 @@ def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str, out
     return out
 
 
-def reset_clock(state: Any, groups: int, lanes: int, device: str) -> None:
+def reset_note(state: Any, groups: int, device: str, entry: int) -> None:
+    """Set one of the notes to zero in all worlds."""
+    wp.launch(zero_note, dim=groups, inputs=[state.notes, NOTES, entry], device=device)
+
+
+def reset_clock(state: Any, groups: int, device: str) -> None:
     """Start a run's clock at zero."""
-    wp.launch(zero_clock, dim=groups, inputs=[state.notes, NOTES, CLOCK], device=device)
+    reset_note(state, groups, device, CLOCK)

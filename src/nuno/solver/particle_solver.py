@@ -18,6 +18,7 @@ from nuno.solver.grip_rows import grip_rows
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.state import (
     ALL_PARTS,
+    FASTEST,
     LAYERS,
     LOADS,
     MOTION,
@@ -189,17 +190,16 @@ class ParticleSolver:
             positions, velocities = positions[:1], velocities[:1]
         # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
         origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
-        notes = np.zeros((len(positions), NOTES), dtype=np.float32)
+        notes = np.zeros((len(positions), FASTEST), dtype=np.float32)
         notes[:, TRAVEL] = 1.0e9
         speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
         notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
-        local = (positions - origin[:, None]).astype(np.float32)
-        origin, velocities = origin.astype(np.float32), velocities.astype(np.float32)
-        self.load_state(dict(local=local, origin=origin, velocities=velocities, notes=notes))
+        local, origin = (positions - origin[:, None]).astype(np.float32), origin.astype(np.float32)
+        self.load_state(dict(local=local, origin=origin, velocities=velocities.astype(np.float32), notes=notes))
 
     def save_state(self) -> dict[str, np.ndarray]:
         """All that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
-        notes = self._get(self._state.notes, NOTES).copy()
+        notes = self._get(self._state.notes, NOTES)[:, :FASTEST].copy()
         # the list of candidate pairs is not part of the state: it is made anew, which changes no result
         notes[:, TRAVEL] = 1.0e9
         return dict(
@@ -219,7 +219,8 @@ class ParticleSolver:
         self._fine.count = False
         if local.dtype == np.float64:
             self._fine.put(local)
-        wp.copy(s.notes, self._put(np.broadcast_to(state["notes"], (worlds, NOTES))))
+        notes = np.broadcast_to(state["notes"], (worlds, FASTEST))
+        wp.copy(s.notes, self._put(np.pad(notes, ((0, 0), (0, NOTES - FASTEST)))))
         self._scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
         s.scalars = self._put(self._scalars)
         if hasattr(self, "_grips"):
@@ -491,7 +492,7 @@ class ParticleSolver:
     def _reset_clock(self) -> None:
         from nuno.solver.pack import reset_clock
 
-        reset_clock(self._state, self.group_count, self.lanes, self.device)
+        reset_clock(self._state, self.group_count, self.device)
 
 
 def substeps_of(duration: float, frame: float, substeps: int) -> int:

@@ -23,7 +23,7 @@ from nuno.solver.shared_memory import (
     fine_column,
     whole,
 )
-from nuno.solver.state import COUNTS, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
+from nuno.solver.state import COUNTS, NOTES, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
 from nuno.solver.taking_turns import end_turn, next_turn
 
 BLOCKS_AT_ONCE = 2
@@ -66,7 +66,7 @@ def advance_block(
             t.touch_count[k] = picked[k]
         for k in range(7):
             t.scalars[k] = scalars[k]
-        for k in range(6):
+        for k in range(NOTES):
             t.notes[k] = notes[k]
     barrier(threads)
     advance(t, near, topo, run, shapes, substeps, thread, threads)
@@ -76,7 +76,7 @@ def advance_block(
             listed[k] = t.pair_count[k]
         for k in range(2):
             picked[k] = t.touch_count[k]
-        for k in range(6):
+        for k in range(NOTES):
             notes[k] = t.notes[k]
         if t.helpers > 0:
             send_home(t.help)

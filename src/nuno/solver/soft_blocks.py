@@ -25,7 +25,7 @@ from nuno.solver.shared_memory import (
 )
 from nuno.solver.soft_frame import advance
 from nuno.solver.soft_state import FarSides, Sides, SoftFine, SoftFloat, SoftSizes, Tetrahedra, view
-from nuno.solver.state import Settings, Shapes
+from nuno.solver.state import NOTES, Settings, Shapes
 
 FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
 """Threads of a block, and of one where worlds queue up for multiprocessors and have all but the substep's start in
@@ -72,13 +72,13 @@ def advance_block(
     if thread == 0:
         for k in range(7):
             t.scalars[k] = scalars[k]
-        for k in range(6):
+        for k in range(NOTES):
             t.notes[k] = notes[k]
     barrier(threads)
     go(t, near, topo, sides, run, shapes, substeps, thread, threads)
     barrier(threads)
     if thread == 0:
-        for k in range(6):
+        for k in range(NOTES):
             notes[k] = t.notes[k]
 
 

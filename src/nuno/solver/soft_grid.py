@@ -19,7 +19,7 @@ from nuno.solver.shared_memory import figures
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
 from nuno.solver.soft_frame import turn_notes
 from nuno.solver.soft_state import SEEN, Sides, SoftFine, SoftFloat, SoftSizes, Tetrahedra, view
-from nuno.solver.state import SPEED, Settings, Shapes
+from nuno.solver.state import NOTES, SPEED, Settings, Shapes
 from nuno.solver.team import Team, begin_to_meet, call_roll, meet, team_of
 from nuno.solver.warps import in_warps
 
@@ -127,13 +127,13 @@ def run_teams(
             if team.thread == 0:
                 for k in range(7):
                     t.scalars[k] = scalars[k]
-                for k in range(6):
+                for k in range(NOTES):
                     t.notes[k] = notes[k]
         barrier(threads)
         near = near_of(t, floats, world, topo.particles, size)
         advance_by_team(t, near, topo, sides, run, shapes, told, world, substeps, team)
         if team.turn == 0:
-            for k in range(6):
+            for k in range(NOTES):
                 notes[k] = t.notes[k]
         barrier(threads)
 

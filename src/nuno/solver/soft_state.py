@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.solver.fine import fine, fine_lane
 from nuno.solver.lanes import lane, lane_int, window
-from nuno.solver.state import LISTINGS, LOADS, PARTICLE_ARRAYS, PICK_REACH, PLACES
+from nuno.solver.state import LISTINGS, LOADS, NOTES, PARTICLE_ARRAYS, PICK_REACH, PLACES
 
 CRUMPLED, SEEN = LISTINGS, PICK_REACH
 """Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
@@ -145,7 +145,7 @@ def view(s: Any, group: int, n: int, size: SoftSizes):
     t.mu = window(s.mu, group * size.soft, size.soft)
     t.bulk = window(s.bulk, group * size.soft, size.soft)
     t.scalars = window(s.scalars, group * 7, 7)
-    t.notes = window(s.notes, group * 6, 6)
+    t.notes = window(s.notes, group * NOTES, NOTES)
     t.box = window(s.box, group * 6, 6)
     t.grip_x = window(s.grip_x, group * size.keys, size.keys)
     t.grip_y = window(s.grip_y, group * size.keys, size.keys)

@@ -16,7 +16,10 @@ a coordinate's step is 1e-7 m, a tenth of what gravity moves a vertex in a subst
 TRAVEL, SPEED, CLOCK, LISTINGS = 0, 1, 2, 3
 # How far anything may have gone since the pairs that may touch were picked, and how far it may go [m].
 PICKED, PICK_REACH = 4, 5
-NOTES = 6
+# Since they were last set to zero: the largest squared speed of any substep but the last [m2/s2], and how far anything
+# of the cloth was within the thickness of what it touches while contacts were solved [m].
+FASTEST, DEEPEST = 6, 7
+NOTES = 8
 
 # Counts of candidate pairs in `State.pair_count`: vertex-triangle and edge-edge ones of the present list, the most of
 # each in an earlier list; and where there was no room for them, pairs of elements that a warp found to look at in two
@@ -198,6 +201,7 @@ class Settings:
     frame: int
     first: int
     parts: int
+    passes: int  # over contacts of a cloth with itself
     grips: int
     pulled: int
     keys: int
@@ -256,7 +260,7 @@ def view(s: Any, group: int, n: int, size: Sizes):
     t.shear_soft = window(s.shear_soft, group * size.shear_soft, size.shear_soft)
     t.bend_soft = window(s.bend_soft, group * size.bend_soft, size.bend_soft)
     t.scalars = window(s.scalars, group * 7, 7)
-    t.notes = window(s.notes, group * 6, 6)
+    t.notes = window(s.notes, group * NOTES, NOTES)
     t.bounds = window(s.bounds, group * size.blocks, size.blocks)
     t.listed = window(s.listed, group * size.listed, size.listed)
     t.middle = window(s.middle, group * size.middle, size.middle)

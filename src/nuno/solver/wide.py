@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.renewal import renew_lists
-from nuno.contact.self_contact import PASSES, touch_edge_edge, touch_vertex_triangle
+from nuno.contact.self_contact import touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import touch_shapes
 from nuno.solver.fine import fine, fine_lane
 from nuno.solver.frame import (
@@ -209,7 +209,7 @@ def advance_wide(
         if run.parts & PULLS != 0:
             pull_points(t, run, 0, 1)
         if run.touching != 0 and run.parts & LAYERS != 0:
-            for _again in range(PASSES):
+            for _again in range(run.passes):
                 touch_edge_edge(t, n, run, 0, 1)
                 touch_vertex_triangle(t, n, run, 0, 1)
         if run.parts & SHAPES != 0:
