@@ -48,6 +48,7 @@ class FreeFall:
     self_contact = True
     substeps = 1
     missed = np.zeros(1, dtype=bool)
+    resolution = None
 
     def __init__(self, topology, material, positions, velocities, *, device, gravity, frame_rate, substeps, friction):
         self.gravity, self.frame = np.array(gravity, dtype=np.float32), 1.0 / frame_rate

@@ -142,6 +142,17 @@ def add(scene):
     scene.world.add(scene.pick(shapes)())
 
 
+@operation(3)
+def join(scene):
+    """Two rigid bodies, or one and the world; what cannot be joined is refused by name."""
+    body, other = scene.pick(scene.dynamic()), scene.pick([None, *scene.static(), *scene.dynamic()])
+    kind, axis = scene.pick([nuno.hinge, nuno.slider, nuno.ball_joint, nuno.fixed_joint]), scene.random.normal(size=3)
+    if body is not None and other is not body and (other is not None or scene.random.random() < 0.3):
+        where = {"point": body.position} if kind in (nuno.hinge, nuno.ball_joint) else {}
+        along = {"axis": axis} if kind in (nuno.hinge, nuno.slider) else {}
+        kind(body, other, **where, **along)
+
+
 @operation(1)
 def remove(scene):
     """Any body, whatever holds it or is held by it."""

@@ -203,7 +203,7 @@ class Joint(Grip):
 
     def _set(self, numbers: Callable[[str, Any], dict[str, Any]], value: Any) -> None:
         world = self._live()
-        with world.lock:
+        with world._change("set on a joint"):
             drives = drive_table(world.world_count, numbers(self.kind, value), self._spec.drives)
             self._spec = replace(self._spec, drives=drives)
 

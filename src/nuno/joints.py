@@ -127,7 +127,7 @@ def _join(
     world = a._world
     if world is None:
         raise BodyStateError(f"{a.name!r} is in no world; add and attach it before it is joined")
-    with world._call():
+    with world._change("join"):
         other = None if b is None else world._own(b)
         if other is a:
             raise InvalidInputError(f"{a.name!r} cannot be joined to itself")

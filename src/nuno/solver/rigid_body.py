@@ -63,16 +63,6 @@ def turned(start: wp.quat, turn: wp.vec3):
 
 
 @wp.func
-def turn_angle(turn: wp.vec3):
-    """The rotation vector [rad] of a `turn_between`."""
-    half = 0.5 * wp.length(turn)
-    scale = float(1.0)
-    if half > 1.0e-4:
-        scale = wp.atan(half) / half
-    return scale * turn
-
-
-@wp.func
 def in_world(q: wp.quat, body: wp.mat33):
     """A tensor in the body's frame as a tensor in the world's."""
     r = wp.quat_to_matrix(q)
