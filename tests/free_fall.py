@@ -100,7 +100,7 @@ class FreeFall:
         """Take the forces."""
         self.forces = forces
 
-    def run(self, time, duration):
+    def run(self, time, duration, substeps=None):
         """Fall."""
         self.runs.append((time, duration))
         whole = int(duration / self.frame + 1e-6)

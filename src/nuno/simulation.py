@@ -287,6 +287,9 @@ class Simulation:
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
         self._rests = False
+        if any(dynamics.is_rigid for dynamics in moving.values()):
+            # what a run goes back to has the static bodies that it met, and lists pairs as it did
+            self._bring_rigid()
         before = RunStart(self, moving)
         self._bring_colliders()
         try:
