@@ -45,7 +45,7 @@ class FreeFall:
     """Unit masses under gravity and forces, one explicit step a frame."""
 
     diverging = False
-    self_contact = True
+    self_contact = False
     substeps = 1
     missed = np.zeros(1, dtype=bool)
     resolution = None
