@@ -45,7 +45,7 @@ class FreeFall:
     """Unit masses under gravity and forces, one explicit step a frame."""
 
     diverging = False
-    self_contact = False
+    self_contact = True
     substeps = 1
     missed = np.zeros(1, dtype=bool)
     resolution = None
@@ -55,6 +55,13 @@ class FreeFall:
         self.set_state(positions, velocities)
         self.friction, self.grips, self.forces, self.colliders = friction, [], None, None
         self.runs = []
+        # never fast: no figures of a run, and as thick as may be
+        self.frame_rate, self._state = frame_rate, SimpleNamespace(notes=None)
+        self._scalars = np.full((len(self.x), 8), 1e6)
+
+    def _get(self, array, count):
+        """No figures."""
+        return np.zeros((len(self.x), count))
 
     def make_room(self):
         """It has no lists."""
