@@ -69,7 +69,8 @@ class Running(Simulation):
             self._wait_until(begin + span)
             return
         frames = span * self.frame_rate
-        most = CUDA_CHUNK if self._device.startswith("cuda") else CHUNK
+        # the poses of what follows a path are laid out for so many frames
+        most = CUDA_CHUNK if self._device.startswith("cuda") and not self._led_bodies() else CHUNK
         chunk = min(most, math.gcd(*(watcher.frames for watcher in self._watchers)) or most)
         chunk = 1 if self.drivers else chunk  # they are asked frame by frame
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))

@@ -28,6 +28,8 @@ then leaves 0.1 mm of overlap at 20 substeps a frame."""
 PASSES_AT_ONCE = 96
 """The same where all contacts of a world are solved at once: with 24, forces of fingers on a cloth between them are 3 %
 off at most, with 96 0.02 %."""
+FAST = 1e6
+"""[m/s] What is faster than this has diverged."""
 QUICKER = 1.5
 """Times its present speed that a body may have within the frame, besides what gravity adds."""
 
@@ -192,7 +194,9 @@ class Coupling:
                 getattr(self.joints, name).zero_()
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
-        reaches = 2.0 * (QUICKER * self._speeds() + 10.0 * duration + 0.1) * dt
+        # what diverges is told of after the run
+        speeds = np.nan_to_num(self._speeds(), nan=FAST, posinf=FAST)
+        reaches = 2.0 * (QUICKER * np.minimum(speeds, FAST) + 10.0 * duration + 0.1) * dt
         self._elements.reach.assign(reaches.T.astype(np.float32).ravel())
         reach = float(reaches.max())
         margin = max(min(self._margin, (1 + substeps / 3) * reach), 1.5 * reach)

@@ -10,7 +10,8 @@ import warp as wp
 
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.rigid_arrays import ENTRY, POINT, SAVED, TOLD
-from nuno.solver.rigid_solver import RigidSolver
+from nuno.solver.rigid_saving import load_listing, save_listing
+from nuno.solver.rigid_solver import DYNAMIC, RigidSolver
 from nuno.solver.state import LOADS, NOTES, PARTICLE_ARRAYS, TRAVEL
 
 PAIRS = (*ENTRY, *POINT, *TOLD, "normal_now", "tangent_now")
@@ -73,11 +74,16 @@ def copy_rigid(solver: RigidSolver) -> Copied:
     """Return all that a run changes of rigid bodies and that outlasts it, with a row for each slot or part."""
     solver._load_contacts()
     bodies = {name: _of_bodies(solver, name).numpy().copy() for name in SAVED}
-    return bodies | {f"contact_{name}": _of_pairs(solver, name).numpy().copy() for name in PAIRS}
+    listing = {f"listing_{name}": array.copy() for name, array in save_listing(solver).items()}
+    return bodies | listing | {f"contact_{name}": _of_pairs(solver, name).numpy().copy() for name in PAIRS}
 
 
 def mix_rigid(solver: RigidSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
-    """Set the state to that of each copy in the worlds and slots (worlds, slots) bool beside it."""
+    """Set the state to that of each copy in the worlds and slots (worlds, slots) bool beside it.
+
+    When pairs are listed decides bits. A world whose bodies are all given back so goes on with the listing of the last
+    copy that it has any of; where others stay as they are, pairs are listed anew.
+    """
     for name in SAVED:
         values = _of_bodies(solver, name).numpy().copy()
         for copied, rows in made:
@@ -95,7 +101,18 @@ def mix_rigid(solver: RigidSolver, made: list[tuple[Copied, np.ndarray]]) -> Non
             if name in ("partner", "count"):
                 values[:, :, width:][parts] = -1 if name == "partner" else 0
         _of_pairs(solver, name).assign(values)
-    solver._list_anew()
+    _mix_listing(solver, made)
+
+
+def _mix_listing(solver: RigidSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
+    covered = np.any([rows for _, rows in made], axis=0)[:, solver._roles == DYNAMIC].all(axis=1)
+    listing = {name: array.copy() for name, array in save_listing(solver).items()}
+    for copied, rows in made:
+        worlds = rows.any(axis=1)
+        for name, values in listing.items():
+            values[worlds] = copied[f"listing_{name}"][worlds]
+    listing["notes"][~covered] = -1.0
+    load_listing(solver, listing)
 
 
 def _of_bodies(solver: RigidSolver, name: str) -> wp.array:
