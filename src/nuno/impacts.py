@@ -67,6 +67,8 @@ class Impacts:
                 velocities = solver.velocities()
                 # of two points that meet each does half of what they differ by at most
                 apart = 0.5 * np.linalg.norm(np.ptp(velocities, axis=1), axis=-1)
+                # nor more than the fastest goes: what is not fast alone is not here, beside a world that is
+                apart = np.minimum(apart, np.linalg.norm(velocities, axis=-1).max(axis=1))
                 asked = np.nan_to_num(apart * frame / (WAY * _thickness(solver)), posinf=0.0)
                 self.substeps[k] = [_at_least(int(own[k]), float(least)) for least in asked]
 

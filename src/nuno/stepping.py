@@ -47,6 +47,9 @@ class Stepping:
         world = self._world
         frame = 1.0 / world.frame_rate
         moving = [body for body in world._bodies.values() if body._dynamics is not None]
+        if not moving:
+            self.careful, self.last = False, []
+            return
         rigid = [body for body in moving if body._dynamics.is_rigid]  # type: ignore[union-attr]
         if rigid:
             world._bring_rigid()
