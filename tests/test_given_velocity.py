@@ -104,31 +104,6 @@ def test_a_world_of_a_batch_and_a_copy_go_on_alike(kind):
         np.testing.assert_array_equal(copy[1], after[1])
 
 
-def test_set_within_a_run():
-    """Combination: set in ``each_frame``, among bodies that touch, it is what stopping there would be, to the bit."""
-
-    def room():
-        world = nuno.World(device="cpu")
-        world.add(nuno.plane())
-        for body in (nuno.sheet((0.2, 0.2), (6, 6), position=(0.0, 0.0, 0.3)),
-                     nuno.box((0.05, 0.05, 0.05), position=(0.0, 0.0, 0.4)),
-                     nuno.soft_box((0.05, 0.05, 0.05), (2, 2, 2), position=(0.05, 0.0, 0.5))):  # fmt: skip
-            world.attach(world.add(body))
-        return world
-
-    def throw(world):
-        for name in ("sheet", "box", "soft_box"):
-            world.set_velocity(name, (0.0, 0.0, 1.0), angular_velocity=SPIN)
-
-    within, between, frames = room(), room(), []
-    within.run(0.5, each_frame=lambda time: (frames.append(time), len(frames) == 10 and throw(within)))
-    between.run(10.0 / 60.0)
-    throw(between)
-    between.run(20.0 / 60.0)
-    for one, other in zip(within.bodies, between.bodies, strict=True):
-        np.testing.assert_array_equal(one.vertices, other.vertices)
-
-
 def falls_on(kind, other):
     """Switch a falling, turning body to another material after 0.2 s, and return what came of it.
 

@@ -58,7 +58,8 @@ def test_a_thrown_cloth():
         assert cloth.mass == pytest.approx(0.018)
         np.testing.assert_allclose(cloth.momentum, 0.018 * np.array([1.0, -2.0, 0.5]), rtol=1e-6)
         np.testing.assert_allclose(cloth.velocity, (1.0, -2.0, 0.5), rtol=1e-6)
-        assert cloth.kinetic_energy == pytest.approx(0.009 * 5.25, rel=1e-6)
+        # velocities are float32, 1.2e-7 each, and what sweeps over a flying cloth round goes into them
+        assert cloth.kinetic_energy == pytest.approx(0.009 * 5.25, rel=3e-6)
         np.testing.assert_allclose(cloth.angular_momentum(), 0.0, atol=1e-9)
         # a step of a coordinate is 3e-8 m: strains of 6e-7 on all edges
         assert cloth.elastic_energy < 1e-9
@@ -100,7 +101,9 @@ def test_masses_on_a_line_do_not_spin_about_it():
 def ringing(substeps):
     """Elastic and kinetic energy (13,) [J] each, every ms, of a free soft ball that was stretched and let go."""
     world = nuno.World(device="cpu", gravity=WEIGHTLESS, frame_rate=1000.0, substeps=substeps)
-    ball = world.attach(world.add(nuno.soft_sphere(0.05, 0.02)), nuno.Soft(density=300.0, youngs_modulus=2e4))
+    # on a lattice, where it rings in one mode: what fits its surface is not alike along all axes, and rings in several
+    sphere = nuno.soft_sphere(0.05, 0.02, tetrahedraliser="lattice")
+    ball = world.attach(world.add(sphere), nuno.Soft(density=300.0, youngs_modulus=2e4))
     state = ball._dynamics.solver.save_state()
     ball._dynamics.solver.load_state({**state, "local": state["local"] * np.array([1.02, 0.99, 0.99], np.float32)})
     elastic, kinetic = [ball.elastic_energy], [ball.kinetic_energy]

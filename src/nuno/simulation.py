@@ -54,7 +54,9 @@ class Simulation:
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
         self._family = uuid.uuid4().hex
-        self._quiet = False  # whether its materials are guesses, of whose resolution nobody is told
+        # whether its materials are guesses, many of which are imagined: of their resolution nobody is told, and where one
+        # of them passes through itself it is one that does not fit
+        self._quiet = False
         self._bodies: dict[str, Body] = {}
         self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
         self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
@@ -338,7 +340,7 @@ class Simulation:
         broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
         if self._must_repeat(moving):
             return False
-        self._stepping.careful = are_fast(moving)
+        self._stepping.careful = not self._quiet and are_fast(moving)
         for body, finite in broken:
             if not finite.all():
                 raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
@@ -347,7 +349,7 @@ class Simulation:
     def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
         """Return whether the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
         longer = self._make_room()
-        if not self._stepping.careful and are_fast(moving):
+        if not self._quiet and not self._stepping.careful and are_fast(moving):
             self._stepping.careful = True
             return True
         return longer

@@ -154,15 +154,17 @@ class Stepping:
         key = tuple(body.key for body in group)
         ties = tuple(grip for body in group for grip in body._dynamics.grips if grip.is_tie)  # type: ignore[union-attr]
         found = self._couplings.pop((key, ties), None)
-        if found is None or not found.is_current():
+        # worlds that go through the frame once more are told of by what comes now, the others by what was before
+        for earlier in self.last:
+            earlier.kept = {body: own & ~kept.get(body, np.False_) for body, own in earlier.kept.items()}
+        self.last = [earlier for earlier in self.last if any(own.any() for own in earlier.kept.values())]
+        if found is None or found in self.last or not found.is_current():
             from nuno.coupled_bodies import CoupledBodies
 
             found = CoupledBodies(world, group, ties)
         while len(self._couplings) >= KEPT:
             self._couplings.pop(next(iter(self._couplings)))
         self._couplings[key, ties] = found
-        if found in self.last:
-            self.last.remove(found)  # it goes through the frame once more, and tells of that
         found.run_frame(time, duration, (count, substeps), dict(zip(group, party, strict=True)), kept)
         self.last.append(found)
 

@@ -161,7 +161,8 @@ def test_contacts_that_find_no_memory_are_told_of(monkeypatch, caplog, scarce):
     with caplog.at_level(logging.WARNING, "nuno"):
         world.run(0.1)
         world.run(0.1)
-    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    # what comes of contacts that are passed over is another warning's
+    assert [record.levelname for record in caplog.records if record.name == "nuno.dynamics"] == ["WARNING"]
     assert "'cloth'" in caplog.text
     assert cloth.missed_contacts.tolist() == [True, True, True]
     assert np.isfinite(cloth.vertices).all()

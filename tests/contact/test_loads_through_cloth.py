@@ -42,8 +42,10 @@ def load(world, mass, shape=None, mu=0.5, bottom=THICK + 5e-4):
 
 
 def borne(world, body, other):
-    """Return the force of another body on one [N]."""
+    """Return the force of another body on one [N]: the last frame's mean where it moves, too, else the last instant's."""
     found = world.contacts(body)
+    if other in found.impulses:
+        return found.impulses[other] * world.frame_rate
     return found.forces[np.array(found.others) == other].sum(axis=0)
 
 
@@ -158,31 +160,33 @@ def test_a_soft_cube_goes_along_too():
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
 def test_a_tablecloth_pulled_from_under_a_box(where):
-    """The box goes as far as Coulomb's law says: mu g while the cloth slides under it, a fall, mu g again.
+    """Coulomb's law: mu g while the cloth slides under the box, and from what speed that gave the way that is left.
 
-    The cloth slides from when its middle does, as its front stretches first, until its end is under the box's middle.
-    The fall by its thickness takes friction away, and gives at its end mu times the speed of the fall.
+    The fall by the cloth's thickness takes friction away, and gives at its end mu times the speed of the fall.
     """
+    from nuno.solver.coupling import solves_at_once
+
     mu, mass, thick = 0.3, 0.3, 4e-3
     world = nuno.World(device=where)
     table(world, mu)
     cloth = towel(world, (0.4, 0.16), mu=mu)
     box = load(world, mass, nuno.box((0.08, 0.08, 0.02)), mu=mu)
     world.run(0.3, progress=False)
-    start, middle = box.position[0], np.argmin(np.linalg.norm(cloth.vertices[:, :2], axis=1))
+    places = [box.position[0]]
     times = np.linspace(0.0, 0.4, 97)
     led_edge(world, cloth, times, np.outer(7.5 * times**2, (1, 0, 0)))
-    slides, ends = [], []
     for _ in range(54):
-        before = cloth.vertices
         world.step()
-        slides.append(cloth.vertices[middle, 0] - before[middle, 0] > 0.5e-3)
-        ends.append(cloth.vertices[:, 0].min() > box.position[0])
-    under = (np.argmax(ends) - np.argmax(slides)) / 60  # known to a frame of about ten
-    speed, falls = mu * G * under, np.sqrt(2 * thick / G)
+        places.append(box.position[0])
+    speeds = np.diff(places) * 60.0
+    # all of the cloth slides from the third frame on, until its end is under the box after the tenth
+    # all at once, the vertices that come in under the box's edge leave a tenth of noise in its friction (docs/contact.md)
+    exact = 0.2 if where != "cpu" or solves_at_once(where) else 0.05
+    assert (speeds[9] - speeds[2]) / (7 / 60) == pytest.approx(mu * G, rel=exact)
+    speed, falls = speeds.max(), np.sqrt(2 * thick / G)
     landed = speed - mu * G * falls
-    expected = speed**2 / (2 * mu * G) + speed * falls + landed**2 / (2 * mu * G)
-    assert box.position[0] - start == pytest.approx(expected, rel=0.1)
+    rest = speed * falls + landed**2 / (2 * mu * G)
+    assert places[-1] - places[0] == pytest.approx(speed**2 / (2 * mu * G) + rest, rel=0.1)
     assert box.rotation[2, 2] > 0.9999
 
 

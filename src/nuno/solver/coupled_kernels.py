@@ -261,4 +261,6 @@ def solve(
         for k in range(joints.count):
             sum_joint(rigid, joints, world, k, dt)
     if at_once != 0:
+        bound_all(particles, world, thread, threads)
+        barrier(threads)
         forget_sharers(particles, rigid, first, start, thread, threads)

@@ -22,7 +22,7 @@ from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PU
 
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which handles one world."""
-PASSES = 24
+PASSES = 28
 """Passes over the shared contacts in a substep, at most: a push of 5 N on a vertex of 50 mg, held between two fingers,
 then leaves 0.1 mm of overlap at 20 substeps a frame."""
 PASSES_AT_ONCE = 96
