@@ -42,7 +42,7 @@ def load(world, mass, shape=None, mu=0.5, bottom=THICK + 5e-4):
 
 
 def borne(world, body, other):
-    """Return the force of another body on one [N]: the last frame's mean where it moves, too, else the last instant's."""
+    """Return the force of another body on one [N]: the last frame's mean where both move, else the last instant's."""
     found = world.contacts(body)
     if other in found.impulses:
         return found.impulses[other] * world.frame_rate
@@ -180,7 +180,7 @@ def test_a_tablecloth_pulled_from_under_a_box(where):
         places.append(box.position[0])
     speeds = np.diff(places) * 60.0
     # all of the cloth slides from the third frame on, until its end is under the box after the tenth
-    # all at once, the vertices that come in under the box's edge leave a tenth of noise in its friction (docs/contact.md)
+    # all at once, vertices that come in under the box's edge leave a tenth of noise in its friction (docs/contact.md)
     exact = 0.2 if where != "cpu" or solves_at_once(where) else 0.05
     assert (speeds[9] - speeds[2]) / (7 / 60) == pytest.approx(mu * G, rel=exact)
     speed, falls = speeds.max(), np.sqrt(2 * thick / G)
