@@ -54,8 +54,8 @@ class Simulation:
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
         self._family = uuid.uuid4().hex
-        # whether its materials are guesses, many of which are imagined: nobody is told of their resolution, and one that
-        # passes through itself is a guess that does not fit
+        # whether its materials are guesses, of which many are imagined: nobody is told of their resolution, and one
+        # that passes through itself is a guess that does not fit
         self._quiet = False
         self._bodies: dict[str, Body] = {}
         self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
