@@ -127,18 +127,26 @@ def corner_weight(particles: Particles, i: int, at_once: int):
 
 
 @wp.func
-def push_step(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, gap: float,
-              soft: float, at_once: int):  # fmt: skip
-    """By how much a row's multiplier is to grow so that its gap closes, as far as shapes let its particles go."""
-    n = rows.normal[r]
+def corners_weight(particles: Particles, first: int, rows: Rows, r: int, at_once: int):
+    """How far a row's particles give way for a unit of its multiplier, where nothing bounds them."""
     corners = rows.corners[r]
     weights = rows.weights[r]
     total = float(1.0e-9)
     for k in range(4):
         if corners[k] >= 0:
             total += weights[k] * weights[k] * corner_weight(particles, first + corners[k], at_once)
+    return total
+
+
+@wp.func
+def push_step(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, gap: float,
+              soft: float, at_once: int):  # fmt: skip
+    """By how much a row's multiplier is to grow so that its gap closes, as far as shapes let its particles go."""
+    n = rows.normal[r]
+    corners = rows.corners[r]
+    weights = rows.weights[r]
     rigid_part = body_weight(particles, rigid, start, rows, r, n, at_once)
-    total += rigid_part
+    total = corners_weight(particles, first, rows, r, at_once) + rigid_part
     step = -gap / (total + soft)
     if is_bounded(particles, first, corners):
         # which particles end on a surface depends on the step, and the step on them
@@ -160,13 +168,8 @@ def push_step(particles: Particles, rigid: RigidState, first: int, start: int, r
 def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
                at_once: int):  # fmt: skip
     """How far a row gives way along n for a unit of its multiplier."""
-    corners = rows.corners[r]
-    weights = rows.weights[r]
-    total = float(1.0e-9)
-    for k in range(4):
-        if corners[k] >= 0:
-            total += weights[k] * weights[k] * corner_weight(particles, first + corners[k], at_once)
-    return total + body_weight(particles, rigid, start, rows, r, n, at_once)
+    weight = corners_weight(particles, first, rows, r, at_once)
+    return weight + body_weight(particles, rigid, start, rows, r, n, at_once)
 
 
 @wp.func

@@ -243,11 +243,11 @@ class Coupling:
         if k % every == 0:
             self._list(margin)
             rows = self._rows
-        # ties are solved where nothing touches, too: none of the rows of before is left
+        # ties are solved where nothing touches, too: none of the rows and bounds of before is left
         rows.active_count.zero_()
+        particles.bounded_count.zero_()
         if self._listed:
             go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
-            particles.bounded_count.zero_()
             for body, (layout, around) in enumerate(zip(self._layouts, self._around, strict=True)):
                 if around.shapes.count:
                     go(
