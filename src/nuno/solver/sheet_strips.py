@@ -9,13 +9,13 @@ and where a material is the same everywhere nothing is read of tables but a numb
 
 import warp as wp
 
+from nuno.solver.compliances import UNIFORM_BENDS
 from nuno.solver.lanes import barrier
 from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
 
 STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(192)
 """Vertices of the longest strip and of the longest line that the 32 threads of a warp take together."""
-BEND_KINDS = wp.constant(9)
-"""Numbers in ``bend_soft`` where they are the same for all elements of a kind."""
+BEND_KINDS = wp.constant(UNIFORM_BENDS)
 
 _BEGIN = """
 #if defined(__CUDA_ARCH__)
