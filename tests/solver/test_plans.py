@@ -76,13 +76,12 @@ def test_scalar_vector_and_lanes_give_the_same_bits(kind, self_contact, substeps
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
-@pytest.mark.parametrize("plan", ["large", "grid"])
 @pytest.mark.parametrize(("worlds", "substeps"), [(1, COARSE), (3, COARSE), (3, FINE)])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
-def test_the_large_plans_give_the_bits_of_the_fused_one(kind, worlds, plan, substeps):
+def test_the_grid_plan_gives_the_bits_of_the_fused_one(kind, worlds, substeps):
     """Promise: without self-contact, whose sums are in fixed point, the colours' order is all that counts."""
     expected = outcome(solver(kind, "fused", worlds, substeps=substeps))
-    np.testing.assert_array_equal(outcome(solver(kind, plan, worlds, substeps=substeps)), expected)
+    np.testing.assert_array_equal(outcome(solver(kind, "grid", worlds, substeps=substeps)), expected)
 
 
 @pytest.mark.parametrize("stretch", [1000.0, 4000.0])  # with coordinates as floats and, on a sheet too, as doubles
@@ -92,18 +91,18 @@ def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
     made = solver(kind, "fused", substeps=None, stretch=stretch)
     assert made.sweeps > 1
     expected = outcome(made)
-    for plan, worlds in (("vector", 1), ("fused", 3), ("large", 1), ("grid", 3)):
+    for plan, worlds in (("vector", 1), ("fused", 3), ("grid", 1), ("grid", 3)):
         found = outcome(solver(kind, plan, worlds, substeps=None, stretch=stretch))
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
 @pytest.mark.parametrize("worlds", [1, 3])
-def test_the_large_plan_lists_the_pairs_of_the_fused_one(worlds):
+def test_the_grid_plan_lists_the_pairs_of_the_fused_one(worlds):
     """Invariant: the listing by many threads finds as many pairs of edges; none touches yet, so that all else is equal.
 
     The test of a vertex and a triangle lets pairs through that are not near, more or fewer by how they are looked for.
     """
-    made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "large")]
+    made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "grid")]
     for each in made:
         each.run(0.0, 1.0 / 60.0 / 12.0)
     assert made[0].pair_counts.min() > 0
@@ -116,20 +115,20 @@ def test_pairs_of_blocks_that_were_not_noted_are_found(monkeypatch):
     counts = []
     for room in (24, 0.1):
         monkeypatch.setattr("nuno.contact.team_listing.ROOM", room)
-        made = solver("sheet", "large", 2, self_contact=True)
+        made = solver("sheet", "grid", 2, self_contact=True)
         made.run(0.0, 1.0 / 60.0 / 12.0)
         counts.append(made.pair_counts)
     assert counts[0].min() > 0
     np.testing.assert_array_equal(*counts)
 
 
-def test_the_large_plan_keeps_layers_apart():
+def test_the_grid_plan_keeps_layers_apart():
     """A sheet folded onto itself rests as two layers, at most 10 % of the thickness nearer than in the fused plan.
 
     Contacts that share a particle are averaged instead of taken one after the other, so the bits differ.
     """
     gaps = []
-    for plan in ("fused", "large"):
+    for plan in ("fused", "grid"):
         cloth = ClothTopology.sheet((12, 6), (0.24, 0.12))
         x = cloth.rest.copy()
         over = x[:, 0] > 0
@@ -145,7 +144,7 @@ def test_the_large_plan_keeps_layers_apart():
     assert gaps[1] > gaps[0] - 0.0004
 
 
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
     """Promise: same bits in any place of a batch, self-contact included; the cloth hangs from two corners and folds."""
     alone = solver("sheet", plan, self_contact=True)
@@ -159,7 +158,7 @@ def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
 
 def test_a_run_in_pieces_is_the_run_in_one():
     """Invariant: whole frames one at a time, under settings made anew, change no bit in any plan."""
-    for plan in ("vector", "large"):
+    for plan in ("vector", "grid"):
         whole, pieces = solver("sheet", plan), solver("sheet", plan)
         whole.run(0.0, 0.1)
         for k in range(6):
@@ -259,7 +258,7 @@ def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
     """The same phases; fused multiply-adds round otherwise, and a swinging cloth makes 1e-7 m grow to millimetres."""
@@ -298,7 +297,7 @@ def test_cuda_tells_cells_apart_in_sheets_of_any_shape(cells):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     """Promise: same input, same bits, in any place of a batch, self-contact included.
 
@@ -306,7 +305,7 @@ def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     does a block of 150 and of 1,000, but not of 300, on a device with 132 multiprocessors.
     """
     alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
-    for worlds in (1, 5, *{"fused": (150, 300, 1000), "large": (), "grid": (150,)}[plan]):
+    for worlds in (1, 5, *{"fused": (150, 300, 1000), "grid": (150,)}[plan]):
         again = solver("sheet", plan, worlds, device="cuda:0", self_contact=True)
         np.testing.assert_array_equal(outcome(again), alone)
         np.testing.assert_array_equal(again.local_positions(), np.broadcast_to(alone[0], again.local_positions().shape))

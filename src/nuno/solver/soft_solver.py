@@ -286,7 +286,10 @@ class SoftSolver(ParticleSolver):
         told = wp.zeros(TOLD * self.world_count, dtype=float, device=self.device)
         before, after = (self._topology, self._surface, self._size), (self._shapes, told)
         kernels = run_soft_grid, run_soft_fine_grid
-        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, self._launch_worlds)
+        return GridPlan(
+            kernels, self._state, before, lambda _: after, self.device, self.world_count, teams, blocks, THREADS,
+            self._launch_worlds,
+        )  # fmt: skip
 
     def _forget_launches(self) -> None:
         self._grid = None
