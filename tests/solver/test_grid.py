@@ -104,7 +104,8 @@ def test_parts_of_substeps_that_found_no_room_are_gone_through_again():
     """Promise: a large cloth that meets a box on a busy device has the bits of one on a free device."""
     ends = []
     for busy in (False, True):
-        world = nuno.World(device="cuda:0", substeps=12)
+        # with coordinates as doubles, of which a block takes all registers that a multiprocessor has
+        world = nuno.World(device="cuda:0", substeps=40)
         world.add(nuno.plane())
         cloth = world.add(nuno.sheet((0.5, 0.5), cells=(SIDE, SIDE), position=(0.0, 0.0, 0.02)))
         box = world.add(nuno.box((0.1, 0.1, 0.04), position=(0.0, 0.0, 0.05)))
