@@ -16,7 +16,7 @@ from nuno.solver.rigid_body import (
     point_of,
     shift_body,
     turn_between,
-    turned,
+    turn_body,
 )
 
 CATCH_UP = wp.constant(1.0)
@@ -237,9 +237,9 @@ def project_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float,
             total = within(total, most)
             twist = total - holds.twist[r]
         holds.twist[r] = total
-        rigid.rotation[i] = turned(rigid.rotation[i], rigid.give[i] * twist)
+        turn_body(rigid, i, rigid.give[i] * twist)
         if leader >= 0:
-            rigid.rotation[j] = turned(rigid.rotation[j], rigid.give[j] * (-twist))
+            turn_body(rigid, j, rigid.give[j] * (-twist))
     return length
 
 

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.solver.rigid_body import RigidState, shift_body, turned
+from nuno.solver.rigid_body import RigidState, shift_body, turn_body
 
 FIXED, HINGE, SLIDER, BALL = 0, 1, 2, 3
 LOWER, UPPER, FRICTION, STIFFNESS, DAMPING, POSITION, VELOCITY, EFFORT, SPRING, REST, SPRING_DAMPING = range(11)
@@ -116,7 +116,7 @@ def respond(block: Block, apart: wp.vec3, off: wp.vec3):
 def apply_joint(rigid: RigidState, i: int, j: int, arm: wp.vec3, other_arm: wp.vec3, pull: wp.vec3, twist: wp.vec3):
     """Move both bodies by a force and a torque at the joint, opposite on the other."""
     shift_body(rigid, i, rigid.weight[i] * pull)
-    rigid.rotation[i] = turned(rigid.rotation[i], rigid.give[i] * (wp.cross(arm, pull) + twist))
+    turn_body(rigid, i, rigid.give[i] * (wp.cross(arm, pull) + twist))
     if j >= 0:
         shift_body(rigid, j, -rigid.weight[j] * pull)
-        rigid.rotation[j] = turned(rigid.rotation[j], -(rigid.give[j] * (wp.cross(other_arm, pull) + twist)))
+        turn_body(rigid, j, -(rigid.give[j] * (wp.cross(other_arm, pull) + twist)))

@@ -89,6 +89,13 @@ def shift_body(s: RigidState, i: int, d: wp.vec3):
 
 
 @wp.func
+def turn_body(s: RigidState, i: int, turn: wp.vec3):
+    """Turn a body; one that corrections do not move keeps every bit, which rounding would not leave it."""
+    if s.weight[i] > 0.0:
+        s.rotation[i] = turned(s.rotation[i], turn)
+
+
+@wp.func
 def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.vec3):
     """Move a body by a positional impulse [kg m] at ``arm`` from its centre of mass (equations 6 to 9).
 
@@ -96,8 +103,7 @@ def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.v
     the body on the other side is -dlambda n.
     """
     shift_body(s, i, s.weight[i] * correction)
-    turn = s.give[i] * wp.cross(arm, correction)
-    s.rotation[i] = turned(s.rotation[i], turn)
+    turn_body(s, i, s.give[i] * wp.cross(arm, correction))
 
 
 @wp.func
