@@ -59,10 +59,6 @@ def project_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: flo
         # the other bears it where this body is on its line
         other_arm = point_before(rigid, i, joints.place[r]) - rigid.position_before[j]
     block = block_of(rigid, kind, i, j, arm, other_arm, axis)
-    if kind == HINGE or kind == SLIDER:
-        project_axis(rigid, joints, block, world, k, dt, axis, arm, other_arm)
-    elif kind == BALL:
-        project_ball(rigid, joints, block, world, k, dt, arm, other_arm)
     apart, off = joint_apart(rigid, joints, world, k, dt)
     pull, twist = respond(block, apart, off)
     most = joints.limit[r] * dt * dt
@@ -73,6 +69,11 @@ def project_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: flo
     joints.pull[r] = pull_sum
     joints.twist[r] = twist_sum
     apply_joint(rigid, i, j, arm, other_arm, pull, twist)
+    # what acts along the free direction keeps the others as they are, so that one pass is enough for one joint
+    if kind == HINGE or kind == SLIDER:
+        project_axis(rigid, joints, block, world, k, dt, axis, arm, other_arm)
+    elif kind == BALL:
+        project_ball(rigid, joints, block, world, k, dt, arm, other_arm)
     floor = ROUNDING * (1.0 + wp.length(rigid.position[i]))
     return wp.max(wp.max(wp.length(apart), wp.length(off)) - floor, 0.0)
 
@@ -181,6 +182,9 @@ def sum_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
     most = 0.999 * joints.limit[r] * dt * dt
     apart, off = joint_apart(rigid, joints, world, k, dt)
     missed = wp.length(pull) > most or wp.length(twist) > most
+    rigid.joined[world * rigid.capacity + joints.slot[k]] = 1
+    if joints.other[k] >= 0:
+        rigid.joined[world * rigid.capacity + joints.other[k]] = 1
     if missed or wp.length(apart) > UNMET or wp.length(off) > UNMET:
         joints.unmet[r] = joints.unmet[r] + 1
     elif joints.kind[k] == FIXED:
