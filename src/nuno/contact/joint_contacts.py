@@ -9,6 +9,7 @@ and last from substep to substep, as those of all manifolds do.
 import warp as wp
 
 from nuno.contact.convex import Parts
+from nuno.contact.joint_block import Joints
 from nuno.contact.rigid_manifolds import COUNTS, POINTS, ROUNDS, Contacts
 from nuno.solver.lanes import barrier
 from nuno.solver.passing import Passing, goes_on, note_wrong, party_of
@@ -37,19 +38,27 @@ def press_entry(rigid: RigidState, parts: Parts, c: Contacts, world: int, e: int
 
 
 @wp.func
-def party_with_joints(passing: Passing, world: int, a: int, b: int):
-    """The body among the coupled ones by which a manifold of two slots belongs to a party with joints, or -1."""
+def party_with_joints(joints: Joints, passing: Passing, world: int, a: int, b: int):
+    """The body among the coupled ones by which a manifold of two slots is gone through with the joints, or -1.
+
+    None is where no joint is in the party, nor between two bodies that are joined to each other: that may contradict
+    the joint, and pass after pass both would grow.
+    """
     body = wp.max(passing.body_of[a], passing.body_of[b])
     if body >= 0:
         if passing.jointed[world * passing.bodies + body] == 0:
             body = -1
+    for k in range(joints.count):
+        if wp.min(joints.slot[k], joints.other[k]) == wp.min(a, b):
+            if wp.max(joints.slot[k], joints.other[k]) == wp.max(a, b):
+                body = -1
     return body
 
 
 @wp.func
 def press_entries(
-    rigid: RigidState, parts: Parts, c: Contacts, passing: Passing, world: int, dt: float, k_pass: int, thread: int,
-    threads: int,
+    rigid: RigidState, parts: Parts, c: Contacts, joints: Joints, passing: Passing, world: int, dt: float, k_pass: int,
+    thread: int, threads: int,
 ):  # fmt: skip
     """Take one pass over the manifolds of parties with joints; returns how far that moved anything [m].
 
@@ -63,7 +72,7 @@ def press_entries(
             e = c.order[base + k]
             a = parts.slot[(e - base) / c.row]
             b = parts.slot[c.partner[e]]
-            body = party_with_joints(passing, world, a, b)
+            body = party_with_joints(joints, passing, world, a, b)
             if body >= 0:
                 party = party_of(passing, world, body)
                 if goes_on(passing, party):
@@ -80,8 +89,9 @@ def press_entries(
 
 @wp.func
 def press_others(
-    rigid: RigidState, parts: Parts, c: Contacts, passing: Passing, world: int, dt: float, thread: int, threads: int
-):
+    rigid: RigidState, parts: Parts, c: Contacts, joints: Joints, passing: Passing, world: int, dt: float, thread: int,
+    threads: int,
+):  # fmt: skip
     """Take one pass over all other manifolds, and over those of bodies that are held entirely: see `stand_on`."""
     base = world * c.parts * c.row
     for r in range(c.counts[world * COUNTS + ROUNDS]):
@@ -90,6 +100,6 @@ def press_others(
             a = parts.slot[(e - base) / c.row]
             b = parts.slot[c.partner[e]]
             held = rigid.weight[world * rigid.capacity + a] < 0.0 or rigid.weight[world * rigid.capacity + b] < 0.0
-            if held or party_with_joints(passing, world, a, b) < 0:
+            if held or party_with_joints(joints, passing, world, a, b) < 0:
                 part_entry(rigid, parts, c, world, e, dt)
         barrier(threads)

@@ -2,11 +2,11 @@
 
 import warp as wp
 
+from nuno.contact.convex import Parts
 from nuno.contact.coupled_joints import begin_joint, joint_at, project_joint, settle_spins, sum_joint, turns_of
 from nuno.contact.coupled_particles import Particles, bound_all
 from nuno.contact.coupled_rows import Rows, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
-from nuno.contact.convex import Parts
 from nuno.contact.joint_block import Joints
 from nuno.contact.joint_contacts import press_entries, press_others
 from nuno.contact.rigid_manifolds import Contacts
@@ -159,7 +159,7 @@ def solve(
                 take_sums(particles, rigid, first, start, thread, threads)
                 barrier(threads)
             if joints.count > 0:
-                off = press_entries(rigid, parts, manifolds, passing, world, dt, k_pass, thread, threads)
+                off = press_entries(rigid, parts, manifolds, joints, passing, world, dt, k_pass, thread, threads)
                 wrong = wp.max(wrong, off)
             if thread == 0:
                 for k in range(ties.count):
@@ -205,7 +205,9 @@ def solve(
 
 
 @wp.kernel(enable_backward=False)
-def end_contacts(rigid: RigidState, parts: Parts, manifolds: Contacts, passing: Passing, dt: float, threads: int):
+def end_contacts(
+    rigid: RigidState, parts: Parts, manifolds: Contacts, joints: Joints, passing: Passing, dt: float, threads: int
+):
     """One pass over the positions of rigid bodies that touch, where joints are: those without any had none yet."""
     tid = wp.tid()
-    press_others(rigid, parts, manifolds, passing, tid / threads, dt, tid % threads, threads)
+    press_others(rigid, parts, manifolds, joints, passing, tid / threads, dt, tid % threads, threads)

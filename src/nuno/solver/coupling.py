@@ -223,7 +223,7 @@ class Coupling:
             if self.joints.count:
                 wp.launch(
                     end_contacts, dim=self.world_count * self._threads, device=self.device, block_dim=BLOCK_THREADS,
-                    inputs=[self._state, *self._manifolds(), self._passing, dt, self._threads],
+                    inputs=[self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads],
                 )  # fmt: skip
             elif self._rigid is not None:
                 self._rigid.contacts()
@@ -271,9 +271,9 @@ class Coupling:
                     )  # fmt: skip
         if self._listed or self._ties.count or self.holds.count or self.joints.count:
             go(
-                solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties, self.holds,
-                self.joints, self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once),
-                self._threads,
+                solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
+                self.holds, self.joints, self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
+                int(self._at_once), self._threads,
             )  # fmt: skip
             if self._listed:
                 go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
