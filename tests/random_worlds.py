@@ -220,7 +220,8 @@ def grip(scene):
     targets = [body.position + scene.random.uniform(-0.02, 0.02, 3), path_from(scene, body.position), *others[:2]]
     free = (1.0, 0.0, 0.0) if isinstance(body.material, nuno.Rigid) and scene.random.random() < 0.2 else None
     compliance = scene.pick([0.0, 1e-4, 1e-3])
-    scene.world.grip(body, points_of(scene, body), to=scene.pick(targets), compliance=compliance, free=free)
+    limit = {"max_force": scene.pick([1.0, 50.0])} if scene.random.random() < 0.4 else {}
+    scene.world.grip(body, points_of(scene, body), to=scene.pick(targets), compliance=compliance, free=free, **limit)
 
 
 @operation(2)

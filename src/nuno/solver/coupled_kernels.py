@@ -165,7 +165,7 @@ def solve(
                 for k in range(ties.count):
                     party = party_of(passing, world, ties.body[k])
                     if goes_on(passing, party):
-                        off = project_tie(particles, rigid, ties, world, k, dt)
+                        off = project_tie(particles, rigid, ties, world, k, dt, fraction)
                         note_wrong(passing, party, off, threads)
                         wrong = wp.max(wrong, off)
                 for k in range(holds.count):
@@ -193,7 +193,7 @@ def solve(
         for k in range(joints.count):
             settle_spins(rigid, joints, world, k, dt)
         for k in range(ties.count):
-            sum_tie(particles, rigid, ties, world, k, dt)
+            sum_tie(particles, rigid, ties, world, k, dt, fraction)
         for k in range(holds.count):
             sum_hold(rigid, holds, world, k, dt, fraction)
         for k in range(joints.count):

@@ -53,6 +53,11 @@ class Coupling:
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
         joints: Rigid bodies that are joined.
+
+    Attributes:
+        led: Slots of rigid bodies that others lead.
+        tie_places: (worlds, ties, 2, 3) float64 [m], where ties to places are led in the next frame, from and to; None
+            where there are none.
     """
 
     def __init__(
@@ -94,6 +99,7 @@ class Coupling:
         self._rows = self._row_room(4 * total + 512)
         self._bvh: Any = None
         self.led: list[int] = []
+        self.tie_places: np.ndarray | None = None
 
     def _room(self, total: int) -> Particles:
         worlds, capacity = self.world_count, max(1, int(self._state.capacity))
@@ -198,7 +204,8 @@ class Coupling:
         self._impulses.zero_()
         for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
-        self.holds.step = 1.0 / substeps
+        self._ties.step = self.holds.step = 1.0 / substeps
+        self._place_ties()
         if self.joints.count:
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
@@ -231,6 +238,14 @@ class Coupling:
                 solver.step_parts(k, SHAPES | VELOCITIES)
             if self._rigid is not None:
                 self._rigid.finish()
+
+    def _place_ties(self) -> None:
+        """Bring the places to which ties are led, relative to what all places of a party are relative to."""
+        if self.tie_places is not None:
+            owners = self._ties.body.numpy()
+            relative = self.tie_places - self._origins[:, owners][:, :, None]
+            table = np.ascontiguousarray(relative.reshape(-1, 3), dtype=np.float32)
+            self._ties.place.assign(wp.array(table, dtype=wp.vec3, device=self.device))
 
     def _is_apart(self, reach: float) -> bool:
         """Whether this is one body that touches itself, and no two of its parts come nearer than ``reach`` [m].
