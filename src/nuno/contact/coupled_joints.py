@@ -12,7 +12,18 @@ their sum and the inertia are solved in closed form.
 import warp as wp
 
 from nuno.contact.coupled_ties import CATCH_UP, UNMET, left_over, stand_on, within
-from nuno.contact.joint_block import BALL, FIXED, HINGE, SLIDER, Joints, apply_joint, arm_of, block_of, respond
+from nuno.contact.joint_block import (
+    BALL,
+    FIXED,
+    HINGE,
+    SLIDER,
+    Joints,
+    apply_joint,
+    arm_of,
+    block_of,
+    other_frame,
+    respond,
+)
 from nuno.contact.joint_drives import project_axis, project_ball
 from nuno.solver.rigid_body import RigidState, in_world, point_before, point_of, turn_between
 
@@ -85,16 +96,7 @@ def joint_apart(rigid: RigidState, joints: Joints, world: int, k: int, dt: float
     i = world * rigid.capacity + joints.slot[k]
     z = wp.vec3(0.0, 0.0, 1.0)
     own = joints.turn[r]
-    other_turn = joints.other_turn[r]
-    other_before = joints.other_turn[r]
-    place = joints.other_place[r]
-    place_before = joints.other_place[r]
-    if joints.other[k] >= 0:
-        j = world * rigid.capacity + joints.other[k]
-        place = point_of(rigid, j, joints.other_place[r])
-        place_before = point_before(rigid, j, joints.other_place[r])
-        other_turn = rigid.rotation[j] * other_turn
-        other_before = rigid.rotation_before[j] * other_before
+    place, other_turn, place_before, other_before = other_frame(rigid, joints, world, k)
     apart, off = misfit(
         joints.kind[k], point_of(rigid, i, joints.place[r]) - place, rigid.rotation[i] * own, other_turn,
         wp.quat_rotate(other_turn, z),
