@@ -16,7 +16,6 @@ from nuno.dynamics import SOON, touches_itself
 from nuno.frame_runs import FrameRuns
 from nuno.impacts import PASSES, Impacts
 from nuno.parties import Parties, find_parties
-from nuno.path import Path
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -225,10 +224,6 @@ def _joined(first: np.ndarray, members: list[int]) -> list[list[int]]:
 
 def _led(spec: Any, time: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Where a path leads its points at a time [s], and how they accelerated before it: (worlds, k, 3) [m], [m/s2]."""
-    worlds, k, m = spec.positions.shape[:3]
-    path = object.__new__(Path)  # its numbers were checked when the grip was made: this runs every tick
-    keys = spec.positions.reshape(worlds * k, m, 3)
-    path.__dict__.update(times=spec.times, positions=keys, quaternions=None, interpolation=spec.interpolation)
-    places = path.at(time - step * np.arange(3.0)).reshape(worlds, k, 3, 3)
+    places = spec.at(time - step * np.arange(3.0))
     now, before, earlier = (places[:, :, n] for n in range(3))
     return now, (now - 2.0 * before + earlier) / step**2

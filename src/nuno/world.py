@@ -256,12 +256,13 @@ class World(Running):
             free: (3,), a direction of the world along which a rigid body may slide; None holds it entirely.
             max_force: [N], a number or (worlds,): the most that the grip bears, at each point where it holds points,
                 and as much [N m] of a rigid body's turns. None is 10 kN, or 1,000 m/s2 times the mass of the heaviest
-                rigid body that it joins. Points that follow a path, a place or a static body have no limit.
+                rigid body that it joins; points that follow a path, a place or a static body have no limit then. With
+                one they are solved beside the body's contacts, which takes longer.
             ignore: Bodies that a rigid body passes through while it is held; None is ``to``, where that is a body.
 
         Raises:
             BodyStateError: the body is static.
-            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit where there is none.
+            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit that is not positive.
         """
         with self._change("grip"):
             own = self._own(body)

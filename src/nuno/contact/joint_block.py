@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.solver.rigid_body import RigidState, shift_body, turn_body
+from nuno.solver.rigid_body import RigidState, point_before, point_of, shift_body, turn_body
 
 FIXED, HINGE, SLIDER, BALL = 0, 1, 2, 3
 LOWER, UPPER, FRICTION, STIFFNESS, DAMPING, POSITION, VELOCITY, EFFORT, SPRING, REST, SPRING_DAMPING = range(11)
@@ -62,6 +62,23 @@ def arm_of(rigid: RigidState, i: int, place: wp.vec3):
     if i >= 0:
         arm = wp.quat_rotate(rigid.rotation_before[i], place)
     return arm
+
+
+@wp.func
+def other_frame(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The joint's frame in the other body, or in the world: place and turn now, and when the substep began."""
+    r = world * joints.count + k
+    place = joints.other_place[r]
+    place_before = joints.other_place[r]
+    turn = joints.other_turn[r]
+    turn_before = joints.other_turn[r]
+    if joints.other[k] >= 0:
+        j = world * rigid.capacity + joints.other[k]
+        place = point_of(rigid, j, joints.other_place[r])
+        place_before = point_before(rigid, j, joints.other_place[r])
+        turn = rigid.rotation[j] * turn
+        turn_before = rigid.rotation_before[j] * turn_before
+    return place, turn, place_before, turn_before
 
 
 @wp.func

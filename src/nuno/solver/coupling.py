@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.convex import Parts
 from nuno.contact.coupled_geometry import measure_rows
 from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
 from nuno.contact.coupled_particles import MOST, Particles
@@ -15,8 +16,10 @@ from nuno.contact.coupled_rows import Rows
 from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.joint_block import Joints
-from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, Passing, add_impulses, collect, scatter, solve
+from nuno.contact.rigid_manifolds import Contacts
+from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.passing import Passing
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
 
@@ -50,6 +53,11 @@ class Coupling:
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
         joints: Rigid bodies that are joined.
+
+    Attributes:
+        led: Slots of rigid bodies that others lead.
+        tie_places: (worlds, ties, 2, 3) float64 [m], where ties to places are led in the next frame, from and to; None
+            where there are none.
     """
 
     def __init__(
@@ -76,6 +84,9 @@ class Coupling:
         self._passing = Passing()
         for name, kind in (("wrong", float), ("done", int)):
             setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
+        numbers = np.full(max(1, int(self._state.capacity)), -1, dtype=np.int32)
+        numbers[self._slots] = np.arange(len(self._solvers), self._bodies)
+        self._passing.body_of = wp.array(numbers, dtype=int, device=self.device)
         self._impulses = wp.zeros(3 * self.world_count * self._bodies**2, dtype=wp.int64, device=self.device)
         firsts = np.cumsum([0, *(solver.particle_count for solver in self._solvers)])
         self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
@@ -88,6 +99,7 @@ class Coupling:
         self._rows = self._row_room(4 * total + 512)
         self._bvh: Any = None
         self.led: list[int] = []
+        self.tie_places: np.ndarray | None = None
 
     def _room(self, total: int) -> Particles:
         worlds, capacity = self.world_count, max(1, int(self._state.capacity))
@@ -159,6 +171,10 @@ class Coupling:
             self._elements.party = wp.array(party.T.astype(np.int32).ravel(), dtype=int, device=self.device)
             self._passing.bodies, self._passing.party = self._bodies, self._elements.party
             self._passing.many = int((party != party[0]).any())
+            joined = np.zeros(party.shape, dtype=bool)
+            for body in self.joints.body.numpy() if self.joints.count else ():
+                joined |= party == party[body]
+            self._passing.jointed = wp.array(joined.T.astype(np.int32).ravel(), dtype=int, device=self.device)
         # what all places of a party are relative to: the rigid scene's where a rigid body is in it, which has no other
         own = np.stack([solver.origin for solver in self._solvers] or [np.zeros((worlds, 3))])  # (solvers, worlds, 3)
         self._origins = np.zeros((worlds, self._bodies, 3))
@@ -188,7 +204,8 @@ class Coupling:
         self._impulses.zero_()
         for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
-        self.holds.step = 1.0 / substeps
+        self._ties.step = self.holds.step = 1.0 / substeps
+        self._place_ties()
         if self.joints.count:
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
@@ -210,12 +227,25 @@ class Coupling:
             if self._rigid is not None:
                 self._rigid.predict()
             self._touch(k, every, margin, dt, (k + 1) / substeps)
-            if self._rigid is not None:
+            if self.joints.count:
+                wp.launch(
+                    end_contacts, dim=self.world_count * self._threads, device=self.device, block_dim=BLOCK_THREADS,
+                    inputs=[self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads],
+                )  # fmt: skip
+            elif self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
                 solver.step_parts(k, SHAPES | VELOCITIES)
             if self._rigid is not None:
                 self._rigid.finish()
+
+    def _place_ties(self) -> None:
+        """Bring the places to which ties are led, relative to what all places of a party are relative to."""
+        if self.tie_places is not None:
+            owners = self._ties.body.numpy()
+            relative = self.tie_places - self._origins[:, owners][:, :, None]
+            table = np.ascontiguousarray(relative.reshape(-1, 3), dtype=np.float32)
+            self._ties.place.assign(wp.array(table, dtype=wp.vec3, device=self.device))
 
     def _is_apart(self, reach: float) -> bool:
         """Whether this is one body that touches itself, and no two of its parts come nearer than ``reach`` [m].
@@ -256,14 +286,18 @@ class Coupling:
                     )  # fmt: skip
         if self._listed or self._ties.count or self.holds.count or self.joints.count:
             go(
-                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self.joints,
-                self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once),
-                self._threads,
+                solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
+                self.holds, self.joints, self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
+                int(self._at_once), self._threads,
             )  # fmt: skip
             if self._listed:
                 go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
             for layout in self._layouts:
                 go(scatter, (worlds, layout.particles), layout, particles, self._start)
+
+    def _manifolds(self) -> tuple[Parts, Contacts]:
+        """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""
+        return (Parts(), Contacts()) if self._rigid is None else (self._rigid.table.parts, self._rigid.manifolds)
 
     def _list(self, margin: float) -> None:
         """Find the candidates anew, in more room where they do not fit."""

@@ -34,6 +34,7 @@ class RigidState:
     inverse_inertia: wp.array(dtype=wp.mat33)
     weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg], negative once a hold says where it is
     give: wp.array(dtype=wp.mat33)  # the inverse inertia in this run, world frame, of where the substep began
+    joined: wp.array(dtype=int)  # 1 once joints say where it is in this substep
 
 
 @wp.func
@@ -124,6 +125,7 @@ def begin_body(s: RigidState, i: int, role: int):
     q = s.rotation[i]
     s.position_before[i] = s.position[i]
     s.rotation_before[i] = q
+    s.joined[i] = 0
     w = s.inverse_mass[i]
     if role == 1 and w > 0.0:
         s.weight[i] = w
