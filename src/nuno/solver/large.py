@@ -20,6 +20,7 @@ from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shap
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_sharp
 from nuno.solver.broad import PairFinder
+from nuno.solver.damping import damp_bends
 from nuno.solver.frame import meet_shapes
 from nuno.solver.grips import forget_loads, pull_points, read_loads
 from nuno.solver.integrate import read_velocities, reset_speed, round_places, tick
@@ -88,6 +89,14 @@ def unload(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: i
     tid = wp.tid()
     t = view(s, tid / threads, topo.particles, size)
     forget_loads(t, run, tid % threads, threads)
+
+
+@wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
+def damp(s: StateFloat, topo: Topology, size: Sizes, run: Settings, threads: int):
+    """The damping of bends, a block a world; velocities are floats in any case."""
+    tid = wp.tid()
+    t = view(s, tid / threads, topo.particles, size)
+    damp_bends(t, topo, run, tid % threads, threads, threads)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1))
@@ -359,6 +368,12 @@ class LargePlan:
             wp.launch(start, dim=self._worlds, inputs=[*common, run], device=self._device)
             if run.touching:
                 self._finder.launch(self._state, self._size, run)
+            if run.damped:
+                threads = self._threads
+                wp.launch(
+                    damp, dim=self._worlds * threads, inputs=[*common, run, threads], device=self._device,
+                    block_dim=THREADS,
+                )  # fmt: skip
             for first, last in self._stages:
                 self._launch_blocks(project if coarse else project_fine, run, self._work, self._gate, first, last)
         if run.parts & PULLS and run.pulled:
