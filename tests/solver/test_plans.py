@@ -9,6 +9,7 @@ from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
 from nuno.solver.bending import bend_line, bend_twist
 from nuno.solver.cloth_solver import ClothSolver
+from nuno.solver.damping import damp_line, damp_twist
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.membrane import shear_cell, stretch_triangle
 from nuno.solver.state import StateFloat, StateLanes
@@ -188,9 +189,11 @@ def project_floats(t: StateFloat, which: int, tables: StateFloat):
         a, b, c, d = 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3
         alpha = tables.x[k]
         if which == 0:
-            bend_line(t, a, b, c, alpha, 1, tables.y[k])
+            bend_line(t, a, b, c, alpha)
+            damp_line(t, a, b, c, alpha, tables.y[k])
         elif which == 1:
-            bend_twist(t, a, b, c, d, alpha, 1, tables.y[k])
+            bend_twist(t, a, b, c, d, alpha)
+            damp_twist(t, a, b, c, d, alpha, tables.y[k])
         elif which == 2:
             shear_cell(t, a, b, c, d, 0.7, alpha, 0.0, 0.4, 0.5)
         else:
@@ -204,9 +207,11 @@ def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int),
     alpha = alphas[0]
     gamma = alphas[1]
     if which == 0:
-        bend_line(t, a, b, c, alpha, 1, gamma)
+        bend_line(t, a, b, c, alpha)
+        damp_line(t, a, b, c, alpha, gamma)
     elif which == 1:
-        bend_twist(t, a, b, c, d, alpha, 1, gamma)
+        bend_twist(t, a, b, c, d, alpha)
+        damp_twist(t, a, b, c, d, alpha, gamma)
     elif which == 2:
         shear_cell(t, a, b, c, d, lane(0.7), alpha, lane(0.0), 0.4, 0.5)
     else:
@@ -219,9 +224,11 @@ def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
     alpha = alphas[0]
     gamma = alphas[1]
     if which == 0:
-        bend_line(t, 0, 1, 2, alpha, 1, gamma)
+        bend_line(t, 0, 1, 2, alpha)
+        damp_line(t, 0, 1, 2, alpha, gamma)
     elif which == 1:
-        bend_twist(t, 0, 1, 2, 3, alpha, 1, gamma)
+        bend_twist(t, 0, 1, 2, 3, alpha)
+        damp_twist(t, 0, 1, 2, 3, alpha, gamma)
     elif which == 2:
         shear_cell(t, 0, 1, 2, 3, 0.7, alpha, lane(0.0), 0.4, 0.5)
     else:
@@ -240,7 +247,7 @@ def filled(kind, values, dtype):
 def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     """Promise: float, sixteen worlds and sixteen elements are one function."""
     random = np.random.default_rng(which)
-    values = {name: random.normal(size=SIZE).astype(np.float32) for name in ("x", "y", "z", "px", "py", "pz")}
+    values = {name: random.normal(size=SIZE).astype(np.float32) for name in ("x", "y", "z", "vx", "vy", "vz")}
     values["w"] = random.uniform(0.5, 2.0, SIZE).astype(np.float32)
     alphas = random.uniform(0.1, 1.0, (2, LANES)).astype(np.float32)
     floats, elements = (filled(StateFloat, values, float) for _ in range(2))
@@ -251,7 +258,8 @@ def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     wp.launch(project_floats, dim=1, inputs=[floats, which, tables], device="cpu")
     wp.launch(project_elements, dim=1, inputs=[elements, which, index, wide], device="cpu")
     wp.launch(project_worlds, dim=1, inputs=[worlds, which, wide], device="cpu")
-    for name in ("x", "y", "z"):
+    bends = which < 2
+    for name in ("x", "y", "z", *(("vx", "vy", "vz") if bends else ())):
         expected = getattr(floats, name).numpy()
         assert (expected != values[name]).sum() > LANES  # it did something
         np.testing.assert_array_equal(getattr(elements, name).numpy(), expected)

@@ -172,6 +172,11 @@ class ClothSolver(ParticleSolver):
         parts = share["stretch"], share["shear"], bending
         return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
+    @property
+    def _fine_rate(self) -> float:
+        """Substeps a second [1/s] from which on coordinates are doubles: any, where the rule chose them."""
+        return FINE_RATE if self.resolution.given else 0.0
+
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count
         state = StateLanes() if self.lanes > 1 else StateFloat()
@@ -183,7 +188,7 @@ class ClothSolver(ParticleSolver):
         topo.particles, topo.blocks, topo.columns = n, topology.blocks.count, topology.blocks.columns
         put_sides(topo, topology, self.device, STRETCHED)
         self._size, self._state, self._topology, self._surface = size, state, topo, topo
-        self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine)
+        self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine, self._fine_rate)
 
         soft = compliances(topology, values)
         for kind in ("stretch", "shear", "bend"):
@@ -408,7 +413,7 @@ class ClothSolver(ParticleSolver):
     def _team_pays(self) -> bool:
         """Whether a world beyond a block's memory is quicker by a team; with doubles the bits are the same."""
         share = cores_of(self.device) // self.world_count
-        fine = self.frame_rate * self.substeps >= FINE_RATE
+        fine = self.frame_rate * self.substeps >= self._fine_rate
         return fine and FINE_PARTICLES < self.particle_count <= TEAM_PARTICLES * share
 
     def _forget_launches(self) -> None:

@@ -15,6 +15,7 @@ from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shap
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_sharp
 from nuno.contact.team_listing import Lists, renew_by_team
+from nuno.solver.damping import damp_bends
 from nuno.solver.frame import meet_shapes
 from nuno.solver.grips import forget_loads, pull_points, read_loads
 from nuno.solver.integrate import read_velocities, reset_speed, round_places, tick
@@ -133,6 +134,8 @@ def advance_by_team(
             barrier(team.threads)
             if run.touching != 0:
                 renew_by_team(near, topo, run, lists, world, team)
+            if run.damped != 0:
+                damp_bends(t, topo, run, team.turn, team.turns, team)
             go_through(t, topo, work, steps, run, led, 0, work.steps, team)
             meet(team)
         if run.pulled != 0 and run.parts & PULLS != 0:
