@@ -14,7 +14,7 @@ import numpy as np
 
 from nuno.dynamics import SOON, touches_itself
 from nuno.frame_runs import FrameRuns
-from nuno.impacts import PASSES, Impacts
+from nuno.impacts import Impacts, collides_with_itself, look_at, look_due, next_look
 from nuno.parties import Parties, find_parties
 
 if TYPE_CHECKING:
@@ -59,11 +59,16 @@ class Stepping:
         apart = not self._may_meet(moving, rigid) and not (rigid and world._led_bodies())
         if apart:
             self._prepare(moving, time)
-            if not self.careful:
-                self._run_apart(moving, time, stop - time)
-                return
+        looking = not world._quiet and any(collides_with_itself(body._dynamics) for body in moving)
         now = time
         while now < stop - SOON:
+            before = now
+            if apart and not self.careful:
+                now = next_look(now, stop, world.frame_rate) if looking else stop
+                self._run_apart(moving, before, now - before)
+                if looking and look_due(before, now, world.frame_rate):
+                    look_at(moving)
+                continue
             # the same instants whether a span is gone through at once or in pieces
             duration = min(frame, stop - now)
             self.last = []
@@ -71,6 +76,8 @@ class Stepping:
                 self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
+            if looking and look_due(before, now, world.frame_rate):
+                look_at(moving)
 
     def _run_apart(self, moving: list[Body], time: float, duration: float, substeps: int | None = None) -> None:
         slots = []
@@ -119,9 +126,11 @@ class Stepping:
                 due[:] = False
                 if impacts is not None:
                     parties, due = impacts.again(parties)
+            if impacts is not None:
+                impacts.settle()
         finally:
             if impacts is not None:
-                impacts.set_passes(PASSES)
+                impacts.guard(False)
 
     def _run_with(
         self, moving: list[Body], parties: Parties, count: int, kept: dict[Body, np.ndarray], time: float,

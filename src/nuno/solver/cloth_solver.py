@@ -59,7 +59,7 @@ from nuno.solver.state import (
     Topology,
 )
 from nuno.solver.substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
-from nuno.solver.upload import upload
+from nuno.solver.upload import upload, upload_blocks
 from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
 if TYPE_CHECKING:
@@ -142,6 +142,9 @@ class ClothSolver(ParticleSolver):
         self.resolution = self._resolution(bool(substeps), wanted_substeps(topology, *rule), soft, density, rigidity)
         self.self_contact = self_contact
         self.passes = PASSES  # over contacts of the cloth with itself, in a substep
+        self._all_edges = False  # whether a sheet's diagonals collide with all edges
+        # see `nuno.impacts`: frames for which the cloth is guarded, and how often it was tried in vain to take it apart
+        self.guarded, self.tangled = np.zeros((2, self.world_count), dtype=np.int32)
         self.shared_memory = True
         if plan == "auto":
             plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
@@ -228,11 +231,7 @@ class ClothSolver(ParticleSolver):
         if self.plan == "grid":
             # see `nuno.contact.closing`
             size.blocks = max(size.blocks, 2 * 6 * boxes(blocks.count))
-        elements = len(blocks.face), len(blocks.edge)
-        # spheres of all elements, or on the CPU the room in which one world after the other is listed
-        alone = not self._cuda and self.plan != "grid"
-        middle = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
-        size.middle = middle if self.self_contact else 1
+        size.middle = self._listing_numbers() if self.self_contact else 1
         size_lists(size, n, self.world_count)
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
@@ -253,6 +252,58 @@ class ClothSolver(ParticleSolver):
         state.middle = empty(size.middle, self._number)
         state.moved = empty(size.moved, int)
         self._allocate_lists()
+
+    def save_state(self) -> dict[str, np.ndarray]:
+        """As of all particles, and for how many frames more the cloth is guarded: see `nuno.impacts`."""
+        return super().save_state() | {"guarded": self.guarded.copy()}
+
+    def load_state(self, state: dict[str, np.ndarray]) -> None:
+        """As of all particles; a state without it is of a cloth that is not guarded."""
+        super().load_state(state)
+        self.guarded = np.array(np.broadcast_to(state.get("guarded", np.int32(0)), (self.world_count,)))
+
+    def keep(self) -> Any:
+        """As of all particles, and for how many frames more the cloth is guarded."""
+        return super().keep(), self.guarded.copy()
+
+    def put_back(self, kept: Any) -> None:
+        """Set the state that `keep` kept."""
+        super().put_back(kept[0])
+        self.guarded = kept[1].copy()
+
+    def velocities_apart(self, kept: Any = None) -> tuple[np.ndarray, ...]:
+        """As of all particles."""
+        return super().velocities_apart(None if kept is None else kept[0])
+
+    def guard(self, passes: int, diagonals: bool) -> None:
+        """Set how contacts of the cloth with itself are found and solved in what runs next, which lists pairs anew.
+
+        Args:
+            passes: Over contacts in a substep.
+            diagonals: Whether a sheet's diagonals collide with all edges, or at creases alone.
+        """
+        self.passes = passes
+        if not self.self_contact or not len(self.topology.cells) or diagonals == self._all_edges:
+            return
+        self._all_edges = diagonals
+        for name, array in upload_blocks(self.topology, diagonals, self.device).items():
+            setattr(self._topology, name, array)
+        room = self._listing_numbers()
+        if room > self._size.middle:
+            self._size.middle = room
+            self._state.middle = self._empty(room, self._number)
+        notes = self._get(self._state.notes, NOTES).copy()
+        notes[:, TRAVEL] = 1.0e9
+        wp.copy(self._state.notes, self._put(notes))
+        self._forget_launches()
+
+    def _listing_numbers(self) -> int:
+        """Room a world or group of lanes for spheres of all elements, or on the CPU for the listing of one world."""
+        blocks = self.topology.blocks
+        elements = len(blocks.face), len(blocks.edge) + (len(self.topology.cells) if self._all_edges else 0)
+        if self._cuda or self.plan == "grid":
+            return 4 * sum(elements)
+        return -(-listing_room(self.particle_count, *elements, blocks.count) // self.lanes)
 
     def _allocate_lists(self) -> None:
         """Room for candidate pairs, none of them listed.
