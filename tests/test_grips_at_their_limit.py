@@ -169,7 +169,7 @@ def test_two_stiff_grips_on_a_vertex_are_told(caplog):
 
 
 def test_a_grip_that_leads_far_at_once_is_told(caplog):
-    """More than a cell at once is a blow (50 mm put 7 J into a sheet of 5 g); less, later or softly nothing is said."""
+    """More than an edge at once is a blow (50 mm put 7 J into 5 g of sheet); less, later or softly nothing is said."""
     world = nuno.World(device="cpu")
     towel = world.add(nuno.sheet((0.1, 0.1), (2, 2), position=(0.0, 0.0, 0.5)))
     world.attach(towel)

@@ -219,14 +219,15 @@ def tell_shared(grip: Grip) -> None:
             )  # fmt: skip
 
 
-def _tell_jump(body: Body, jump: float) -> None:
-    """Warn where a stiff grip leads points farther at once [m] than a cell: the cells beside them take it up."""
-    cell = float(body._dynamics.solver._cell_size)  # type: ignore[union-attr]
-    if jump > cell:
+def _tell_jump(body: Body, places: np.ndarray, jump: float) -> None:
+    """Warn where a stiff grip leads points farther at once [m] than edges are long, by the vertices' ``places``."""
+    corners = places[body.faces]
+    edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean())
+    if jump > edge:
         log.warning(
-            "the grip on %r leads its points %.4g m at once, in its first substep, and cells are %.4g m: that is a "
-            "blow. Begin the path where the mean of the points is, or give the grip a compliance",
-            body.name, jump, cell,
+            "the grip on %r leads its points %.4g m at once, in its first substep, and edges are %.4g m long: that is "
+            "a blow. Begin the path where the mean of the points is, or give the grip a compliance",
+            body.name, jump, edge,
         )  # fmt: skip
 
 
@@ -297,7 +298,8 @@ def make_grip(
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
         jump = goal - mean
     if compliance == 0.0:
-        _tell_jump(body, float(np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1).max()))
+        jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
+        _tell_jump(body, positions[0], float(jumps.max()))
     spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance)
     return Grip(body, spec, target, local)
 
