@@ -163,9 +163,25 @@ def test_two_stiff_grips_on_a_vertex_are_told(caplog):
         for vertices, compliance in (([0, 1], 0.0), ([2], 0.0), ([1], 1e-3)):
             world.grip(towel, vertices, to=towel.vertices[vertices].mean(axis=0), compliance=compliance)
         assert not caplog.records
-        world.grip(towel, [1, 3], to=(0.0, 0.0, 0.6))
+        world.grip(towel, [1, 3], to=towel.vertices[[1, 3]].mean(axis=0))
     (record,) = caplog.records
     assert "[1]" in record.getMessage() and "'sheet'" in record.getMessage() and "compliance" in record.getMessage()
+
+
+def test_a_grip_that_leads_far_at_once_is_told(caplog):
+    """More than an edge at once is a blow (50 mm put 7 J into 5 g of sheet); less, later or softly nothing is said."""
+    world = nuno.World(device="cpu")
+    towel = world.add(nuno.sheet((0.1, 0.1), (2, 2), position=(0.0, 0.0, 0.5)))
+    world.attach(towel)
+    place, up = towel.vertices[0], np.array((0.0, 0.0, 0.1))
+    with caplog.at_level(logging.WARNING):
+        world.grip(towel, [0], to=place + 0.4 * up).release()
+        world.grip(towel, [0], to=place + up, compliance=1e-3).release()
+        world.grip(towel, [0], to=nuno.Path([0.0, 1.0], [place, place + up])).release()
+        assert not caplog.records
+        world.grip(towel, [0], to=nuno.Path([0.0, 1.0], [place + 0.6 * up, place]))
+    (record,) = caplog.records
+    assert "0.06 m" in record.getMessage() and "'sheet'" in record.getMessage()
 
 
 def test_a_limit_that_cannot_be_is_refused():

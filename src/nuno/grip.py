@@ -232,6 +232,18 @@ def tell_shared(grip: Grip) -> None:
             )  # fmt: skip
 
 
+def _tell_jump(body: Body, places: np.ndarray, jump: float) -> None:
+    """Warn where a stiff grip leads points farther at once [m] than edges are long, by the vertices' ``places``."""
+    corners = places[body.faces]
+    edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean())
+    if jump > edge:
+        log.warning(
+            "the grip on %r leads its points %.4g m at once, in its first substep, and edges are %.4g m long: that is "
+            "a blow. Begin the path where the mean of the points is, or give the grip a compliance",
+            body.name, jump, edge,
+        )  # fmt: skip
+
+
 def _stiff_vertices(grip: Grip) -> np.ndarray | None:
     spec = grip._spec
     return spec.vertices if isinstance(spec, GripSpec) and not grip.is_tie and spec.compliance == 0.0 else None
@@ -280,8 +292,7 @@ def make_grip(
     mean = np.where(valid[..., None], held, 0.0).sum(axis=1) / number
     offsets = np.where(valid[..., None], held - mean[:, None], 0.0)
 
-    interpolation = "linear"
-    local = None
+    interpolation, local, jump = "linear", None, np.zeros(3)
     if target is not None:
         local = np.broadcast_to(apply(invert(target._pose()), held), held.shape).copy()
         times, keys = np.array([world.time]), held[:, :, None]
@@ -289,10 +300,15 @@ def make_grip(
         if to.world_count not in (None, worlds):
             raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {worlds}")
         times, keys, interpolation = _along(to, offsets, world)
+        jump = to.at(world.time) - mean
     else:
         goal = finite_array("to, where it is no Path or Body,", to, (3,), (worlds, 3))
         times = np.array([world.time])
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
+        jump = goal - mean
+    if compliance == 0.0 and most is None:
+        jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
+        _tell_jump(body, positions[0], float(jumps.max()))
     spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, most)
     return Grip(body, spec, target, local)
 

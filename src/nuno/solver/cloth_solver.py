@@ -24,6 +24,7 @@ from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.relaxation import PLAIN, RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.solver.shared import (
     FEW_FRAMES,
@@ -126,6 +127,7 @@ class ClothSolver(ParticleSolver):
         # teams of blocks have one world after the other, also where that is tried out on the CPU
         self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
         self.topology, self._cell_size = topology, topology.cell_size
+        self._launches = RecordedLaunches(self.device, 1)
         down = float(np.linalg.norm(self.gravity))
         values = material.resolved(self.world_count, topology.element_count)
         rigidity = max(float(values[f"bending_rigidity_{side}"].max()) for side in ("warp", "weft"))
@@ -417,7 +419,7 @@ class ClothSolver(ParticleSolver):
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)
             inputs = [*states, self._topology, self._wide, self._size, run, self._shapes, substeps]
-            wp.launch(run_wide if fine is None else run_fine_wide, dim=1, inputs=inputs, device=self.device)
+            self._launches.launch(run_wide if fine is None else run_fine_wide, 1, inputs)
         else:
             kernels = (run_lanes, run_fine_lanes) if self.lanes > 1 else (run_worlds, run_fine_worlds)
             kernel = kernels[fine is not None]

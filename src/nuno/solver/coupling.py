@@ -20,6 +20,7 @@ from nuno.contact.rigid_manifolds import Contacts
 from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.passing import Passing
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
 
@@ -78,6 +79,7 @@ class Coupling:
         self.device, self.world_count = str(first.device), int(first.world_count)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._at_once = solves_at_once(self.device)
+        self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
         self._state = RigidState() if rigid is None else rigid.state
         self._bodies = int(elements.bodies)
         self._party = np.zeros((0, 0), dtype=int)
@@ -265,11 +267,11 @@ class Coupling:
     def _touch(self, k: int, every: int, margin: float, dt: float, fraction: float) -> None:
         worlds, particles, rows, elements = self.world_count, self._particles, self._rows, self._elements
 
-        def go(kernel: Any, dim: Any, *inputs: Any) -> None:
-            wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device, block_dim=BLOCK_THREADS)
+        def go(kernel: Any, dim: Any, *inputs: Any, body: int = 0) -> None:
+            self._launches.launch(kernel, dim, inputs, body)
 
-        for layout in self._layouts:
-            go(collect, (worlds, layout.particles), layout, particles, self._start)
+        for body, layout in enumerate(self._layouts):
+            go(collect, (worlds, layout.particles), layout, particles, self._start, body=body)
         if k % every == 0:
             self._list(margin)
             rows = self._rows
@@ -282,7 +284,7 @@ class Coupling:
                 if around.shapes.count:
                     go(
                         bound_particles, (worlds, layout.particles), layout, particles, elements, around, body, k + 1,
-                        dt,
+                        dt, body=body,
                     )  # fmt: skip
         if self._listed or self._ties.count or self.holds.count or self.joints.count:
             go(
@@ -292,8 +294,8 @@ class Coupling:
             )  # fmt: skip
             if self._listed:
                 go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
-            for layout in self._layouts:
-                go(scatter, (worlds, layout.particles), layout, particles, self._start)
+            for body, layout in enumerate(self._layouts):
+                go(scatter, (worlds, layout.particles), layout, particles, self._start, body=body)
 
     def _manifolds(self) -> tuple[Parts, Contacts]:
         """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""
