@@ -65,8 +65,8 @@ class Stepping:
                 return
         now = time
         while now < stop - SOON:
-            # the same instants whether a span is gone through at once or in pieces
-            duration = min(frame, stop - now)
+            # the same instants whether a span is gone through at once or in pieces, and the same steps by itself or not
+            duration = frame if stop - now > frame - SOON else stop - now
             self.last = []
             if not apart:
                 self._prepare(moving, now)
