@@ -125,9 +125,12 @@ class Dynamics:
         """Give back what the world holds for the body."""
 
     def add_push(self, push: Push) -> None:
-        """Add a push; one without an end takes the place of the last such push."""
+        """Add a push; one without an end takes the place of the last such push.
+
+        One with an end that is nothing here may be something in other worlds of a batch, whose frame it ends, too.
+        """
         kept = [other for other in self.pushes if push.end is not None or other.end is not None]
-        self.pushes = [*kept, push] if push.force.any() else kept
+        self.pushes = [*kept, push] if push.end is not None or push.force.any() else kept
 
     def pushing(self, time: float) -> tuple[Push, ...]:
         """Return the pushes that act from ``time`` [s] on."""

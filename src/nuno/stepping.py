@@ -69,8 +69,8 @@ class Stepping:
                 if looking and look_due(before, now, world.frame_rate):
                     look_at(moving)
                 continue
-            # the same instants whether a span is gone through at once or in pieces
-            duration = min(frame, stop - now)
+            # the same instants whether a span is gone through at once or in pieces, and the same steps by itself or not
+            duration = frame if stop - now > frame - SOON else stop - now
             self.last = []
             if not apart:
                 self._prepare(moving, now)

@@ -163,7 +163,8 @@ def move_body(s: RigidState, i: int, role: int, dt: float):
         half = in_world(turned_by(0.5 * dt * spin, q), s.inverse_inertia[i]) * momentum
         q = turned_by(dt * (spin + (half - there)), q)
         s.spin[i] = spin + (in_world(q, s.inverse_inertia[i]) * momentum - there)
-    elif role == 2:
+    elif role == 2 and wp.length_sq(v) + wp.length_sq(spin) > 0.0:
+        # what stands in this world and is led in others keeps its rotation, which would be rounded
         x = x + dt * v
         q = turned_by(dt * spin, q)
     s.position[i] = x
