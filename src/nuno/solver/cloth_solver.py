@@ -154,7 +154,7 @@ class ClothSolver(ParticleSolver):
                 plan = "grid"
         self.plan = plan
         self._grid: GridPlan | None = None
-        self._left_out = False
+        self._left_out = self._crowded = False
         self._wide: Any = None
         # what a team shares out, and its room for listing pairs
         self._shares: tuple[int, Any] | None = None
@@ -377,6 +377,8 @@ class ClothSolver(ParticleSolver):
         """
         left_out = self._left_out or (self._grid is not None and self._grid.left_out())
         self._left_out = False
+        if left_out:  # the run that is gone through again must not find the device too busy once more
+            self._crowded, self._grid = True, None
         counts = self._get(self._state.pair_count, COUNTS) if self._counted is None else self._counted
         self._counted = None
         missed = find_missed(self._size, counts)
@@ -475,7 +477,9 @@ class ClothSolver(ParticleSolver):
         self._grid = None
 
     def _grid_plan(self) -> GridPlan:
-        teams, blocks = teams_of(self.world_count, cores_of(self.device), SHARED_OUT)
+        teams, blocks = self.world_count, 1
+        if not self._crowded:
+            teams, blocks = teams_of(self.world_count, cores_of(self.device), SHARED_OUT)
         if self._lists is None:
             self._lists = make_lists(self._topology, self.world_count, self.device)
         before, speeds = (self._topology, self._size), wp.zeros(2 * self.world_count, dtype=float, device=self.device)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from nuno.solver.fine import fine_lane
 from nuno.solver.lanes import lane
 from nuno.solver.state import CLOCK, NOTES, ORIGIN, SCALARS
 
@@ -48,6 +49,49 @@ def pack_lanes(
         world = group * 16 + j
         if world < out.shape[0]:
             out[world, i] = wp.vec3(a[j], b[j], c[j])
+
+
+# A module of its own: only bodies with coordinates as doubles need it.
+@wp.kernel(enable_backward=False, module="nuno.solver.pack_fine")
+def pack_fine(
+    x: wp.array(dtype=wp.float64),
+    y: wp.array(dtype=wp.float64),
+    z: wp.array(dtype=wp.float64),
+    scalars: wp.array(dtype=float),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """`pack` of doubles, rounded once."""
+    world, i = wp.tid()
+    k = world * n + i
+    o = world * SCALARS + ORIGIN
+    a = x[k] + wp.float64(scalars[o])
+    b = y[k] + wp.float64(scalars[o + 1])
+    c = z[k] + wp.float64(scalars[o + 2])
+    out[world, i] = wp.vec3(float(a), float(b), float(c))
+
+
+@wp.kernel(enable_backward=False, module="nuno.solver.pack_fine")
+def pack_fine_lanes(
+    x: wp.array(dtype=fine_lane),
+    y: wp.array(dtype=fine_lane),
+    z: wp.array(dtype=fine_lane),
+    scalars: wp.array(dtype=lane),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """The same out of lanes."""
+    group, i = wp.tid()
+    k = group * n + i
+    o = group * SCALARS + ORIGIN
+    lanes = int(16)
+    for j in range(lanes):
+        world = group * 16 + j
+        if world < out.shape[0]:
+            a = x[k][j] + wp.float64(scalars[o][j])
+            b = y[k][j] + wp.float64(scalars[o + 1][j])
+            c = z[k][j] + wp.float64(scalars[o + 2][j])
+            out[world, i] = wp.vec3(float(a), float(b), float(c))
 
 
 @wp.kernel(enable_backward=False)
@@ -114,12 +158,17 @@ def finite_worlds(
     return np.asarray(values[:worlds] == 0), None if counts is None else values[worlds:].reshape(worlds, -1)
 
 
-def pack_positions(state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None) -> wp.array:
-    """(worlds, n) array of vec3 [m] from a solver's state, or into ``out``."""
+def pack_positions(
+    state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None,
+    places: list[wp.array] | None = None,
+) -> wp.array:  # fmt: skip
+    """(worlds, n) array of vec3 [m] from a solver's state, or into ``out``; from doubles, where they are ``places``."""
     if out is None:
         out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
-    kernel, count = (pack_lanes, -(-worlds // lanes)) if lanes > 1 else (pack, worlds)
-    wp.launch(kernel, dim=(count, n), inputs=[state.x, state.y, state.z, state.scalars, n, out], device=device)
+    places = [state.x, state.y, state.z] if places is None else places
+    kernels = (pack_fine, pack_fine_lanes) if places[0].dtype in (wp.float64, fine_lane) else (pack, pack_lanes)
+    count = -(-worlds // lanes)
+    wp.launch(kernels[lanes > 1], dim=(count, n), inputs=[*places, state.scalars, n, out], device=device)
     return out
 
 

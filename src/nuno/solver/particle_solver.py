@@ -262,7 +262,8 @@ class ParticleSolver:
         """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy, into ``out`` if given."""
         from nuno.solver.pack import pack_positions
 
-        return pack_positions(self._state, self.world_count, self.particle_count, self.lanes, self.device, out)
+        worlds, n, places = self.world_count, self.particle_count, self._fine.arrays
+        return pack_positions(self._state, worlds, n, self.lanes, self.device, out, places)
 
     @property
     def arrays(self) -> dict[str, wp.array]:
