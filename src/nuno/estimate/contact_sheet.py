@@ -34,7 +34,7 @@ def contact_sheet(result: PickResult) -> Figure:
     above = sheet[0].subgridspec(1, 2, wspace=0.04)
     _real(figure.add_subplot(above[0]), result, after=False)
     _real(figure.add_subplot(above[1]), result, after=True)
-    _imagined(figure.add_subplot(sheet[1]), result, n, m)
+    _imagined(figure, figure.add_subplot(sheet[1]), result, n, m)
     i, j = result.best
     figure.suptitle(
         f"picked at ({i}, {j}), confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
@@ -46,7 +46,7 @@ def contact_sheet(result: PickResult) -> Figure:
     return figure
 
 
-def _imagined(axes: Axes, result: PickResult, n: int, m: int) -> None:
+def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) -> None:
     """All candidates' futures, in one image: axes of their own for each would take most of the sheet's time."""
     from matplotlib.patches import Rectangle
 
@@ -55,7 +55,7 @@ def _imagined(axes: Axes, result: PickResult, n: int, m: int) -> None:
     high, wide = y1 - y0, x1 - x0
     # a panel is wider than high where the axes are, so that all fit and none is distorted
     place = axes.get_position()
-    width, height = axes.get_figure().get_size_inches() * (place.width, place.height)
+    width, height = figure.get_size_inches() * (place.width, place.height)
     down = max(high * (1.0 + TITLE), wide * n / width * height / m)
     across = max(wide * (1.0 + GAP), down * m / height * width / n)
     down, across = int(np.ceil(down)), int(np.ceil(across))
