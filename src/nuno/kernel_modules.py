@@ -25,11 +25,13 @@ CPU_ONLY = frozenset(
 )  # fmt: skip
 """Worlds by a thread, and in lanes of SIMD registers."""
 
-CUDA_ONLY = ("nuno.solver.run_blocks", "nuno.solver.run_fine_blocks", "nuno.solver.run_grid",
-             "nuno.solver.run_fine_grid", "nuno.solver.run_rigid_team", "nuno.solver.finite", "nuno.solver.large",
-             "nuno.solver.fine_large", "nuno.solver.broad", "nuno.solver.run_soft_blocks",
-             "nuno.solver.run_soft_few", "nuno.solver.run_soft_fine_blocks", "nuno.solver.run_soft_grid",
-             "nuno.solver.run_soft_fine_grid")  # fmt: skip
+CUDA_ONLY = tuple(
+    f"nuno.solver.{name}"
+    for name in (
+        "run_blocks", "run_fine_blocks", "run_grid", "run_fine_grid", "run_rigid_team", "finite",
+        "run_soft_blocks", "run_soft_few", "run_soft_fine_blocks", "run_soft_grid", "run_soft_fine_grid",
+    )
+)  # fmt: skip
 """Beginnings of names: worlds by blocks and by the whole device. The CPU runs some of them, when asked to."""
 
 
@@ -85,7 +87,7 @@ def _described(name: str, module: Any) -> KernelModule:
 
 
 def _blocks(name: str) -> tuple[int, ...]:
-    from nuno.solver import grid, large, shared, soft_blocks
+    from nuno.solver import grid, shared, soft_blocks
 
     few, many = shared.FEW_THREADS, shared.MANY_THREADS
     plain = name.rpartition("nuno.solver.")[2]
@@ -93,8 +95,6 @@ def _blocks(name: str) -> tuple[int, ...]:
         return (few, many)
     if plain == "run_blocks_shared":
         return (few,)
-    if plain in ("large", "fine_large"):
-        return (BLOCK, large.THREADS)
     if plain in ("run_grid", "run_fine_grid"):
         return (grid.THREADS,)
     if plain.startswith("run_soft_blocks_shared"):

@@ -29,8 +29,8 @@ def bend_stiffness(weight: Any, alpha: Any):
 
 
 @wp.func
-def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: Any):
-    """Three vertices in a row: c = x_0 - 2 x_1 + x_2; ``gamma`` is the damping over dt."""
+def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any):
+    """Three vertices in a row: c = x_0 - 2 x_1 + x_2."""
     ax = at(t.x, a)
     ay = at(t.y, a)
     az = at(t.z, a)
@@ -47,14 +47,6 @@ def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: An
     wb = at(t.w, b)
     wc = at(t.w, c)
     weight = wa + wb * 4.0 + wc
-    if damped != 0:
-        mx = at(t.px, b)
-        cx = cx + times(gamma, cx - beside(at(t.px, a), mx) + beside(mx, mx) * 2.0 - beside(at(t.px, c), mx))
-        my = at(t.py, b)
-        cy = cy + times(gamma, cy - beside(at(t.py, a), my) + beside(my, my) * 2.0 - beside(at(t.py, c), my))
-        mz = at(t.pz, b)
-        cz = cz + times(gamma, cz - beside(at(t.pz, a), mz) + beside(mz, mz) * 2.0 - beside(at(t.pz, c), mz))
-        weight = weight + times(gamma, weight)
     s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
     sa = times(s, wa)
     sb = times(s, wb) * -2.0
@@ -78,8 +70,8 @@ def twist_of(x: Any, a: Any, b: Any, c: Any, d: Any):
 
 
 @wp.func
-def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, gamma: Any):
-    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3; ``gamma`` is the damping over dt."""
+def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any):
+    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3."""
     cx = twist_of(t.x, a, b, c, d)
     cy = twist_of(t.y, a, b, c, d)
     cz = twist_of(t.z, a, b, c, d)
@@ -88,11 +80,6 @@ def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, 
     wc = at(t.w, c)
     wd = at(t.w, d)
     weight = wa + wb + wc + wd
-    if damped != 0:
-        cx = cx + times(gamma, cx - twist_of(t.px, a, b, c, d))
-        cy = cy + times(gamma, cy - twist_of(t.py, a, b, c, d))
-        cz = cz + times(gamma, cz - twist_of(t.pz, a, b, c, d))
-        weight = weight + times(gamma, weight)
     s = over(fill(cx, -1.0), bend_stiffness(weight, alpha))
     shift(t, a, cx, cy, cz, times(s, wa))
     shift(t, b, cx, cy, cz, times(-s, wb))
@@ -120,7 +107,7 @@ def total_at(x: Any, weights: Any, row: int, i0: Any, i1: Any, i2: Any, i3: Any,
 
 
 @wp.func
-def bend_patch(t: Any, table: Any, k: int, alpha: Any, damped: int, gamma: Any):
+def bend_patch(t: Any, table: Any, k: int, alpha: Any):
     """A triangle and its neighbours: three times c = sum k_i x_i - rest, one after the other.
 
     ``rest`` turns with the triangle: a sum of its two sides from vertex 0 and its unit normal. A triangle at the rim
@@ -175,14 +162,6 @@ def bend_patch(t: Any, table: Any, k: int, alpha: Any, damped: int, gamma: Any):
         weight = weight + scaled(scaled(w3, k3), k3)
         weight = weight + scaled(scaled(w4, k4), k4)
         weight = weight + scaled(scaled(w5, k5), k5)
-        if damped != 0:
-            before = total_at(t.px, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
-            cx = cx + times(gamma, cx - before)
-            before = total_at(t.py, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
-            cy = cy + times(gamma, cy - before)
-            before = total_at(t.pz, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
-            cz = cz + times(gamma, cz - before)
-            weight = weight + times(gamma, weight)
         if is_set(table.patch_curved[k]):
             r = 9 * k + 3 * j
             ex = x1 - x0
