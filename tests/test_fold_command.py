@@ -45,7 +45,7 @@ def test_the_bundled_case_end_to_end(tmp_path):
     assert final["vertices"].shape[1:] == (3,) and final["faces"].max() < len(final["vertices"])
     result = json.loads((out / "result.json").read_text())
     assert result["format"] == 1 and result["warnings"] == []
-    assert set(result["seconds"]) == {"read", "see", "imagine", "segment", "compare", "total"}
+    assert set(result["seconds"]) == {"read", "see", "compile", "imagine", "segment", "compare", "total"}
     assert result["material"]["name"] in result["scores"] and len(result["frames"]) == 113
     # against the cloth as it is found in the images, which is itself right to 0.98
     assert result["agreement"]["mean"] > 0.93 and result["agreement"]["last"] > 0.95

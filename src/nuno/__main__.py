@@ -1,4 +1,4 @@
-"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, ``fold`` likewise, and ``serve talos``."""
+"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, ``fold`` likewise, ``serve talos`` and ``compile``."""
 
 from __future__ import annotations
 
@@ -44,6 +44,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--factor", type=float, default=1.0, help="simulated over real time (default 1; inf: at full speed)"
     )
     pace.add_argument("--stepped", action="store_true", help="let time pass only while a client waits for it")
+    ahead = commands.add_parser(
+        "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
+        description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
+        "CUDA needs no device for it.",
+    )  # fmt: skip
+    ahead.add_argument("--device", choices=("cpu", "cuda"), help="default: cuda where --arch is given, else cpu")
+    ahead.add_argument(
+        "--arch", metavar="sm_NN", help="CUDA's architecture, such as sm_90 (default: of the devices here)"
+    )
+    ahead.add_argument("--only", nargs="+", metavar="MODULE", help="these modules of kernels (default: all)")
+    ahead.add_argument("--jobs", type=int, metavar="N", help="compile so many at once (default: one for each core)")
     for command in (pick, fold, serve):
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
     for command in (pick, fold):
@@ -54,7 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
-        return {"pick": _pick, "fold": _fold, "serve": _serve}[options.command](options)
+        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile}
+        return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
     except (NunoError, OSError) as error:
@@ -125,6 +137,26 @@ def _serve(options: argparse.Namespace) -> int:
         sys.stdout.flush()
         while not server.join(1.0):
             pass
+    return ANSWERED
+
+
+def _compile(options: argparse.Namespace) -> int:
+    from nuno.errors import InvalidInputError
+    from nuno.kernel_cache import compile_kernels
+
+    if options.jobs is not None and options.jobs < 1:
+        raise InvalidInputError(f"--jobs must be at least 1, got {options.jobs}")
+    _start_warp()
+    device = options.device or ("cpu" if options.arch is None else "cuda")
+    count = 0
+
+    def told(name: str, seconds: float) -> None:
+        nonlocal count
+        count += 1
+        sys.stderr.write(f"nuno: {name}: {seconds:.1f} s\n")
+
+    where = compile_kernels(device, options.arch, only=options.only, jobs=options.jobs, told=told)
+    sys.stdout.write(f"{count} modules of kernels for {options.arch or device} in {where}\n")
     return ANSWERED
 
 

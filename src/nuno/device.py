@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from nuno.errors import InvalidInputError
+from nuno.kernel_cache import take_machine_code
 
 
 def checked_device(name: Any) -> str:
@@ -30,10 +31,11 @@ def found_device(name: str) -> str:
     import warp as wp
 
     available = wp.get_cuda_device_count()
-    if name == "auto":
-        return "cuda:0" if available else "cpu"
+    if name == "auto" and not available:
+        return "cpu"
     index = int(name.partition(":")[2] or 0)
     if index >= available:
         valid = ", ".join(["cpu", *(f"cuda:{i}" for i in range(available))])
         raise InvalidInputError(f"there is no device {name!r} here; there are: {valid}")
+    take_machine_code(f"cuda:{index}")
     return f"cuda:{index}"

@@ -43,6 +43,14 @@ def test_depth_and_bodies_are_those_of_the_other_renderers():
     assert picture.color.shape == (64, 64, 3) and picture.time == world.time
 
 
+def test_depth_is_infinite_where_nothing_is_seen():
+    """Beside a box in an empty world."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.box((0.2, 0.3, 0.1)))
+    depth = take_picture(world, above()).depth.numpy()
+    assert np.isposinf(depth[0, 0]) and np.isfinite(depth[32, 32])
+
+
 def test_light_falls_by_lamberts_law():
     """A plate under a lamp at angles whose cosine is known: sky and lamp times the colour, to a level of rounding."""
     world = nuno.World(device="cpu")

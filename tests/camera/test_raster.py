@@ -101,6 +101,15 @@ def test_sphere_has_the_area_and_depth_of_the_closed_form():
     assert np.abs(raster.depths_of(keys).numpy()[0] - expected)[core].max() < limit
 
 
+@pytest.mark.parametrize("ids", [False, True])
+def test_depth_of_nothing_is_infinite(ids):
+    """Of masks' keys and of bodies', and by a kernel that was declared: another would compile the module again."""
+    before = dict(raster._to_depths.overloads)
+    keys = raster.key_images(1, Region(0, 0, 4, 3), "cpu", ids=ids)
+    assert np.isposinf(raster.depths_of(keys).numpy()).all()
+    assert raster._to_depths.overloads == before
+
+
 def test_depth_is_perspective_correct():
     """A tilted plane has the depth at which rays meet it, everywhere."""
     vertices = np.array([(-1.0, -1.0, 0.8), (1.0, -1.0, 1.4), (1.0, 1.0, 3.4), (-1.0, 1.0, 2.8)])

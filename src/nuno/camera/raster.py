@@ -300,11 +300,14 @@ def _to_ids(keys: wp.array3d[wp.int64], ids_out: wp.array3d[wp.int32]):
     ids_out[world, row, column] = label
 
 
+_to_depths_of = {}
+"""By the keys' type: launched as the kernel for any, Warp would take a background of 63 bits for an int32."""
+
 for _key in (wp.int32, wp.int64):
     wp.overload(_draw_triangles, {"keys": wp.array3d[_key]})
     wp.overload(_draw_depth, {"keys": wp.array3d[_key]})
     wp.overload(_copy_layer, {"layer": wp.array3d[_key], "keys": wp.array3d[_key]})
-    wp.overload(_to_depths, {"keys": wp.array3d[_key], "background": _key})
+    _to_depths_of[_key] = wp.overload(_to_depths, {"keys": wp.array3d[_key], "background": _key})
 
 
 def load(device: str | wp.Device) -> None:
@@ -405,7 +408,7 @@ def depths_of(keys: wp.array, *, out: wp.array | None = None) -> wp.array:
     out = wp.empty(keys.shape, dtype=wp.float32, device=keys.device) if out is None else out
     wide = keys.dtype == wp.int64
     arguments = [ID_BITS, ID_BACKGROUND] if wide else [1, MASK_BACKGROUND]
-    wp.launch(_to_depths, dim=keys.shape, inputs=[keys, *arguments, out], device=keys.device)
+    wp.launch(_to_depths_of[keys.dtype], dim=keys.shape, inputs=[keys, *arguments, out], device=keys.device)
     return out
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -22,6 +21,7 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_after, segment_before
 from nuno.camera.table import Table
+from nuno.compile_watch import Stages, compiling_watched
 from nuno.device import checked_device, found_device
 from nuno.errors import ClothNotFoundError, InvalidInputError
 from nuno.estimate.fold_result import FoldResult
@@ -59,6 +59,7 @@ REST_SPEED = 0.05
 Picture = ArrayLike | str | FilePath
 
 
+@compiling_watched()
 def replay_fold(
     first_image: Picture | None,
     hands: Sequence[HandPath],
@@ -119,7 +120,7 @@ def replay_fold(
         EstimationError: what lies there is no rectangle.
         SimulationDiverged: a state stopped being finite.
     """
-    started = time.perf_counter()
+    stages = Stages("read", "see", "compile", "imagine", "segment", "compare")
     camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
     table = _table(table_height, table_half_extents, table_centre, table_thickness)
     paths = _checked_hands(hands)
@@ -133,9 +134,8 @@ def replay_fold(
     before = _picture(first_image, camera, "the first image")
     seen_images = {k: _picture(v, camera, f"the image of frame {k}") for k, v in _by_frame("images", images, times)}
     given = {k: _mask(v, camera, f"the mask of frame {k}") for k, v in _by_frame("masks", masks, times)}
-    seconds = {"read": time.perf_counter() - started}
+    stages.end("read")
 
-    clock = time.perf_counter()
     lying = None if first_mask is None else check_mask(first_mask, camera, "first_mask")
     if lying is None and before is not None:
         lying = segment_before(before, camera, table, hint=hint)
@@ -143,18 +143,16 @@ def replay_fold(
         if lying is None:
             raise InvalidInputError("the first image is needed, or first_mask, or rectangle")
         rectangle = fit_rectangle(lying, before, camera, table.height + rest_height)
-    seconds["see"] = time.perf_counter() - clock
+    stages.end("see")
 
-    clock = time.perf_counter()
     size = cell_counts(rectangle.long_m, rectangle.short_m, cells, (2, 2))
     world, cloth = table_world(rectangle, table, size, device=device, substeps=substeps)
     fold = imagine_fold(
         world, cloth, paths, list(known.values()), begin=float(times[0]), end=float(times[-1]),
         reach=hand_radius + REACH,
     )  # fmt: skip
-    seconds["imagine"] = time.perf_counter() - clock
+    stages.end("imagine")
 
-    clock = time.perf_counter()
     warnings = [*rectangle.warnings, *_hold_warnings(fold, hand_radius + REACH)]
     at = np.stack([hand.at(times) for hand in paths], axis=1)
     held = np.array([[hand.holds_at(t) for hand in paths] for t in times])
@@ -163,9 +161,8 @@ def replay_fold(
     if before is not None and lying is not None:
         looked_for = {k: fold.at(times[[k]], 0)[0] for k in seen_images if k not in given}
         real |= _segmented(seen_images, before, lying, camera, table, looked_for, warnings, progress)
-    seconds["segment"] = time.perf_counter() - clock
+    stages.end("segment")
 
-    clock = time.perf_counter()
     faces = np.asarray(fold.body.faces)
     spheres = hand_spheres(at, there, max(hand_radius, 1e-4))
     around = {k: _around(camera, at[k], there[k], hand_radius) for k in real}
@@ -193,15 +190,14 @@ def replay_fold(
     speed = _last_speed(fold, best)
     if speed > REST_SPEED:
         warnings.append(f"the cloth still moves at the last frame, by {speed:.2f} m/s")
-    seconds["compare"] = time.perf_counter() - clock
-    seconds["total"] = time.perf_counter() - started
+    stages.end("compare")
     for warning in warnings:
         log.warning("%s", warning)
     return FoldResult(
         times=times, vertices=vertices, faces=faces, masks=drawn, real=real, agreement=agreements[best],
         given=frozenset(given), material_name=list(known)[best], material=list(known.values())[best], scores=scores,
         rectangle=rectangle, camera=camera, hands=paths, hands_at=at, hands_seen=there, hand_radius=hand_radius,
-        seconds=seconds, warnings=warnings, fold=fold, best_index=best, images=seen_images, first_image=before,
+        seconds=stages.total(), warnings=warnings, fold=fold, best_index=best, images=seen_images, first_image=before,
     )  # fmt: skip
 
 

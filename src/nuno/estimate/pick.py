@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -21,6 +20,7 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table, table_margin
+from nuno.compile_watch import Stages, compiling_watched
 from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
@@ -46,6 +46,7 @@ MOST_CANDIDATES = 1024
 """Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
 
 
+@compiling_watched()
 def estimate_pick(
     before: ArrayLike | str | FilePath | None,
     after: ArrayLike | str | FilePath | None,
@@ -126,8 +127,7 @@ def estimate_pick(
         ClothNotFoundError: no cloth in an image.
         EstimationError: no candidate gave a finite future.
     """
-    started = time.perf_counter()
-    seconds: dict[str, float] = {}
+    stages = Stages("read", "see", "compile", "imagine", "compare")
     camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
     table = Table(
         number("table_height", table_height),
@@ -157,8 +157,7 @@ def estimate_pick(
     if image_before is not None and image_after is not None and np.array_equal(image_before, image_after):
         raise InvalidInputError("the image after is the image before: nothing was picked up between them")
     wait_for_kernels = compile_ahead(device)
-    seconds["read"] = time.perf_counter() - started
-    clock = time.perf_counter()
+    stages.end("read")
     mask_before = None if before_mask is None else check_mask(before_mask, camera, "before_mask")
     if mask_before is None and (rectangle is None or after_mask is None):
         if image_before is None:
@@ -176,11 +175,11 @@ def estimate_pick(
         with_pattern=score == "evidence",
         meanwhile=device != "cpu" or len(os.sched_getaffinity(0)) > 1,
     )  # fmt: skip
-    seconds["see"] = time.perf_counter() - clock
+    stages.end("see")
     with with_clock("compiling kernels, which are kept for later runs", progress):
         wait_for_kernels()
+    stages.end("compile")
 
-    seconds["imagine"] = seconds["compare"] = 0.0
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
     ranked: Ranked | None = None
@@ -192,18 +191,15 @@ def estimate_pick(
     )  # fmt: skip
     ahead = Ahead(uv, **settings) if has_room(device) else None
     for k, discretisation in enumerate(with_bar(discretisations, "imagining", progress, "mesh")):
-        clock = time.perf_counter()
         chosen = np.arange(len(uv))
         if ranked is not None and discretisation.best is not None:
             chosen = ranked.plausible(discretisation.best)
         futures: Futures | None = None if ahead is None else ahead.part(discretisations[k:], chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **settings)
-        seconds["imagine"] += time.perf_counter() - clock
-        clock = time.perf_counter()
+        stages.end("imagine")
         seen = wait_for_seen()
-        seconds["see"] += time.perf_counter() - clock
-        clock = time.perf_counter()
+        stages.end("see")
         values = score_futures(
             futures, seen.camera, seen.silhouette, table, pattern=seen.pattern, turns=angles, hand=hand_at,
             coarse=seen.coarse,
@@ -221,21 +217,19 @@ def estimate_pick(
         comparisons.append(comparison)
         batches.append(futures)
         ranked = rank(comparisons, score, len(uv), before_seen)
-        seconds["compare"] += time.perf_counter() - clock
+        stages.end("compare")
         if ranked.settled(sure):
             break
     assert ranked is not None
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    clock = time.perf_counter()
     chosen_batch, best_index, best_turn = _most_alike(comparisons, score, int(ranked.order[0]))
     masks = _masks(comparisons, batches, score, seen.camera, table, hand_at)
     best_batch, best_index = batches[chosen_batch].whole(best_index)
-    seconds["compare"] += time.perf_counter() - clock
-    seconds["total"] = time.perf_counter() - started
+    stages.end("compare")
     result = PickResult(
         labels=labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name,
-        eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=seconds,
+        eq1=ranked.eq1, rectangle=rectangle, camera=camera, grid=grid, seconds=stages.total(),
         futures=best_batch, best_index=best_index, turn=best_turn, hand=hand_at, masks=masks,
         real=seen.silhouette, image_before=image_before, image_after=image_after, mask_before=mask_before,
         mask_after=seen.mask, seen_warnings=seen.warnings, sideways=sideways if score in EVIDENCE else None,

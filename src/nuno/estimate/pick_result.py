@@ -189,7 +189,8 @@ class PickResult:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "result.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
         if picture:
-            self.figure().savefig(folder / "result.png", dpi=110)
+            # packed no harder than is quick: a third larger, in a third of the time
+            self.figure().savefig(folder / "result.png", dpi=110, pil_kwargs={"compress_level": 1})
 
     def _label(self, k: int) -> tuple[Any, Any]:
         a, b = self.labels[k]

@@ -1,0 +1,31 @@
+"""CUDA's side of every kernel, seen without a GPU: each module that CUDA runs is compiled to PTX for an H100 or H200.
+
+Native snippets have a branch for CUDA, which no other test looks at on a machine without a device. Warp keeps what was
+compiled in its cache, by a hash of the source, so that only what has changed is compiled again.
+"""
+
+import pytest
+import warp as wp
+
+from nuno.kernel_modules import kernel_modules
+
+ARCHITECTURE = 90
+MODULES = {module.name: module for module in kernel_modules() if "cuda" in module.devices}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODULES)
+def test_module_compiles_to_ptx(name):
+    """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
+    module, blocks = MODULES[name].module, MODULES[name].blocks
+    kept = dict(wp.get_module_options(module))
+    wp.set_module_options({"block_dim": blocks[0]}, module=module)
+    try:
+        (made,) = wp.compile_aot_module(module, arch=ARCHITECTURE, use_ptx=True)
+    finally:
+        wp.set_module_options(kept, module=module)
+    ptx = made.read_text()
+    kernels = [each for kernel in module.kernels.values() for each in (kernel.overloads or {"": kernel}).values()]
+    assert kernels
+    for kernel in kernels:
+        assert f".entry {kernel.key}_" in ptx, kernel.key
