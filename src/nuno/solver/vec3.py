@@ -2,8 +2,9 @@
 
 `Vec3` is one world's vector of floats, `LaneVec3` that of the sixteen worlds or elements in the lanes of vectors.
 `FineVec3` and `FineLaneVec3` are places whose coordinates are doubles (`nuno.solver.fine`): the difference of two of
-them is a vector of floats, and a place moved by such a vector is a place. The functions of particles read and write
-their three arrays at once, by an index or by a vector of sixteen (`nuno.solver.vector`).
+them is a vector of floats, and a place moved by such a vector is a place. `Mat3` and `LaneMat3` are matrices of three
+rows. The functions of particles read and write their three arrays at once, by an index or by a vector of sixteen
+(`nuno.solver.vector`).
 
 Sums run from x to z, and each product is rounded by itself, as if every coordinate were written out.
 """
@@ -13,7 +14,7 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.fine import fine, fine_lane
-from nuno.solver.lanes import add, beside, div, lane, mul, sub
+from nuno.solver.lanes import add, beside, choose, div, gather, lane, mul, rough, sub
 from nuno.solver.vector import at, put
 
 
@@ -53,6 +54,24 @@ class FineLaneVec3:
     z: fine_lane
 
 
+@wp.struct
+class Mat3:
+    """A matrix of three rows."""
+
+    x: Vec3
+    y: Vec3
+    z: Vec3
+
+
+@wp.struct
+class LaneMat3:
+    """A matrix of three rows of lanes."""
+
+    x: LaneVec3
+    y: LaneVec3
+    z: LaneVec3
+
+
 @wp.func
 def vec3(x: float, y: float, z: float):
     """The vector of three numbers."""
@@ -88,6 +107,25 @@ def vec3(x: fine_lane, y: fine_lane, z: fine_lane):
     v.y = y
     v.z = z
     return v
+
+
+@wp.func
+def mat3(x: Vec3, y: Vec3, z: Vec3):
+    """The matrix of three rows."""
+    m = Mat3()
+    m.x = x
+    m.y = y
+    m.z = z
+    return m
+
+
+@wp.func
+def mat3(x: LaneVec3, y: LaneVec3, z: LaneVec3):
+    m = LaneMat3()
+    m.x = x
+    m.y = y
+    m.z = z
+    return m
 
 
 @wp.func
@@ -193,6 +231,74 @@ def cross(a: Any, b: Any):
 
 
 @wp.func
+def sub(a: Mat3, b: Mat3):
+    return mat3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+@wp.func
+def sub(a: LaneMat3, b: LaneMat3):
+    return mat3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+@wp.func
+def mul(m: Mat3, v: Vec3):
+    return vec3(dot(m.x, v), dot(m.y, v), dot(m.z, v))
+
+
+@wp.func
+def mul(m: LaneMat3, v: LaneVec3):
+    return vec3(dot(m.x, v), dot(m.y, v), dot(m.z, v))
+
+
+@wp.func
+def transposed_mul(m: Any, v: Any):
+    """The product of a matrix, transposed, and a vector: of a rotation, its inverse's."""
+    x = m.x.x * v.x + m.y.x * v.y + m.z.x * v.z
+    y = m.x.y * v.x + m.y.y * v.y + m.z.y * v.z
+    z = m.x.z * v.x + m.y.z * v.y + m.z.z * v.z
+    return vec3(x, y, z)
+
+
+@wp.func
+def less_product(a: Any, m: Any, v: Any):
+    """The vector a - m v, one product taken off after the other."""
+    x = a.x - m.x.x * v.x - m.x.y * v.y - m.x.z * v.z
+    y = a.y - m.y.x * v.x - m.y.y * v.y - m.y.z * v.z
+    z = a.z - m.z.x * v.x - m.z.y * v.y - m.z.z * v.z
+    return vec3(x, y, z)
+
+
+@wp.func
+def choose(sign: float, a: Vec3, b: Vec3):
+    return vec3(choose(sign, a.x, b.x), choose(sign, a.y, b.y), choose(sign, a.z, b.z))
+
+
+@wp.func
+def choose(sign: lane, a: LaneVec3, b: LaneVec3):
+    return vec3(choose(sign, a.x, b.x), choose(sign, a.y, b.y), choose(sign, a.z, b.z))
+
+
+@wp.func
+def rough(a: Vec3):
+    return a
+
+
+@wp.func
+def rough(a: LaneVec3):
+    return a
+
+
+@wp.func
+def rough(a: FineVec3):
+    return vec3(rough(a.x), rough(a.y), rough(a.z))
+
+
+@wp.func
+def rough(a: FineLaneVec3):
+    return vec3(rough(a.x), rough(a.y), rough(a.z))
+
+
+@wp.func
 def offset(a: Any, base: Any):
     """A place in a sum whose weights add up to zero; where it is in doubles, what it exceeds ``base`` by."""
     return vec3(beside(a.x, base.x), beside(a.y, base.y), beside(a.z, base.z))
@@ -202,6 +308,12 @@ def offset(a: Any, base: Any):
 def position(t: Any, i: Any):
     """Particle i's position."""
     return vec3(at(t.x, i), at(t.y, i), at(t.z, i))
+
+
+@wp.func
+def gather_position(t: Any, i: Any):
+    """Particle i's position; with lanes, each lane's own particle of its own world."""
+    return vec3(gather(t.x, i), gather(t.y, i), gather(t.z, i))
 
 
 @wp.func
