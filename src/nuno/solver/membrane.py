@@ -31,12 +31,6 @@ def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
 
 
 @wp.func
-def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
-    """Move particle i by s (dx, dy, dz)."""
-    move(t, i, vec3(dx, dy, dz) * s)
-
-
-@wp.func
 def stretch_yarn(
     t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
 ):
