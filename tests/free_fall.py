@@ -58,6 +58,7 @@ class FreeFall:
         # never fast: no figures of a run, and as thick as may be
         self.frame_rate, self._state = frame_rate, SimpleNamespace(notes=None)
         self._scalars = np.full((len(self.x), 8), 1e6)
+        self.guarded = np.zeros(len(self.x), dtype=int)  # nor crossed
 
     def _get(self, array, count):
         """No figures."""
@@ -143,4 +144,6 @@ def free_fall(monkeypatch):
     """Let worlds use the stand-in."""
     monkeypatch.setattr(nuno.dynamics, "backend", lambda: (FreeFall, Topology, Colliders))
     monkeypatch.setattr(FreeFall, "diverging", False)
+    # it never touches itself
+    monkeypatch.setattr("nuno.contact.crossed.crossed_worlds", lambda solver: np.zeros(len(solver.x), dtype=bool))
     return FreeFall

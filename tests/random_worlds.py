@@ -56,6 +56,10 @@ class RandomWorld:
         """The dynamic bodies."""
         return [body for body in self.world.bodies if body.is_dynamic]
 
+    def movable(self):
+        """All bodies besides the floor, the static ones first."""
+        return [*self.static(), *self.dynamic()]
+
     def grips(self):
         """The active grips, in the world's order."""
         return [grip for body in self.dynamic() for grip in body._dynamics.grips]
@@ -77,12 +81,21 @@ class RandomWorld:
         return self
 
 
-def operation(weight):
-    """Register an operation, which comes as often as its weight says."""
+def operation(weight, of=None):
+    """Register an operation, which comes as often as its weight says.
+
+    With ``of``, a method of ``RandomWorld``, it takes one of what that gives, and is nothing where there is none.
+    """
 
     def register(function):
-        OPERATIONS[function] = weight
-        return function
+        def happen_to_one(scene):
+            picked = scene.pick(of(scene))
+            if picked is not None:
+                function(scene, picked)
+
+        act = function if of is None else functools.wraps(function)(happen_to_one)
+        OPERATIONS[act] = weight
+        return act
 
     return register
 
@@ -153,61 +166,47 @@ def join(scene):
         kind(body, other, **where, **along)
 
 
-@operation(1)
-def remove(scene):
+@operation(1, RandomWorld.movable)
+def remove(scene, body):
     """Any body, whatever holds it or is held by it."""
-    body = scene.pick([*scene.static(), *scene.dynamic()])
-    if body is not None:
-        scene.world.remove(body)
+    scene.world.remove(body)
 
 
-@operation(10)
-def attach(scene):
+@operation(10, RandomWorld.static)
+def attach(scene, body):
     """A static body."""
-    body = scene.pick(scene.static())
-    if body is not None:
-        scene.world.attach(body, material_for(scene, body))
+    scene.world.attach(body, material_for(scene, body))
 
 
-@operation(2)
-def detach(scene):
+@operation(2, RandomWorld.dynamic)
+def detach(scene, body):
     """A dynamic body."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        scene.world.detach(body)
+    scene.world.detach(body)
 
 
-@operation(3)
-def attach_as_another(scene):
+@operation(3, RandomWorld.dynamic)
+def attach_as_another(scene, body):
     """A dynamic body, at once with another material, also of another kind."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        scene.world.detach(body)
-        scene.world.attach(body, material_for(scene, body))
+    scene.world.detach(body)
+    scene.world.attach(body, material_for(scene, body))
 
 
-@operation(2)
-def attach_and_keep_velocity(scene):
+@operation(2, RandomWorld.dynamic)
+def attach_and_keep_velocity(scene, body):
     """A dynamic body, with another material, also of another kind, as it moves."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        scene.world.attach(body, material_for(scene, body), keep_velocity=True)
+    scene.world.attach(body, material_for(scene, body), keep_velocity=True)
 
 
-@operation(2)
-def set_velocity(scene):
+@operation(2, RandomWorld.dynamic)
+def set_velocity(scene, body):
     """Another velocity of a dynamic body, also a turn."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        scene.world.set_velocity(body, scene.random.normal(0.0, 0.3, 3), scene.random.normal(0.0, 1.0, 3))
+    scene.world.set_velocity(body, scene.random.normal(0.0, 0.3, 3), scene.random.normal(0.0, 1.0, 3))
 
 
-@operation(1)
-def set_material(scene):
+@operation(1, RandomWorld.dynamic)
+def set_material(scene, body):
     """Another material of the same kind, as the body moves."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        scene.world.set_material(body, material_for(scene, body))
+    scene.world.set_material(body, material_for(scene, body))
 
 
 @operation(4)
@@ -220,7 +219,8 @@ def grip(scene):
     targets = [body.position + scene.random.uniform(-0.02, 0.02, 3), path_from(scene, body.position), *others[:2]]
     free = (1.0, 0.0, 0.0) if isinstance(body.material, nuno.Rigid) and scene.random.random() < 0.2 else None
     compliance = scene.pick([0.0, 1e-4, 1e-3])
-    scene.world.grip(body, points_of(scene, body), to=scene.pick(targets), compliance=compliance, free=free)
+    limit = {"max_force": scene.pick([1.0, 50.0])} if scene.random.random() < 0.4 else {}
+    scene.world.grip(body, points_of(scene, body), to=scene.pick(targets), compliance=compliance, free=free, **limit)
 
 
 @operation(2)
@@ -232,54 +232,42 @@ def weld(scene):
         scene.world.weld(bodies[a], bodies[b], points_of(scene, bodies[a]), compliance=scene.pick([0.0, 1e-4]))
 
 
-@operation(2)
-def release(scene):
+@operation(2, RandomWorld.grips)
+def release(scene, grip):
     """A grip."""
-    grip = scene.pick(scene.grips())
-    if grip is not None:
-        grip.release()
+    grip.release()
 
 
-@operation(4)
-def push(scene):
+@operation(4, RandomWorld.dynamic)
+def push(scene, body):
     """A dynamic body, for a while or until the next such push; a rigid one is turned, too."""
-    body = scene.pick(scene.dynamic())
-    if body is not None:
-        duration = scene.pick([None, 1.0 / 60.0, 0.1, float(scene.random.uniform(0.01, 0.2))])
-        torque = scene.random.uniform(-0.01, 0.01, 3) if isinstance(body.material, nuno.Rigid) else None
-        scene.world.push(body, scene.random.uniform(-0.5, 0.5, 3), torque, duration)
+    duration = scene.pick([None, 1.0 / 60.0, 0.1, float(scene.random.uniform(0.01, 0.2))])
+    torque = scene.random.uniform(-0.01, 0.01, 3) if isinstance(body.material, nuno.Rigid) else None
+    scene.world.push(body, scene.random.uniform(-0.5, 0.5, 3), torque, duration)
 
 
-@operation(2)
-def locate(scene):
+@operation(2, RandomWorld.movable)
+def locate(scene, body):
     """Any body, elsewhere, at any turn."""
-    body = scene.pick([*scene.static(), *scene.dynamic()])
-    if body is not None:
-        body.locate(scene.place()).rotate(scene.random.uniform(0.0, 3.0), scene.random.normal(size=3))
+    body.locate(scene.place()).rotate(scene.random.uniform(0.0, 3.0), scene.random.normal(size=3))
 
 
-@operation(1)
-def nudge(scene):
+@operation(1, RandomWorld.movable)
+def nudge(scene, body):
     """Any body, a little."""
-    body = scene.pick([*scene.static(), *scene.dynamic()])
-    if body is not None:
-        body.translate(scene.random.uniform(-0.01, 0.01, 3))
+    body.translate(scene.random.uniform(-0.01, 0.01, 3))
 
 
-@operation(4)
-def move(scene):
+@operation(4, RandomWorld.static)
+def move(scene, body):
     """A static body, along a path."""
-    body = scene.pick(scene.static())
-    if body is not None:
-        scene.world.move(body, path_from(scene, body.position))
+    scene.world.move(body, path_from(scene, body.position))
 
 
-@operation(1)
-def end_path(scene):
+@operation(1, RandomWorld.static)
+def end_path(scene, body):
     """A static body stays where it is."""
-    body = scene.pick(scene.static())
-    if body is not None:
-        scene.world.move(body, None)
+    scene.world.move(body, None)
 
 
 @operation(1)

@@ -194,3 +194,21 @@ def test_a_timed_push_ends_in_copies(kind, after):
     futures.run(1.1 - after)
     world.run(1.1 - after)
     np.testing.assert_array_equal(futures.find("body").vertices, np.repeat(body.vertices[None], 2, axis=0))
+
+
+def test_pushes_end_at_instants_that_rounding_alone_keeps_apart():
+    """Two pushes that both end at 0.3 s, but for rounding, end together, also where something follows a path."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    boxes = [world.add(nuno.box((0.1, 0.1, 0.1), position=(x, 0, 1.0))) for x in (0.0, 1.0)]
+    rail = world.add(nuno.box((0.1, 0.1, 0.1)))
+    for box in boxes:
+        world.attach(box, nuno.Rigid(mass=1.0))
+    world.push(boxes[0], (1.0, 0, 0), duration=0.3)
+    world.run(0.1)
+    world.push(boxes[1], (1.0, 0, 0), duration=0.2)
+    ends = [box._dynamics.pushes[0].end for box in boxes]
+    assert 0 < abs(ends[1] - ends[0]) < 1e-15
+    world.move(rail, nuno.Path([0.0, 1.0], [(0, 0, 0), (0, 0, -1)]))
+    world.attach(world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=(3, 0, 0))))
+    world.run(0.5)
+    np.testing.assert_allclose([box.velocity[0] for box in boxes], [0.3, 0.2], rtol=1e-5)

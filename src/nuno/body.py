@@ -287,9 +287,11 @@ class Body(Quantities, Coordinates):
         if self._deformed is None:
             return apply(pose, self._shape.mesh()[0])
         vertices, base = self._deformed
-        if all(np.array_equal(a, b) for a, b in zip(pose, base, strict=True)):
+        stays = np.logical_and(*((a == b).all(axis=-1) for a, b in zip(pose, base, strict=True)))
+        if stays.all():
             return vertices
-        return apply(compose(pose, invert(base)), vertices)
+        # where only some worlds' bodies were moved, the others' vertices are not rounded
+        return np.where(stays[..., None, None], vertices, apply(compose(pose, invert(base)), vertices))
 
     def local_vertices(self) -> np.ndarray:
         """Return the vertices of the static body in its own frame, (n, 3) or (worlds, n, 3) [m], read-only."""

@@ -14,14 +14,14 @@ from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coupled_joints import CoupledJoints
 from nuno.dynamics import ParticleDynamics, touches_itself
-from nuno.grip import Grip, tell_unmet
+from nuno.grip import Grip, GripSpec, tell_unmet
 from nuno.joint import Joint
 from nuno.rigid_dynamics import RigidDynamics
 from nuno.scene.coupled import RigidPart, SurfaceOfParticles, SurfaceOfRigid, joined_particles, make_elements
 from nuno.scene.ridges import Ridges, ridges_of
 from nuno.solver.coupling import Coupling
 from nuno.solver.state import THICKNESS
-from nuno.tie import HoldSpec, TieSpec
+from nuno.tie import HoldSpec, TieSpec, corners_of
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -80,7 +80,7 @@ class CoupledBodies:
         elements = make_elements(
             surfaces, [self._surface(body) for body in self.rigid], *self._rules(), str(world.device)
         )
-        self._point_ties = [grip for grip in ties if isinstance(grip._spec, TieSpec)]
+        self._point_ties = [grip for grip in ties if isinstance(grip._spec, TieSpec | GripSpec)]
         self._frame_holds = [grip for grip in ties if isinstance(grip._spec, HoldSpec)]
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
@@ -111,6 +111,7 @@ class CoupledBodies:
         """
         self.kept = kept
         self._lead_holds(time, duration)
+        self._lead_ties(time, duration)
         self._joints.bring()
         if self.rigid and self._world._rigid is not None:
             self.coupling.led = self._world._rigid.lead(self._world, time, duration)
@@ -260,25 +261,31 @@ class CoupledBodies:
 
     def _make_ties(self) -> Ties:
         worlds, device = self._world.world_count, str(self._world.device)
-        corners, weights, slots, points, compliance = [], [], [], [], []
+        corners, weights, slots, points, led, compliance = [], [], [], [], [], []
         self._tie_counts: list[int] = []
         for grip in self._point_ties:
-            spec: TieSpec = grip._spec
-            k = spec.corners.shape[1]
+            spec: TieSpec | GripSpec = grip._spec
+            own_corners, own_weights = corners_of(spec)
+            k = own_corners.shape[1]
             self._tie_counts.append(k)
             first = self._first[grip.body]
             four = np.full((worlds, k, 4), -1, dtype=np.int32)
             share = np.zeros((worlds, k, 4))
-            own = spec.corners >= 0
-            if spec.places is not None:
-                four[..., :3] = np.where(own, spec.corners + first, -1)
-                share[..., :3] = np.where(own, spec.weights, 0.0)
+            own = own_corners >= 0
+            led.append(np.full(k, isinstance(spec, GripSpec)))
+            if isinstance(spec, GripSpec) or spec.places is not None:
+                four[..., :3] = np.where(own, own_corners + first, -1)
+                share[..., :3] = np.where(own, own_weights, 0.0)
+            if isinstance(spec, GripSpec):
+                slots.append(np.full((worlds, k), -1))
+                points.append(np.zeros((worlds, k, 3)))
+            elif spec.places is not None:
                 other: Any = grip.target._dynamics  # type: ignore[union-attr]
                 slots.append(np.full((worlds, k), other.slot))
                 points.append(spec.places - other.centre)
             else:
                 assert spec.other_corners is not None and spec.other_weights is not None
-                four[..., :1] = np.where(own, spec.corners + first, -1)[..., :1]
+                four[..., :1] = np.where(own, own_corners + first, -1)[..., :1]
                 share[..., 0] = 1.0
                 four[..., 1:] = spec.other_corners + self._first[grip.target]  # type: ignore[index]
                 share[..., 1:] = -spec.other_weights
@@ -299,6 +306,8 @@ class CoupledBodies:
 
         ties.corners, ties.weights = put(corners, wp.vec4i, 4), put(weights, wp.vec4, 4)
         ties.slot, ties.point, ties.compliance = put(slots, int), put(points, wp.vec3, 3), put(compliance, float)
+        ties.led = put(led, int)
+        ties.place = wp.zeros(max(1, 2 * worlds * ties.count), dtype=wp.vec3, device=device)
         owners = np.repeat([self.bodies.index(grip.body) for grip in self._point_ties], self._tie_counts)
         ties.body = wp.array(owners.astype(np.int32) if ties.count else np.zeros(1, np.int32), dtype=int, device=device)
         for name, kind in (("pull", wp.vec3), ("total", wp.vec3), ("unmet", int)):
@@ -312,12 +321,24 @@ class CoupledBodies:
 
     def _tie_points(self, grip: Grip) -> np.ndarray:
         """(worlds, k, 3), where the points of the body are now."""
-        spec: TieSpec = grip._spec
+        corners, weights = corners_of(grip._spec)
         worlds = self._world.world_count
         own = np.broadcast_to(grip.body._vertices(), (worlds, *grip.body._vertices().shape[-2:]))
         rows = np.arange(worlds)[:, None, None]
-        weights = np.where(spec.corners >= 0, spec.weights, 0.0)
-        return np.einsum("wkc,wkcx->wkx", weights, own[rows, np.maximum(spec.corners, 0)])
+        weights = np.where(corners >= 0, weights, 0.0)
+        return np.einsum("wkc,wkcx->wkx", weights, own[rows, np.maximum(corners, 0)])
+
+    def _lead_ties(self, time: float, duration: float) -> None:
+        """Where the points of grips with a limit are led when the frame begins and ends."""
+        specs: list[Any] = [grip._spec for grip in self._point_ties]
+        if any(isinstance(spec, GripSpec) for spec in specs):
+            times, worlds = np.array([time, time + duration]), self._world.world_count
+            nowhere = [np.zeros((worlds, count, 2, 3)) for count in self._tie_counts]
+            places = [
+                spec.at(times) if isinstance(spec, GripSpec) else none
+                for spec, none in zip(specs, nowhere, strict=True)
+            ]
+            self.coupling.tie_places = np.concatenate(places, axis=1)
 
     def _make_holds(self) -> Holds:
         worlds, device, count = self._world.world_count, str(self._world.device), len(self._frame_holds)

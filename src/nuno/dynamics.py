@@ -125,9 +125,12 @@ class Dynamics:
         """Give back what the world holds for the body."""
 
     def add_push(self, push: Push) -> None:
-        """Add a push; one without an end takes the place of the last such push."""
+        """Add a push; one without an end takes the place of the last such push.
+
+        One with an end that is nothing here may be something in other worlds of a batch, whose frame it ends, too.
+        """
         kept = [other for other in self.pushes if push.end is not None or other.end is not None]
-        self.pushes = [*kept, push] if push.force.any() else kept
+        self.pushes = [*kept, push] if push.end is not None or push.force.any() else kept
 
     def pushing(self, time: float) -> tuple[Push, ...]:
         """Return the pushes that act from ``time`` [s] on."""
@@ -238,6 +241,9 @@ class ParticleDynamics(Dynamics):
     def prepare(self, time: float, frame: float) -> None:
         """Bring the grips and pushes of a span from ``time`` on; a leading body's last move takes a ``frame`` [s]."""
         grips = [grip for grip in self.grips if not grip.is_tie]
+        for grip in self.grips:
+            if grip.is_tie and grip._offsets is not None:
+                grip._spec_for(time, frame)
         if self.grips_changed or any(grip.target is not None for grip in grips):
             self.solver.set_grips([grip._spec_for(time, frame) for grip in grips])
             self.grips_changed = False

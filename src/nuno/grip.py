@@ -38,6 +38,8 @@ class GripSpec:
         positions: (worlds, k, m, 3) float64 [m], where each point is at each time.
         interpolation: "linear" or "minimum_jerk", between the times; before and after them the point is held.
         compliance: [m/N], 0 is stiff.
+        max_force: (worlds,) float64 [N], the most that each point bears, or None: no limit. With one, the grip is
+            solved beside the body's contacts, as a tie.
     """
 
     vertices: np.ndarray | None
@@ -47,6 +49,15 @@ class GripSpec:
     positions: np.ndarray
     interpolation: str
     compliance: float
+    max_force: np.ndarray | None = None
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return where the points are led at ``times`` (n,) [s]: (worlds, k, n, 3) float64 [m]."""
+        worlds, k, m = self.positions.shape[:3]
+        path = object.__new__(Path)  # its numbers were checked when the grip was made: this runs every tick
+        keys = self.positions.reshape(worlds * k, m, 3)
+        path.__dict__.update(times=self.times, positions=keys, quaternions=None, interpolation=self.interpolation)
+        return path.at(times).reshape(worlds, k, len(times), 3)
 
 
 class Grip:
@@ -94,9 +105,11 @@ class Grip:
     def max_force(self) -> Any:
         """[N], the most that it bears, a number or (worlds,); of a rigid body's turns as much [N m].
 
-        Infinite for points that follow a path, a place or a static body.
+        Infinite for points that follow a path, a place or a static body, unless a limit was asked for; each point
+        bears it.
         """
-        limit = np.atleast_1d(getattr(self._spec, "max_force", np.inf))
+        given = getattr(self._spec, "max_force", None)
+        limit = np.atleast_1d(np.inf if given is None else given)
         return float(limit[0]) if len(limit) == 1 else limit.copy()
 
     @property
@@ -106,8 +119,8 @@ class Grip:
 
     @property
     def is_tie(self) -> bool:
-        """Whether it joins bodies that move, or holds a rigid body: it is then solved with their contacts."""
-        return not isinstance(self._spec, GripSpec)
+        """Whether it joins bodies that move, holds a rigid body or has a limit: it is then solved with contacts."""
+        return not isinstance(self._spec, GripSpec) or self._spec.max_force is not None
 
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:
@@ -219,9 +232,21 @@ def tell_shared(grip: Grip) -> None:
             )  # fmt: skip
 
 
+def _tell_jump(body: Body, places: np.ndarray, jump: float) -> None:
+    """Warn where a stiff grip leads points farther at once [m] than edges are long, by the vertices' ``places``."""
+    corners = places[body.faces]
+    edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean())
+    if jump > edge:
+        log.warning(
+            "the grip on %r leads its points %.4g m at once, in its first substep, and edges are %.4g m long: that is "
+            "a blow. Begin the path where the mean of the points is, or give the grip a compliance",
+            body.name, jump, edge,
+        )  # fmt: skip
+
+
 def _stiff_vertices(grip: Grip) -> np.ndarray | None:
     spec = grip._spec
-    return spec.vertices if isinstance(spec, GripSpec) and spec.compliance == 0.0 else None
+    return spec.vertices if isinstance(spec, GripSpec) and not grip.is_tie and spec.compliance == 0.0 else None
 
 
 def make_grip(
@@ -252,11 +277,7 @@ def make_grip(
     if target is not None and target._dynamics is not None:
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
-    if max_force is not None:
-        raise InvalidInputError(
-            f"max_force is for rigid bodies and for grips led by a dynamic body; points of {body.name!r} follow a "
-            "path, a place or a static body exactly: give a compliance [m/N] to let them yield"
-        )
+    most = None if max_force is None else force_limit(max_force, worlds)
     present = body.vertices
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
@@ -271,8 +292,7 @@ def make_grip(
     mean = np.where(valid[..., None], held, 0.0).sum(axis=1) / number
     offsets = np.where(valid[..., None], held - mean[:, None], 0.0)
 
-    interpolation = "linear"
-    local = None
+    interpolation, local, jump = "linear", None, np.zeros(3)
     if target is not None:
         local = np.broadcast_to(apply(invert(target._pose()), held), held.shape).copy()
         times, keys = np.array([world.time]), held[:, :, None]
@@ -280,11 +300,16 @@ def make_grip(
         if to.world_count not in (None, worlds):
             raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {worlds}")
         times, keys, interpolation = _along(to, offsets, world)
+        jump = to.at(world.time) - mean
     else:
         goal = finite_array("to, where it is no Path or Body,", to, (3,), (worlds, 3))
         times = np.array([world.time])
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
-    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance)
+        jump = goal - mean
+    if compliance == 0.0 and most is None:
+        jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
+        _tell_jump(body, positions[0], float(jumps.max()))
+    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, most)
     return Grip(body, spec, target, local)
 
 

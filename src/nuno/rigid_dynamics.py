@@ -66,6 +66,7 @@ class RigidScene:
         self.settings = self.settings_of(world)
         self.static: dict[str, StaticPlace] = {}
         self.kept: dict[str, tuple[int, tuple[int, ...]]] = {}
+        self._moving: list[str] = []  # static bodies that had velocities in the last frame
         self._version = -1
 
     @staticmethod
@@ -105,12 +106,17 @@ class RigidScene:
 
     def lead(self, world: Simulation, time: float, duration: float) -> list[int]:
         """Let static bodies that follow paths move at a steady pace for a frame or less; return their slots."""
-        schedule = world._schedule
-        if schedule is None:
-            return []
-        k, slots = schedule.frame_at(time), []
-        for key in schedule.poses:
-            if key in self.static and k is not None:
+        schedule, keys = world._schedule, []
+        k = None if schedule is None else schedule.frame_at(time)
+        if schedule is not None and k is not None:
+            keys = [key for key in schedule.poses if key in self.static]
+        for key in set(self._moving).difference(keys):
+            if key in self.static and key in world._bodies:  # follows a path no longer, and stands where it arrived
+                self.solver.set_velocity(self.static[key].slot, np.zeros(3), np.zeros(3))
+                self.bring_static(world._bodies[key])
+        self._moving, slots = keys, []
+        if schedule is not None and k is not None:
+            for key in keys:
                 slot, (start, end) = self.static[key].slot, schedule.in_frame(key, k)
                 self.static[key].where = None
                 self.solver.set_pose(slot, *start)
@@ -138,6 +144,9 @@ class RigidScene:
                 wp.copy(own, array)
             else:
                 longer = True
+        self._moving = list(self.static)  # whatever places and velocities they have now
+        for place in self.static.values():
+            place.where = None
         if longer:
             solver._list_anew()
 

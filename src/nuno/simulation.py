@@ -324,8 +324,10 @@ class Simulation:
     ) -> bool:  # fmt: skip
         """Advance all bodies to ``finish`` [s]; return whether no list was too short: else all are longer now."""
         start = now = self._time
-        ends = {p.end for d in moving.values() for p in d.pushes if p.end is not None}
-        stops = [*sorted(t for t in ends if start + SOON < t < finish - SOON), finish]
+        ends = sorted({p.end for d in moving.values() for p in d.pushes if p.end is not None})
+        # of instants that rounding alone keeps apart one
+        ends = [t for k, t in enumerate(ends) if k == 0 or t > ends[k - 1] + SOON]
+        stops = [*(t for t in ends if start + SOON < t < finish - SOON), finish]
         for body, dynamics in moving.items():
             if isinstance(dynamics, ParticleDynamics):
                 dynamics.set_self_contact(self._rules.touches_itself(body))

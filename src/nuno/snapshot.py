@@ -58,6 +58,8 @@ class BodyRecord:
     deformed_quaternion: np.ndarray | None
     dynamics: DynamicsRecord | None
     path: Path | None = None  # that the body follows
+    # relative to a frame that is no body of the world, which the body follows
+    relative: Pose | None = field(default=None, metadata={"file": False})
 
     @property
     def deformation(self) -> tuple[np.ndarray, Pose] | None:
@@ -143,6 +145,7 @@ class Snapshot:
                 position=single(body.position, 1), quaternion=single(body.quaternion, 1),
                 deformed=batched(body.deformed), deformed_position=single(body.deformed_position, 1),
                 deformed_quaternion=single(body.deformed_quaternion, 1), dynamics=dynamics, path=path(body.path),
+                relative=None if body.relative is None else tuple(single(part, 1) for part in body.relative),
             ))  # fmt: skip
         grips = [
             replace(
@@ -246,6 +249,7 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
         quaternion=pose[1], parent=None if parent is None else parent.key, deformed=deformed,
         deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics,
         path=body._path.as_it_is() if isinstance(body._path, CompanyPath) else body._path,
+        relative=None if body._parent is None or parent else (body._position, body._quaternion),
     )  # fmt: skip
 
 
@@ -318,10 +322,18 @@ def _fill(body: Body, record: BodyRecord) -> None:
     # A frame that is no body is not part of a snapshot: a body that follows one goes on following it.
     pose = (record.position, record.quaternion)
     outside = body._parent is not None and record.parent is None and record.dynamics is None
+    # nor does it begin to follow a body that was its parent meanwhile, and left the world
+    outside = outside and (record.relative is not None or not isinstance(body._parent, Body))
     if body._parent is not None and not outside:
         body._parent._children = [child for child in body._parent._children if child is not body]
         body._parent = None
-    body._position, body._quaternion = pose if body._parent is None else compose(invert(body._parent._pose()), pose)
+    if body._parent is not None:
+        frame = body._parent._pose()
+        kept = record.relative
+        # rounding would move it where the frame has not
+        same = kept is not None and all(map(np.array_equal, compose(frame, kept), pose))
+        pose = kept if kept is not None and same else compose(invert(frame), pose)
+    body._position, body._quaternion = pose
     body._name, body._shape, body.color = record.name, record.shape, record.color
     body._friction, body._thickness = record.friction, record.thickness
     body._group, body._collides_with = record.group, record.collides_with

@@ -14,9 +14,8 @@ import numpy as np
 
 from nuno.dynamics import SOON, touches_itself
 from nuno.frame_runs import FrameRuns
-from nuno.impacts import PASSES, Impacts
+from nuno.impacts import Impacts, collides_with_itself, look_at, look_due, next_look
 from nuno.parties import Parties, find_parties
-from nuno.path import Path
 
 if TYPE_CHECKING:
     from nuno.body import Body
@@ -60,18 +59,25 @@ class Stepping:
         apart = not self._may_meet(moving, rigid) and not (rigid and world._led_bodies())
         if apart:
             self._prepare(moving, time)
-            if not self.careful:
-                self._run_apart(moving, time, stop - time)
-                return
+        looking = not world._quiet and any(collides_with_itself(body._dynamics) for body in moving)
         now = time
         while now < stop - SOON:
-            # the same instants whether a span is gone through at once or in pieces
-            duration = min(frame, stop - now)
+            before = now
+            if apart and not self.careful:
+                now = next_look(now, stop, world.frame_rate) if looking else stop
+                self._run_apart(moving, before, now - before)
+                if looking and look_due(before, now, world.frame_rate):
+                    look_at(moving)
+                continue
+            # the same instants whether a span is gone through at once or in pieces, and the same steps by itself or not
+            duration = frame if stop - now > frame - SOON else stop - now
             self.last = []
             if not apart:
                 self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
+            if looking and look_due(before, now, world.frame_rate):
+                look_at(moving)
 
     def _run_apart(self, moving: list[Body], time: float, duration: float, substeps: int | None = None) -> None:
         slots = []
@@ -120,9 +126,11 @@ class Stepping:
                 due[:] = False
                 if impacts is not None:
                     parties, due = impacts.again(parties)
+            if impacts is not None:
+                impacts.settle()
         finally:
             if impacts is not None:
-                impacts.set_passes(PASSES)
+                impacts.guard(False)
 
     def _run_with(
         self, moving: list[Body], parties: Parties, count: int, kept: dict[Body, np.ndarray], time: float,
@@ -225,10 +233,6 @@ def _joined(first: np.ndarray, members: list[int]) -> list[list[int]]:
 
 def _led(spec: Any, time: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Where a path leads its points at a time [s], and how they accelerated before it: (worlds, k, 3) [m], [m/s2]."""
-    worlds, k, m = spec.positions.shape[:3]
-    path = object.__new__(Path)  # its numbers were checked when the grip was made: this runs every tick
-    keys = spec.positions.reshape(worlds * k, m, 3)
-    path.__dict__.update(times=spec.times, positions=keys, quaternions=None, interpolation=spec.interpolation)
-    places = path.at(time - step * np.arange(3.0)).reshape(worlds, k, 3, 3)
+    places = spec.at(time - step * np.arange(3.0))
     now, before, earlier = (places[:, :, n] for n in range(3))
     return now, (now - 2.0 * before + earlier) / step**2

@@ -128,8 +128,7 @@ def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simu
     worlds = world.world_count
     vertices, corners, weights = chosen_points(where, body.vertices.shape[-2], body.faces, worlds)
     if vertices is not None:
-        corners = np.stack([vertices, np.full_like(vertices, -1), np.full_like(vertices, -1)], axis=-1)
-        weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+        corners, weights = _single(vertices)
     assert corners is not None and weights is not None
     return _tie_of(body, corners, weights, other, compliance, worlds)
 
@@ -198,6 +197,21 @@ def make_hold(
     return HoldSpec(now, goal[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance), None
 
 
+def corners_of(spec: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices (worlds, k, 3) of each point that a grip or tie holds, -1 for none, and their weights."""
+    if isinstance(spec, TieSpec):
+        return spec.corners, spec.weights
+    if spec.corners is not None:
+        return spec.corners, spec.barycentric
+    return _single(spec.vertices)
+
+
+def _single(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (worlds, k) as points, see `corners_of`."""
+    corners = np.stack([vertices, *2 * [np.full_like(vertices, -1)]], axis=-1)
+    return corners, np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
+
+
 def check_leader(leader: Body, deforms: bool, grips: Sequence[Grip]) -> None:
     """Check that a static body can be given dynamics while it leads what it holds.
 
@@ -219,11 +233,9 @@ def tie_to_leader(grip: Grip, worlds: int) -> None:
         # its places are in the leader's frame already
         grip._offsets = grip._led = None
         return
-    corners, weights = spec.corners, spec.barycentric
-    if corners is None:
-        corners = np.stack([spec.vertices, *2 * [np.full_like(spec.vertices, -1)]], axis=-1)
-        weights = np.broadcast_to([1.0, 0.0, 0.0], corners.shape)
-    tie = _tie_of(grip.body, corners, weights, leader, spec.compliance, worlds)
+    tie = _tie_of(grip.body, *corners_of(spec), leader, spec.compliance, worlds)
+    if spec.max_force is not None:
+        tie = replace(tie, max_force=spec.max_force)
     # at the very places where the leader held them
     grip._spec = replace(tie, places=grip._offsets) if leader._dynamics.is_rigid else tie
     grip._offsets = None

@@ -1,9 +1,7 @@
-"""World: bodies that come and go, dynamics that come and go, and time."""
+"""World: bodies that come and go, and dynamics that come and go."""
 
 from __future__ import annotations
 
-import logging
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,20 +18,16 @@ from nuno.materials import Material, Rigid
 from nuno.motion import arrive, path_for
 from nuno.path import Path
 from nuno.resolution import tell
-from nuno.running import Running
-from nuno.snapshot import Snapshot, apply, capture, check_world_index
+from nuno.saving import Saving
 from nuno.tie import check_leader, check_weld, tie_to_leader
-from nuno.validation import count, finite_array, number
+from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
     from nuno.camera.camera import Camera
     from nuno.contact_points import ContactPoints
 
 
-logger = logging.getLogger(__name__)
-
-
-class World(Running):
+class World(Saving):
     """A room: static bodies, which cost nothing, and attached ones, which move.
 
     All methods may be called while the world runs in the background; they take effect between frames. In what a run
@@ -256,12 +250,13 @@ class World(Running):
             free: (3,), a direction of the world along which a rigid body may slide; None holds it entirely.
             max_force: [N], a number or (worlds,): the most that the grip bears, at each point where it holds points,
                 and as much [N m] of a rigid body's turns. None is 10 kN, or 1,000 m/s2 times the mass of the heaviest
-                rigid body that it joins. Points that follow a path, a place or a static body have no limit.
+                rigid body that it joins; points that follow a path, a place or a static body have no limit then. With
+                one they are solved beside the body's contacts, which takes longer.
             ignore: Bodies that a rigid body passes through while it is held; None is ``to``, where that is a body.
 
         Raises:
             BodyStateError: the body is static.
-            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit where there is none.
+            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit that is not positive.
         """
         with self._change("grip"):
             own = self._own(body)
@@ -424,88 +419,6 @@ class World(Running):
             else:
                 positions = wp.array(dynamics.vertices(own), dtype=wp.vec3, device=self.device)
             return {"positions": positions, "velocities": velocities}
-
-    # Snapshots
-
-    def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
-        """Return everything that the world is, and write it to ``path`` (.npz) where one is given."""
-        with self._change("save"):
-            snapshot = capture(self)
-        if path is not None:
-            from nuno.snapshot_file import write_snapshot
-
-            write_snapshot(snapshot, path)
-        return snapshot
-
-    def restore(self, saved: Snapshot | str | os.PathLike[str]) -> None:
-        """Make the world what it was. Bodies removed since come back, bodies added since go.
-
-        Body and Grip objects keep their identity; a file of another process finds its bodies by name and
-        shape.
-
-        Raises:
-            FileFormatError: the file cannot be read, or its format is unknown or newer.
-            InvalidInputError: neither a snapshot nor a path.
-        """
-        snapshot = saved
-        if isinstance(snapshot, str | os.PathLike):
-            from nuno.snapshot_file import read_snapshot
-
-            snapshot = read_snapshot(snapshot)
-        if not isinstance(snapshot, Snapshot):
-            raise InvalidInputError(f"restore needs what save returned, or a path, got {type(saved).__name__}")
-        with self._change("restore"):
-            apply(snapshot, self)
-
-    def imagine(self, n: int, device: str | None = None) -> World:
-        """Return a batch of ``n`` copies of this world as it is now, with everything in it.
-
-        Args:
-            n: How many.
-            device: Where they run; None is where this world runs.
-
-        A driver, such as a simulated robot, moves this world only: what it moves stands still in the copies, which is
-        said once, as a warning.
-
-        Raises:
-            BodyStateError: this world is a batch itself.
-        """
-        worlds = count("n", n)
-        with self._change("imagine"):
-            if self.world_count != 1:
-                raise BodyStateError(f"only a single world can be imagined further; this one has {self.world_count}")
-            self._tell_of_drivers()
-            futures = World(device=self._device if device is None else device)
-            snapshot = capture(self)
-        apply(snapshot.spread(worlds), futures)
-        futures._family, futures._quiet = self._family, self._quiet
-        return futures
-
-    def adopt(self, futures: World, k: int) -> None:
-        """Become world ``k`` of a batch that was imagined from this one; Body objects keep their identity.
-
-        Raises:
-            InvalidInputError: not imagined from this world, or ``k`` out of range.
-            BodyStateError: this world is a batch itself.
-        """
-        if not isinstance(futures, World) or futures is self or futures._family != self._family:
-            raise InvalidInputError("adopt needs a world that imagine of this world returned")
-        with futures._change("adopt"):
-            snapshot = capture(futures).pick(check_world_index(k, futures.world_count))
-        with self._change("adopt"):
-            if self.world_count != 1:
-                raise BodyStateError("a batch cannot adopt a world; adopt it in the single world")
-            apply(snapshot, self)
-
-    def _tell_of_drivers(self) -> None:
-        """Say once of each driver that imagined worlds are without it."""
-        for driver in self.drivers:
-            if driver not in self._left_out:
-                self._left_out.append(driver)
-                logger.warning(
-                    "imagine leaves %r out: in the imagined worlds what it moves stands still where it is now; "
-                    "let it follow paths there (world.move), or lead grips along the paths that are planned", driver,
-                )  # fmt: skip
 
     # Cameras
 

@@ -5,6 +5,7 @@ import pytest
 
 import nuno
 from nuno.mesh.crossings import crossing_faces
+from nuno.snapshot_file import read_snapshot
 
 GRAVITY = 9.81
 
@@ -74,32 +75,23 @@ def random_scene(seed):
 
 
 def left_after_a_second(seed):
-    """Return the crossings 1 s after a random throw, drop or crumple, and whether they are told."""
+    """Return the crossings 1 s after a random throw, drop or crumple."""
     world, sheet = random_scene(seed)
     world.run(1.0)
-    return crossings(sheet), bool(sheet.missed_contacts)
+    return crossings(sheet)
 
 
-@pytest.mark.parametrize("seed", [0, 4, 6, 12, 14, 15, 18, 26, 32, 33, 39, 44])
+@pytest.mark.parametrize("seed", [0, 2, 4, 6, 11, 12, 14, 15, 18, 26, 32, 33, 39, 44, 50])
 def test_nothing_thrown_dropped_or_crumpled_stays_crossed(seed):
-    """Exact: no edge is inside of a triangle 1 s later; eight of these left 2 to 21 crossings before.
-
-    What grips crumple may have no room on the side where it is: there something may be left, but it is told.
-    """
-    left, told = left_after_a_second(seed)
-    assert left == 0 or (seed % 3 == 2 and told)
+    """Exact: no edge is inside of a triangle 1 s later; eleven of these left 2 to 21 crossings before."""
+    assert left_after_a_second(seed) == 0
 
 
 @pytest.mark.slow
-def test_nothing_of_200_stays_crossed_unless_grips_press_it_together():
-    """Exact: of 134 throws and drops at up to 10 m/s none is crossed after 1 s; of 66 crumples few, and all are told.
-
-    What grips draw together to a tenth may have no room on the side where it is.
-    """
-    left = {seed: found for seed in range(200) if (found := left_after_a_second(seed))[0]}
-    assert {seed for seed in left if seed % 3 != 2} == set()
-    assert all(told for _, told in left.values())
-    assert len(left) <= 8  # 6 when this was written, 27 before
+@pytest.mark.timeout(3600)
+def test_nothing_of_200_stays_crossed():
+    """Exact: of 200 throws, drops and crumples at up to 10 m/s none is crossed 1 s later (27 were at first)."""
+    assert {seed: left for seed in range(200) if (left := left_after_a_second(seed))} == {}
 
 
 SPEEDS = (0.0, 9.0, 5.0)
@@ -194,6 +186,8 @@ def test_a_corner_that_is_lifted_slowly_is_left_alone():
 def test_what_passes_through_itself_all_the_same_is_told_once(caplog, monkeypatch):
     """What cannot be met is told by name: here faces are said to cross whatever is done."""
     monkeypatch.setattr("nuno.impacts.crossing_faces", lambda vertices, faces: np.zeros((1, 2), dtype=int))
+    monkeypatch.setattr("nuno.impacts.untangle", lambda vertices, *rest: (vertices, 1))
+    monkeypatch.setattr("nuno.contact.crossed.crossed_worlds", lambda solver: np.ones(1, dtype=bool))
     world = nuno.World(device="cpu")
     world.add(nuno.cylinder(0.005, 0.6)).rotate(np.pi / 2, "x")
     sheet = world.add(nuno.sheet((0.3, 0.3), cells=(15, 15), position=(0.003, 0.004, 0.1), name="towel"))
@@ -201,7 +195,58 @@ def test_what_passes_through_itself_all_the_same_is_told_once(caplog, monkeypatc
     assert not sheet.missed_contacts
     thrown(world, sheet, (0.0, 0.0, -7.0))
     with caplog.at_level("WARNING", logger="nuno"):
-        world.run(0.1)
+        world.run(0.7)
     assert sheet.missed_contacts
     told = [record.getMessage() for record in caplog.records]
     assert sum("'towel' passes through itself" in message for message in told) == 1
+
+
+def pressed_through_itself(worlds=None):
+    """Return a world, or a batch, in which a folded cloth starts with its upper layer 7 to 12 mm through its lower."""
+    cells = 12
+    i = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = (corner.ravel() for corner in (i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]))
+    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    rest = np.stack(np.meshgrid(*2 * [np.arange(cells + 1)]), axis=-1).reshape(-1, 2) * 0.02
+    x = np.column_stack([rest, np.full(len(rest), 0.05)])
+    upper = x[:, 0] > 0.12
+    x[upper, 0] = 0.24 - x[upper, 0]
+    x[upper, 2] += 0.008 - 0.02 * np.exp(-((x[upper, :2] - (0.06, 0.12)) ** 2).sum(axis=1) / (2.0 * 0.02**2))
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane())
+    world.add(nuno.cloth_mesh(x, faces, rest=rest, name="cloth"))
+    if worlds:
+        world = world.imagine(worlds)
+    world.attach(world.find("cloth"), nuno.Cloth())
+    return world
+
+
+def test_a_cloth_that_passes_through_itself_from_the_start_is_taken_apart():
+    """Exact: none of what was given crossed is left 0.2 s later, nor after 1 s; nothing is told, for it is mended."""
+    world = pressed_through_itself()
+    cloth = world.find("cloth")
+    assert crossings(cloth) > 0
+    for span in (0.2, 0.8):
+        world.run(span)
+        assert crossings(cloth) == 0
+    assert not cloth.missed_contacts
+    assert np.abs(cloth.velocities).max() < 1.0  # it was not blown apart
+
+
+def test_what_is_taken_apart_is_the_same_in_pieces_in_batches_and_restored(tmp_path):
+    """Promise: one run, steps, a batch and a snapshot restored from a file come to the same bits."""
+    whole, batch, steps = pressed_through_itself(), pressed_through_itself(2), pressed_through_itself()
+    for world in (whole, batch):
+        world.run(0.5)
+    for k in range(30):
+        if k in (5, 14):
+            steps.save(tmp_path / "saved.npz")
+            steps = pressed_through_itself()
+            steps.restore(read_snapshot(tmp_path / "saved.npz"))
+        steps.step()
+    for what in ("vertices", "velocities"):
+        wanted = getattr(whole.find("cloth"), what)
+        np.testing.assert_array_equal(getattr(steps.find("cloth"), what), wanted)
+        for k in range(2):
+            np.testing.assert_array_equal(getattr(batch.find("cloth"), what)[k], wanted)
+    assert whole.find("cloth")._dynamics.solver.guarded[0] > 0

@@ -223,7 +223,7 @@ def test_a_world_of_a_batch_moves_as_alone(kind):
 
 
 def test_all_plans_see_a_shape_move_alike():
-    """One source: sixteen particles at a time, one by one, and a launch per phase give the same bits."""
+    """One source: sixteen particles at a time, one by one, and teams of blocks give the same bits."""
     world = nuno.World(device="cpu")
     tray = world.add(nuno.box((0.3, 0.3, 0.02), name="tray", position=(0, 0, -0.0125)))
     other = world.add(nuno.mesh((tray.vertices + np.array([0.3, 0, 0]), tray.faces), name="other"))
@@ -234,7 +234,7 @@ def test_all_plans_see_a_shape_move_alike():
     topology = ClothTopology.sheet((12, 12), (0.4, 0.4))
     start = topology.rest[None] + np.array([0.1, 0, 0.001])
     ends = []
-    for plan in ("vector", "fused", "large"):
+    for plan in ("vector", "fused", "grid"):
         solver = ClothSolver(
             topology, nuno.Cloth(thickness=THICKNESS), start, 0 * start, substeps=20, plan=plan, self_contact=False
         )

@@ -128,6 +128,38 @@ def test_a_sheet_bears_the_tension_that_the_resolution_says(share, bears):
     assert (abs(grip.wrench[0][0]) / 0.03 > 0.97 * tension) == bears
 
 
+def borne(stiffness, tension, h, substeps=None):
+    """Return the share of a tension [N/m] that a strip bears whose ends are drawn apart by its nominal strain."""
+    length, cells = 0.3, (round(0.3 / h), 4)
+    sheet = nuno.sheet((length, 4 * h), cells=cells, position=(0, 0, 1))
+    world, body = attached(sheet, nuno.Cloth(stretch_stiffness=stiffness, air_drag=2.0), substeps=substeps)
+    start = rows(body)[0]
+    left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-6) for x in (-0.5 * length, 0.5 * length))
+    world.grip(body, left, to=start[left].mean(axis=0))
+    end = start[right].mean(axis=0)
+    drawn = end + np.array([length * tension / stiffness, 0.0, 0.0])
+    grip = world.grip(body, right, to=nuno.Path([0.0, 0.5], [end, drawn], interpolation="minimum_jerk"))
+    world.run(1.5)
+    return abs(grip.wrench[0][0]) / (4 * h) / tension, body.resolution
+
+
+@pytest.mark.parametrize("h", [0.01, 0.02])
+@pytest.mark.parametrize(("stiffness", "tension"), [(1000.0, 100.0), (2000.0, 200.0), (5000.0, 200.0)])
+def test_a_drawn_strip_bears_its_load_at_default_substeps(stiffness, tension, h):
+    """Closed form T = E strain: up to 10 % of strain and 300 N/m the rule promises all of it, 0.3 % less was found."""
+    found, resolution = borne(stiffness, tension, h)
+    assert found == pytest.approx(1.0, abs=0.01) and resolution.tension >= tension
+
+
+@pytest.mark.parametrize("h", [0.01, 0.02])
+def test_a_load_beyond_the_rule_is_borne_with_as_many_substeps_as_the_resolution_says(h):
+    """Closed form T = E strain at 20 %: the tension that is borne goes with the square of the substeps."""
+    found, resolution = borne(1000.0, 200.0, h)
+    assert resolution.tension < 200.0 and found < 0.8  # this is what is told
+    enough = int(np.ceil(resolution.substeps * np.sqrt(200.0 / resolution.tension)))
+    assert borne(1000.0, 200.0, h, enough)[0] == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("tension", [40.0, 100.0])
 def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):

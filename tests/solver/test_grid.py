@@ -78,23 +78,49 @@ def test_pieces_of_a_run_change_no_bit():
     np.testing.assert_array_equal(pieces.local_positions(), whole.local_positions())
 
 
-@pytest.mark.cuda
-def test_blocks_that_find_no_room_leave_the_work_to_launches():
-    """Promise: whatever else the device does, nothing hangs and no substep is lost: the launches' bits from there on.
-
-    Half of the multiprocessors are kept for a second, five times as long as blocks wait for each other.
-    """
-    busy, launches = folded(), folded("large")
-    busy.run(0.0, 1.0 / 60.0)
-    launches.load_state(busy.save_state())
+def keep_half_busy():
+    """Keep half of the multiprocessors for a second, five times as long as blocks wait for each other."""
     wp.load_module(keep_busy.module, device="cuda:0")
     wp.synchronize()
     half = wp.get_device("cuda:0").sm_count // 2
     wp.launch(keep_busy, dim=half * 256, inputs=[1_000_000_000], stream=wp.Stream("cuda:0"), device="cuda:0")
-    for made in (busy, launches):
-        made.run(1.0 / 60.0, 5.0 / 60.0)
-    assert busy._large._crowded
-    np.testing.assert_array_equal(busy.local_positions(), launches.local_positions())
+
+
+@pytest.mark.cuda
+def test_where_blocks_find_no_room_each_world_has_one():
+    """Promise: whatever else the device does, nothing hangs and no substep is lost; the bits are the team's."""
+    busy, undisturbed = folded(), folded()
+    for made in (busy, undisturbed):
+        made.run(0.0, 1.0 / 60.0)
+    undisturbed.run(1.0 / 60.0, 5.0 / 60.0)
+    keep_half_busy()
+    busy.run(1.0 / 60.0, 5.0 / 60.0)
+    assert busy._grid._blocks == 1 and undisturbed._grid._blocks > 1
+    np.testing.assert_array_equal(busy.local_positions(), undisturbed.local_positions())
+
+
+@pytest.mark.cuda
+def test_parts_of_substeps_that_found_no_room_are_gone_through_again():
+    """Promise: a large cloth that meets a box on a busy device has the bits of one on a free device."""
+    ends = []
+    for busy in (False, True):
+        # with coordinates as doubles, of which a block takes all registers that a multiprocessor has
+        world = nuno.World(device="cuda:0", substeps=40)
+        world.add(nuno.plane())
+        cloth = world.add(nuno.sheet((0.5, 0.5), cells=(SIDE, SIDE), position=(0.0, 0.0, 0.02)))
+        box = world.add(nuno.box((0.1, 0.1, 0.04), position=(0.0, 0.0, 0.05)))
+        world.attach(cloth)
+        world.attach(box, nuno.Rigid(density=300.0))
+        world.run(2.0 / 60.0)
+        if busy:
+            keep_half_busy()
+        world.run(2.0 / 60.0)
+        plan = cloth._dynamics.solver._grid
+        assert plan is not None and (plan._blocks == 1) == busy
+        ends.append((cloth.vertices, box.position))
+    assert len(world.contacts(box).points) > 0
+    for free, crowded in zip(*ends, strict=True):
+        np.testing.assert_array_equal(crowded, free)
 
 
 @pytest.mark.cuda

@@ -9,6 +9,7 @@ from nuno.scene.cloth import ClothTopology
 from nuno.scene.colliders import Colliders
 from nuno.solver.bending import bend_line, bend_twist
 from nuno.solver.cloth_solver import ClothSolver
+from nuno.solver.damping import damp_line, damp_twist
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.membrane import shear_cell, stretch_triangle
 from nuno.solver.state import StateFloat, StateLanes
@@ -76,13 +77,12 @@ def test_scalar_vector_and_lanes_give_the_same_bits(kind, self_contact, substeps
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
-@pytest.mark.parametrize("plan", ["large", "grid"])
 @pytest.mark.parametrize(("worlds", "substeps"), [(1, COARSE), (3, COARSE), (3, FINE)])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
-def test_the_large_plans_give_the_bits_of_the_fused_one(kind, worlds, plan, substeps):
+def test_the_grid_plan_gives_the_bits_of_the_fused_one(kind, worlds, substeps):
     """Promise: without self-contact, whose sums are in fixed point, the colours' order is all that counts."""
     expected = outcome(solver(kind, "fused", worlds, substeps=substeps))
-    np.testing.assert_array_equal(outcome(solver(kind, plan, worlds, substeps=substeps)), expected)
+    np.testing.assert_array_equal(outcome(solver(kind, "grid", worlds, substeps=substeps)), expected)
 
 
 @pytest.mark.parametrize("stretch", [1000.0, 4000.0])  # with coordinates as floats and, on a sheet too, as doubles
@@ -92,18 +92,19 @@ def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
     made = solver(kind, "fused", substeps=None, stretch=stretch)
     assert made.sweeps > 1
     expected = outcome(made)
-    for plan, worlds in (("vector", 1), ("fused", 3), ("large", 1), ("grid", 3)):
+    for plan, worlds in (("vector", 1), ("fused", 3), ("grid", 1), ("grid", 3)):
         found = outcome(solver(kind, plan, worlds, substeps=None, stretch=stretch))
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
 @pytest.mark.parametrize("worlds", [1, 3])
-def test_the_large_plan_lists_the_pairs_of_the_fused_one(worlds):
+def test_the_grid_plan_lists_the_pairs_of_the_fused_one(worlds, monkeypatch):
     """Invariant: the listing by many threads finds as many pairs of edges; none touches yet, so that all else is equal.
 
     The test of a vertex and a triangle lets pairs through that are not near, more or fewer by how they are looked for.
     """
-    made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "large")]
+    monkeypatch.setattr("nuno.solver.cloth_solver.WIDE_MARGIN", 0.35)  # the fused plan's
+    made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "grid")]
     for each in made:
         each.run(0.0, 1.0 / 60.0 / 12.0)
     assert made[0].pair_counts.min() > 0
@@ -116,20 +117,20 @@ def test_pairs_of_blocks_that_were_not_noted_are_found(monkeypatch):
     counts = []
     for room in (24, 0.1):
         monkeypatch.setattr("nuno.contact.team_listing.ROOM", room)
-        made = solver("sheet", "large", 2, self_contact=True)
+        made = solver("sheet", "grid", 2, self_contact=True)
         made.run(0.0, 1.0 / 60.0 / 12.0)
         counts.append(made.pair_counts)
     assert counts[0].min() > 0
     np.testing.assert_array_equal(*counts)
 
 
-def test_the_large_plan_keeps_layers_apart():
+def test_the_grid_plan_keeps_layers_apart():
     """A sheet folded onto itself rests as two layers, at most 10 % of the thickness nearer than in the fused plan.
 
     Contacts that share a particle are averaged instead of taken one after the other, so the bits differ.
     """
     gaps = []
-    for plan in ("fused", "large"):
+    for plan in ("fused", "grid"):
         cloth = ClothTopology.sheet((12, 6), (0.24, 0.12))
         x = cloth.rest.copy()
         over = x[:, 0] > 0
@@ -145,7 +146,7 @@ def test_the_large_plan_keeps_layers_apart():
     assert gaps[1] > gaps[0] - 0.0004
 
 
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
     """Promise: same bits in any place of a batch, self-contact included; the cloth hangs from two corners and folds."""
     alone = solver("sheet", plan, self_contact=True)
@@ -159,7 +160,7 @@ def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
 
 def test_a_run_in_pieces_is_the_run_in_one():
     """Invariant: whole frames one at a time, under settings made anew, change no bit in any plan."""
-    for plan in ("vector", "large"):
+    for plan in ("vector", "grid"):
         whole, pieces = solver("sheet", plan), solver("sheet", plan)
         whole.run(0.0, 0.1)
         for k in range(6):
@@ -188,9 +189,11 @@ def project_floats(t: StateFloat, which: int, tables: StateFloat):
         a, b, c, d = 4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3
         alpha = tables.x[k]
         if which == 0:
-            bend_line(t, a, b, c, alpha, 1, tables.y[k])
+            bend_line(t, a, b, c, alpha)
+            damp_line(t, a, b, c, alpha, tables.y[k])
         elif which == 1:
-            bend_twist(t, a, b, c, d, alpha, 1, tables.y[k])
+            bend_twist(t, a, b, c, d, alpha)
+            damp_twist(t, a, b, c, d, alpha, tables.y[k])
         elif which == 2:
             shear_cell(t, a, b, c, d, 0.7, alpha, 0.0, 0.4, 0.5)
         else:
@@ -204,9 +207,11 @@ def project_elements(t: StateFloat, which: int, index: wp.array(dtype=lane_int),
     alpha = alphas[0]
     gamma = alphas[1]
     if which == 0:
-        bend_line(t, a, b, c, alpha, 1, gamma)
+        bend_line(t, a, b, c, alpha)
+        damp_line(t, a, b, c, alpha, gamma)
     elif which == 1:
-        bend_twist(t, a, b, c, d, alpha, 1, gamma)
+        bend_twist(t, a, b, c, d, alpha)
+        damp_twist(t, a, b, c, d, alpha, gamma)
     elif which == 2:
         shear_cell(t, a, b, c, d, lane(0.7), alpha, lane(0.0), 0.4, 0.5)
     else:
@@ -219,9 +224,11 @@ def project_worlds(t: StateLanes, which: int, alphas: wp.array(dtype=lane)):
     alpha = alphas[0]
     gamma = alphas[1]
     if which == 0:
-        bend_line(t, 0, 1, 2, alpha, 1, gamma)
+        bend_line(t, 0, 1, 2, alpha)
+        damp_line(t, 0, 1, 2, alpha, gamma)
     elif which == 1:
-        bend_twist(t, 0, 1, 2, 3, alpha, 1, gamma)
+        bend_twist(t, 0, 1, 2, 3, alpha)
+        damp_twist(t, 0, 1, 2, 3, alpha, gamma)
     elif which == 2:
         shear_cell(t, 0, 1, 2, 3, 0.7, alpha, lane(0.0), 0.4, 0.5)
     else:
@@ -240,7 +247,7 @@ def filled(kind, values, dtype):
 def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     """Promise: float, sixteen worlds and sixteen elements are one function."""
     random = np.random.default_rng(which)
-    values = {name: random.normal(size=SIZE).astype(np.float32) for name in ("x", "y", "z", "px", "py", "pz")}
+    values = {name: random.normal(size=SIZE).astype(np.float32) for name in ("x", "y", "z", "vx", "vy", "vz")}
     values["w"] = random.uniform(0.5, 2.0, SIZE).astype(np.float32)
     alphas = random.uniform(0.1, 1.0, (2, LANES)).astype(np.float32)
     floats, elements = (filled(StateFloat, values, float) for _ in range(2))
@@ -251,7 +258,8 @@ def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     wp.launch(project_floats, dim=1, inputs=[floats, which, tables], device="cpu")
     wp.launch(project_elements, dim=1, inputs=[elements, which, index, wide], device="cpu")
     wp.launch(project_worlds, dim=1, inputs=[worlds, which, wide], device="cpu")
-    for name in ("x", "y", "z"):
+    bends = which < 2
+    for name in ("x", "y", "z", *(("vx", "vy", "vz") if bends else ())):
         expected = getattr(floats, name).numpy()
         assert (expected != values[name]).sum() > LANES  # it did something
         np.testing.assert_array_equal(getattr(elements, name).numpy(), expected)
@@ -259,7 +267,7 @@ def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_cuda_moves_a_cloth_like_the_cpu(kind, plan):
     """The same phases; fused multiply-adds round otherwise, and a swinging cloth makes 1e-7 m grow to millimetres."""
@@ -286,19 +294,19 @@ def patchwork(cells, device, shares=(0.0, 1.0)):
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("cells", [(13, 9), (70, 6), (6, 70), (4, 200), (3, 260)])
+@pytest.mark.parametrize("cells", [(1, 2), (1, 3), (13, 9), (70, 6), (6, 70), (4, 200), (3, 260)])
 def test_cuda_tells_cells_apart_in_sheets_of_any_shape(cells):
     """Beside the CPU: what strips, lines and yarns a warp has threads for, and what it has not.
 
-    10 um: rounding; one material everywhere makes 4 to 7 mm.
+    10 um: rounding; one material everywhere makes 0.9 (2 and 3 cells) to 7 mm.
     """
     expected = patchwork(cells, "cpu")
-    assert np.abs(patchwork(cells, "cpu", (0.5, 0.5)) - expected).max() > 1e-3
+    assert np.abs(patchwork(cells, "cpu", (0.5, 0.5)) - expected).max() > 5e-4
     np.testing.assert_allclose(patchwork(cells, "cuda:0"), expected, atol=1e-5)
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("plan", ["fused", "large", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "grid"])
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     """Promise: same input, same bits, in any place of a batch, self-contact included.
 
@@ -306,7 +314,7 @@ def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     does a block of 150 and of 1,000, but not of 300, on a device with 132 multiprocessors.
     """
     alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
-    for worlds in (1, 5, *{"fused": (150, 300, 1000), "large": (), "grid": (150,)}[plan]):
+    for worlds in (1, 5, *{"fused": (150, 300, 1000), "grid": (150,)}[plan]):
         again = solver("sheet", plan, worlds, device="cuda:0", self_contact=True)
         np.testing.assert_array_equal(outcome(again), alone)
         np.testing.assert_array_equal(again.local_positions(), np.broadcast_to(alone[0], again.local_positions().shape))

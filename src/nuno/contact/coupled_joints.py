@@ -12,7 +12,18 @@ their sum and the inertia are solved in closed form.
 import warp as wp
 
 from nuno.contact.coupled_ties import CATCH_UP, UNMET, left_over, stand_on, within
-from nuno.contact.joint_block import BALL, FIXED, HINGE, SLIDER, Joints, apply_joint, arm_of, block_of, respond
+from nuno.contact.joint_block import (
+    BALL,
+    FIXED,
+    HINGE,
+    SLIDER,
+    Joints,
+    apply_joint,
+    arm_of,
+    block_of,
+    other_frame,
+    respond,
+)
 from nuno.contact.joint_drives import project_axis, project_ball
 from nuno.solver.rigid_body import RigidState, in_world, point_before, point_of, turn_between
 
@@ -59,10 +70,6 @@ def project_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: flo
         # the other bears it where this body is on its line
         other_arm = point_before(rigid, i, joints.place[r]) - rigid.position_before[j]
     block = block_of(rigid, kind, i, j, arm, other_arm, axis)
-    if kind == HINGE or kind == SLIDER:
-        project_axis(rigid, joints, block, world, k, dt, axis, arm, other_arm)
-    elif kind == BALL:
-        project_ball(rigid, joints, block, world, k, dt, arm, other_arm)
     apart, off = joint_apart(rigid, joints, world, k, dt)
     pull, twist = respond(block, apart, off)
     most = joints.limit[r] * dt * dt
@@ -73,6 +80,11 @@ def project_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: flo
     joints.pull[r] = pull_sum
     joints.twist[r] = twist_sum
     apply_joint(rigid, i, j, arm, other_arm, pull, twist)
+    # what acts along the free direction keeps the others as they are, so that one pass is enough for one joint
+    if kind == HINGE or kind == SLIDER:
+        project_axis(rigid, joints, block, world, k, dt, axis, arm, other_arm)
+    elif kind == BALL:
+        project_ball(rigid, joints, block, world, k, dt, arm, other_arm)
     floor = ROUNDING * (1.0 + wp.length(rigid.position[i]))
     return wp.max(wp.max(wp.length(apart), wp.length(off)) - floor, 0.0)
 
@@ -84,16 +96,7 @@ def joint_apart(rigid: RigidState, joints: Joints, world: int, k: int, dt: float
     i = world * rigid.capacity + joints.slot[k]
     z = wp.vec3(0.0, 0.0, 1.0)
     own = joints.turn[r]
-    other_turn = joints.other_turn[r]
-    other_before = joints.other_turn[r]
-    place = joints.other_place[r]
-    place_before = joints.other_place[r]
-    if joints.other[k] >= 0:
-        j = world * rigid.capacity + joints.other[k]
-        place = point_of(rigid, j, joints.other_place[r])
-        place_before = point_before(rigid, j, joints.other_place[r])
-        other_turn = rigid.rotation[j] * other_turn
-        other_before = rigid.rotation_before[j] * other_before
+    place, other_turn, place_before, other_before = other_frame(rigid, joints, world, k)
     apart, off = misfit(
         joints.kind[k], point_of(rigid, i, joints.place[r]) - place, rigid.rotation[i] * own, other_turn,
         wp.quat_rotate(other_turn, z),
@@ -181,6 +184,9 @@ def sum_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
     most = 0.999 * joints.limit[r] * dt * dt
     apart, off = joint_apart(rigid, joints, world, k, dt)
     missed = wp.length(pull) > most or wp.length(twist) > most
+    rigid.joined[world * rigid.capacity + joints.slot[k]] = 1
+    if joints.other[k] >= 0:
+        rigid.joined[world * rigid.capacity + joints.other[k]] = 1
     if missed or wp.length(apart) > UNMET or wp.length(off) > UNMET:
         joints.unmet[r] = joints.unmet[r] + 1
     elif joints.kind[k] == FIXED:

@@ -1,7 +1,8 @@
 """Which elements of different bodies may touch: rows of candidates, made anew when anything may have gone too far.
 
 Lists hold all that is nearer than the contact distance and a margin. By one thread they come in an order that the
-elements alone decide, so that it does not matter when a list was made.
+elements alone decide. Each party of bodies has a margin and lists when it must by itself: what goes on in other worlds
+of a batch, or elsewhere in the same one, changes none of its rows.
 """
 
 import warp as wp
@@ -59,6 +60,7 @@ class Elements:
     soft: wp.array(dtype=float)  # how far a contact presses a cloth together [m/N]
     party: wp.array(dtype=int)  # in each world, the first body of those that go together
     reach: wp.array(dtype=float)  # in each world, what bounds how far a body's contacts come in a substep [m]
+    far: wp.array(dtype=float)  # in each world, up to where a body's rows are listed now [m]; negative: they stay
     solid: wp.array(dtype=int)  # by body, whether its triangles enclose it
     # by particle, where the sorted numbers start of those near it within its own body, if that touches itself
     near_start: wp.array(dtype=int)
@@ -101,6 +103,26 @@ def add_row(
         rows.part[r] = part
         rows.bodies[r] = bodies
         rows.point[r] = point
+
+
+@wp.kernel(enable_backward=False, module="nuno.contact.coupled_lists")
+def keep_rows(elements: Elements, rows: Rows):
+    """Of each world's rows, leave those of bodies that are not listed now, in their order."""
+    world = wp.tid()
+    base = world * rows.room
+    kept = int(0)
+    for k in range(rows.count[world]):
+        r = base + k
+        if elements.far[world * elements.bodies + rows.bodies[r][0]] < 0.0:
+            to = base + kept
+            rows.kind[to] = rows.kind[r]
+            rows.corners[to] = rows.corners[r]
+            rows.slot[to] = rows.slot[r]
+            rows.part[to] = rows.part[r]
+            rows.bodies[to] = rows.bodies[r]
+            rows.point[to] = rows.point[r]
+            kept = kept + 1
+    rows.count[world] = kept
 
 
 @wp.func
@@ -305,36 +327,44 @@ def list_ridge(
 
 @wp.kernel(enable_backward=False, module="nuno.contact.coupled_lists")
 def list_rows(
-    particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, bvh: wp.uint64,
-    far: float, threads: int,
+    particles: Particles, rigid: RigidState, elements: Elements, rows: Rows, bvh: wp.uint64, threads: int,
 ):  # fmt: skip
-    """List all pairs nearer than ``far`` [m], the contact distance included."""
+    """List all pairs nearer than their bodies' ``far``, the contact distance included."""
     tid = wp.tid()
     world = tid / threads
     thread = tid % threads
+    of = world * elements.bodies
     root = int(-1)
     if elements.triangles > 0:
         root = wp.bvh_get_group_root(bvh, world)
     for k in range(thread, elements.vertices, threads):
-        if elements.triangles > 0:
-            start = rows.count[world]
-            list_vertex(particles, elements, rows, bvh, root, world, k, far)
-            if threads == 1:
-                sort_rows(rows, world, start)
-        list_parts(particles, rigid, elements, rows, world, k, far)
+        far = elements.far[of + elements.vertex_body[k]]
+        if far >= 0.0:
+            if elements.triangles > 0:
+                start = rows.count[world]
+                list_vertex(particles, elements, rows, bvh, root, world, k, far)
+                if threads == 1:
+                    sort_rows(rows, world, start)
+            list_parts(particles, rigid, elements, rows, world, k, far)
     if elements.triangles > 0:
         for k in range(thread, elements.edges, threads):
-            start = rows.count[world]
-            list_edge(particles, elements, rows, bvh, root, world, k, far)
-            if threads == 1:
-                sort_rows(rows, world, start)
+            far = elements.far[of + elements.edge_body[k]]
+            if far >= 0.0:
+                start = rows.count[world]
+                list_edge(particles, elements, rows, bvh, root, world, k, far)
+                if threads == 1:
+                    sort_rows(rows, world, start)
         for k in range(thread, elements.points, threads):
-            start = rows.count[world]
-            list_point(particles, rigid, elements, rows, bvh, root, world, k, far)
-            if threads == 1:
-                sort_rows(rows, world, start)
+            far = elements.far[of + elements.point_body[k]]
+            if far >= 0.0:
+                start = rows.count[world]
+                list_point(particles, rigid, elements, rows, bvh, root, world, k, far)
+                if threads == 1:
+                    sort_rows(rows, world, start)
         for k in range(thread, elements.ridges, threads):
-            start = rows.count[world]
-            list_ridge(particles, rigid, elements, rows, bvh, root, world, k, far)
-            if threads == 1:
-                sort_rows(rows, world, start)
+            far = elements.far[of + elements.ridge_body[k]]
+            if far >= 0.0:
+                start = rows.count[world]
+                list_ridge(particles, rigid, elements, rows, bvh, root, world, k, far)
+                if threads == 1:
+                    sort_rows(rows, world, start)

@@ -16,7 +16,7 @@ from nuno.solver.rigid_body import (
     point_of,
     shift_body,
     turn_between,
-    turned,
+    turn_body,
 )
 
 CATCH_UP = wp.constant(1.0)
@@ -31,14 +31,17 @@ UNMET = wp.constant(5.0e-4)
 
 @wp.struct
 class Ties:
-    """Sums of particles that stay on a point of a rigid body, or on particles of the other side (weights below 0)."""
+    """Sums of particles that stay on a point of a rigid body, a place, or other particles (weights below 0)."""
 
     count: int
+    step: float  # a substep's share of the frame
     corners: wp.array(dtype=wp.vec4i)  # (worlds * count), -1: none
     weights: wp.array(dtype=wp.vec4)
     body: wp.array(dtype=int)  # (count), among the coupled bodies
     slot: wp.array(dtype=int)  # -1: none
     point: wp.array(dtype=wp.vec3)
+    led: wp.array(dtype=int)  # (count), 1 for a place that is led
+    place: wp.array(dtype=wp.vec3)  # (worlds * 2 * count), which is there at the frame's start and end
     compliance: wp.array(dtype=float)  # (count) [m/N]
     limit: wp.array(dtype=float)  # (worlds * count) [N], what each point bears at most
     pull: wp.array(dtype=wp.vec3)  # of the substep, and of all substeps of the frame [kg m]
@@ -84,7 +87,7 @@ def left_over(apart: wp.vec3, mended: float):
 
 
 @wp.func
-def tie_apart(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float):
+def tie_apart(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float, fraction: float):
     """How far the sides of a tie are apart, beyond what it may mend in a substep."""
     r = world * ties.count + k
     first = world * particles.count
@@ -97,13 +100,17 @@ def tie_apart(particles: Particles, rigid: RigidState, ties: Ties, world: int, k
     if slot >= 0:
         before = before - point_before(rigid, i, ties.point[r])
         apart = apart - point_of(rigid, i, ties.point[r])
+    if ties.led[k] != 0:
+        goes = ties.place[2 * r + 1] - ties.place[2 * r]
+        apart = apart - (ties.place[2 * r] + goes * fraction)
+        before = before - (ties.place[2 * r] + goes * (fraction - ties.step))
     if ties.compliance[k] == 0.0:
         apart = apart - left_over(before, CATCH_UP * dt)
     return apart
 
 
 @wp.func
-def project_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float):
+def project_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float, fraction: float):
     """One projection of the distance between the sides, along itself; returns how far it was."""
     r = world * ties.count + k
     first = world * particles.count
@@ -114,7 +121,7 @@ def project_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int,
     slot = ties.slot[r]
     i = world * rigid.capacity + slot
     alpha = ties.compliance[k] / (dt * dt)
-    apart = tie_apart(particles, rigid, ties, world, k, dt) + ties.pull[r] * alpha
+    apart = tie_apart(particles, rigid, ties, world, k, dt, fraction) + ties.pull[r] * alpha
     length = wp.length(apart)
     if length > 1.0e-12:
         n = apart / length
@@ -143,7 +150,7 @@ def project_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int,
 
 
 @wp.func
-def sum_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float):
+def sum_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: int, dt: float, fraction: float):
     """Add what a tie bore in the substep to the frame's sum, and note whether it was met."""
     r = world * ties.count + k
     pull = ties.pull[r]
@@ -151,7 +158,7 @@ def sum_tie(particles: Particles, rigid: RigidState, ties: Ties, world: int, k: 
     if ties.corners[r][0] >= 0:
         missed = wp.length(pull) > 0.999 * ties.limit[r] * dt * dt
         if ties.compliance[k] == 0.0:
-            missed = missed or wp.length(tie_apart(particles, rigid, ties, world, k, dt)) > UNMET
+            missed = missed or wp.length(tie_apart(particles, rigid, ties, world, k, dt, fraction)) > UNMET
         if missed:
             ties.unmet[r] = ties.unmet[r] + 1
 
@@ -237,9 +244,9 @@ def project_hold(rigid: RigidState, holds: Holds, world: int, k: int, dt: float,
             total = within(total, most)
             twist = total - holds.twist[r]
         holds.twist[r] = total
-        rigid.rotation[i] = turned(rigid.rotation[i], rigid.give[i] * twist)
+        turn_body(rigid, i, rigid.give[i] * twist)
         if leader >= 0:
-            rigid.rotation[j] = turned(rigid.rotation[j], rigid.give[j] * (-twist))
+            turn_body(rigid, j, rigid.give[j] * (-twist))
     return length
 
 

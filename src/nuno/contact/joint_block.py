@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.solver.rigid_body import RigidState, shift_body, turned
+from nuno.solver.rigid_body import RigidState, point_before, point_of, shift_body, turn_body
 
 FIXED, HINGE, SLIDER, BALL = 0, 1, 2, 3
 LOWER, UPPER, FRICTION, STIFFNESS, DAMPING, POSITION, VELOCITY, EFFORT, SPRING, REST, SPRING_DAMPING = range(11)
@@ -65,6 +65,23 @@ def arm_of(rigid: RigidState, i: int, place: wp.vec3):
 
 
 @wp.func
+def other_frame(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The joint's frame in the other body, or in the world: place and turn now, and when the substep began."""
+    r = world * joints.count + k
+    place = joints.other_place[r]
+    place_before = joints.other_place[r]
+    turn = joints.other_turn[r]
+    turn_before = joints.other_turn[r]
+    if joints.other[k] >= 0:
+        j = world * rigid.capacity + joints.other[k]
+        place = point_of(rigid, j, joints.other_place[r])
+        place_before = point_before(rigid, j, joints.other_place[r])
+        turn = rigid.rotation[j] * turn
+        turn_before = rigid.rotation_before[j] * turn_before
+    return place, turn, place_before, turn_before
+
+
+@wp.func
 def block_of(rigid: RigidState, kind: int, i: int, j: int, arm: wp.vec3, other_arm: wp.vec3, axis: wp.vec3):
     """The block of a joint."""
     made = Block()
@@ -116,7 +133,7 @@ def respond(block: Block, apart: wp.vec3, off: wp.vec3):
 def apply_joint(rigid: RigidState, i: int, j: int, arm: wp.vec3, other_arm: wp.vec3, pull: wp.vec3, twist: wp.vec3):
     """Move both bodies by a force and a torque at the joint, opposite on the other."""
     shift_body(rigid, i, rigid.weight[i] * pull)
-    rigid.rotation[i] = turned(rigid.rotation[i], rigid.give[i] * (wp.cross(arm, pull) + twist))
+    turn_body(rigid, i, rigid.give[i] * (wp.cross(arm, pull) + twist))
     if j >= 0:
         shift_body(rigid, j, -rigid.weight[j] * pull)
-        rigid.rotation[j] = turned(rigid.rotation[j], -(rigid.give[j] * (wp.cross(other_arm, pull) + twist)))
+        turn_body(rigid, j, -(rigid.give[j] * (wp.cross(other_arm, pull) + twist)))

@@ -21,6 +21,7 @@ from nuno.contact.joint_block import (
     Joints,
     apply_joint,
     inverted,
+    other_frame,
     respond,
 )
 from nuno.solver.rigid_body import RigidState, point_before, point_of, turn_between
@@ -117,16 +118,9 @@ def project_axis(
     j = int(-1)
     turn = rigid.rotation[i] * joints.turn[r]
     before = rigid.rotation_before[i] * joints.turn[r]
-    other_turn = joints.other_turn[r]
-    other_before = joints.other_turn[r]
-    place = joints.other_place[r]
-    place_before = joints.other_place[r]
     if joints.other[k] >= 0:
         j = world * rigid.capacity + joints.other[k]
-        place = point_of(rigid, j, joints.other_place[r])
-        place_before = point_before(rigid, j, joints.other_place[r])
-        other_turn = rigid.rotation[j] * other_turn
-        other_before = rigid.rotation_before[j] * other_before
+    place, other_turn, place_before, other_before = other_frame(rigid, joints, world, k)
     pull = wp.vec3(0.0, 0.0, 0.0)
     twist = wp.vec3(0.0, 0.0, 0.0)
     if joints.kind[k] == HINGE:

@@ -1,8 +1,8 @@
 """The phases in which many blocks of a CUDA device list the self-contact pairs of one world together.
 
-What `nuno.contact.renewal` does, in phases between which all threads of a world wait: those of a team of blocks
-(`nuno.solver.team`), or launches (`nuno.solver.broad`). First pairs of blocks are noted, a block of vertices by a warp,
-which passes over far regions at a comparison each. Then a thread looks at two elements of a noted pair at a time.
+What `nuno.contact.renewal` does, in phases between which all threads of a team of blocks wait (`nuno.solver.team`).
+First pairs of blocks are noted, a block of vertices by a warp, which passes over far regions at a comparison each. Then
+a thread looks at two elements of a noted pair at a time.
 """
 
 from typing import Any

@@ -6,6 +6,7 @@ Everything here depends on the rest shape alone; materials come in as compliance
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -96,6 +97,14 @@ class ClothTopology:
     def vertex_count(self) -> int:
         """Number of vertices."""
         return len(self.rest)
+
+    @cached_property
+    def guarded_blocks(self) -> Blocks:
+        """`blocks` in which a sheet's diagonals collide with all edges: see `nuno.impacts`."""
+        if not len(self.cells):
+            return self.blocks
+        edges = np.concatenate([self.edges.vertices, self.cells.vertices[:, [0, 3]]])
+        return make_blocks(self.rest, self.faces, edges, np.zeros((0, 4), int), columns=self.blocks.columns)
 
     @classmethod
     def sheet(cls, cells: tuple[int, int], size: tuple[float, float]) -> ClothTopology:

@@ -155,6 +155,7 @@ def make_elements(
     made.near = put(pairs[:, 1] if len(pairs) else [0], int)
     made.party = wp.zeros(worlds * bodies, dtype=int, device=device)
     made.reach = wp.zeros(worlds * bodies, dtype=float, device=device)
+    made.far = wp.zeros(worlds * bodies, dtype=float, device=device)
     made.solid = put([*(surface.solid for surface in particles), *(False for _ in rigid)], int)
     made.low = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)
     made.high = wp.zeros(worlds * made.triangles, dtype=wp.vec3, device=device)

@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from nuno.solver.lanes import add, div, fill, most, mul, root, sub  # noqa: F401
-from nuno.solver.vec3 import cross, dot, move, offset, position, put_position, start_position
+from nuno.solver.vec3 import cross, dot, move, offset, position, put_position
 from nuno.solver.vector import at, is_set
 
 
@@ -29,11 +29,8 @@ def bend_stiffness(weight: Any, alpha: Any):
 
 
 @wp.func
-def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: Any):
-    """Three vertices in a row: c = x_0 - 2 x_1 + x_2; ``gamma`` is the damping over dt.
-
-    With damping, c becomes c + gamma (c - c'), where c' is that of the substep's start.
-    """
+def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any):
+    """Three vertices in a row: c = x_0 - 2 x_1 + x_2."""
     xa = position(t, a)
     xb = position(t, b)
     xc = position(t, c)
@@ -42,11 +39,6 @@ def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, damped: int, gamma: An
     wc = at(t.w, c)
     error = offset(xa, xb) - offset(xb, xb) * 2.0 + offset(xc, xb)
     weight = wa + wb * 4.0 + wc
-    if damped != 0:
-        m = start_position(t, b)
-        change = error - offset(start_position(t, a), m) + offset(m, m) * 2.0 - offset(start_position(t, c), m)
-        error = error + gamma * change
-        weight = weight + gamma * weight
     s = -1.0 / bend_stiffness(weight, alpha)
     put_position(t, a, xa + error * (s * wa))
     put_position(t, b, xb + error * (s * wb * -2.0))
@@ -60,18 +52,14 @@ def twist_of(a: Any, b: Any, c: Any, d: Any):
 
 
 @wp.func
-def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, damped: int, gamma: Any):
-    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3; ``gamma`` is the damping over dt, as in `bend_line`."""
+def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any):
+    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3."""
     error = twist_of(position(t, a), position(t, b), position(t, c), position(t, d))
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
     wd = at(t.w, d)
     weight = wa + wb + wc + wd
-    if damped != 0:
-        before = twist_of(start_position(t, a), start_position(t, b), start_position(t, c), start_position(t, d))
-        error = error + gamma * (error - before)
-        weight = weight + gamma * weight
     s = -1.0 / bend_stiffness(weight, alpha)
     move(t, a, error * (s * wa))
     move(t, b, error * (-s * wb))
@@ -88,19 +76,7 @@ def total(weights: Any, row: int, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any, x
 
 
 @wp.func
-def total_before(t: Any, weights: Any, row: int, i0: Any, i1: Any, i2: Any, i3: Any, i4: Any, i5: Any):
-    """The weighed sum of six particles' places when the substep began."""
-    x0 = start_position(t, i0)
-    x1 = start_position(t, i1)
-    x2 = start_position(t, i2)
-    x3 = start_position(t, i3)
-    x4 = start_position(t, i4)
-    x5 = start_position(t, i5)
-    return total(weights, row, x0, x1, x2, x3, x4, x5)
-
-
-@wp.func
-def bend_patch(t: Any, table: Any, k: int, alpha: Any, damped: int, gamma: Any):
+def bend_patch(t: Any, table: Any, k: int, alpha: Any):
     """A triangle and its neighbours: three times c = sum k_i x_i - rest, one after the other.
 
     ``rest`` turns with the triangle: a sum of its two sides from vertex 0 and its unit normal. A triangle at the rim
@@ -141,9 +117,6 @@ def bend_patch(t: Any, table: Any, k: int, alpha: Any, damped: int, gamma: Any):
         weight = weight + w3 * k3 * k3
         weight = weight + w4 * k4 * k4
         weight = weight + w5 * k5 * k5
-        if damped != 0:
-            error = error + gamma * (error - total_before(t, table.patch_weight, row, i0, i1, i2, i3, i4, i5))
-            weight = weight + gamma * weight
         if is_set(table.patch_curved[k]):
             r = 9 * k + 3 * j
             e = x1 - x0

@@ -11,7 +11,7 @@ import warp as wp
 from nuno.solver.bending import bend_line, bend_twist
 from nuno.solver.lanes import barrier, product
 from nuno.solver.membrane import shear_cell
-from nuno.solver.state import DAMPING, Settings, Topology
+from nuno.solver.state import Settings, Topology
 
 
 @wp.struct
@@ -74,7 +74,6 @@ def read_cell(table: Topology, k: int, last: int):
 def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, threads: int):
     """All line bends, as `nuno.solver.frame.bend_lines` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     colours = table.line_colour.shape[0] - 1
     if colours > 0:
         first = table.line_colour[0]
@@ -88,11 +87,11 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, thread
             stop = table.line_colour[wp.min(c + 2, colours)]
             ready = read_line(table, start + thread, stop)
             if first + thread < last:
-                bend_line(t, now.a, now.b, now.c, alpha, run.damped, damping)
+                bend_line(t, now.a, now.b, now.c, alpha)
             for k in range(first + thread + threads, last, threads):
                 element = read_line(table, k, last)
                 alpha = product(t.bend_soft[element.soft], element.scale * rate)
-                bend_line(t, element.a, element.b, element.c, alpha, run.damped, damping)
+                bend_line(t, element.a, element.b, element.c, alpha)
             soft = t.bend_soft[ready.soft]
             first = start
             last = stop
@@ -103,7 +102,6 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, thread: int, thread
 def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threads: int):
     """All cell twists, as `nuno.solver.frame.bend_twists` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     colours = table.twist_colour.shape[0] - 1
     if colours > 0:
         first = table.twist_colour[0]
@@ -117,11 +115,11 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, thread: int, threa
             stop = table.twist_colour[wp.min(c + 2, colours)]
             ready = read_twist(table, start + thread, stop)
             if first + thread < last:
-                bend_twist(t, now.a, now.b, now.c, now.d, alpha, run.damped, damping)
+                bend_twist(t, now.a, now.b, now.c, now.d, alpha)
             for k in range(first + thread + threads, last, threads):
                 element = read_twist(table, k, last)
                 alpha = product(t.bend_soft[element.soft], element.scale * rate)
-                bend_twist(t, element.a, element.b, element.c, element.d, alpha, run.damped, damping)
+                bend_twist(t, element.a, element.b, element.c, element.d, alpha)
             soft = t.bend_soft[ready.soft]
             first = start
             last = stop

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.closing import boxes
 from nuno.contact.nearness import GROUP
 from nuno.contact.team_listing import make_lists
 from nuno.contact.world_room import listing_room
 from nuno.resolution import Resolution
 from nuno.scene.cloth import ClothTopology
-from nuno.solver.broad import bounds_room
 from nuno.solver.compliances import compliances, vertex_masses
 from nuno.solver.fine_places import FINE_RATE, FinePlaces
 from nuno.solver.frame import run_fine_lanes, run_fine_worlds, run_lanes, run_worlds
-from nuno.solver.grid import run_fine_grid, run_grid
+from nuno.solver.grid import THREADS, run_fine_grid, run_grid
 from nuno.solver.grid_plan import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES
-from nuno.solver.large import THREADS, LargePlan
 from nuno.solver.list_room import find_missed, lengthen_lists, size_lists
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.relaxation import PLAIN, RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.solver.shared import (
     FEW_FRAMES,
@@ -60,7 +60,7 @@ from nuno.solver.state import (
     Topology,
 )
 from nuno.solver.substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
-from nuno.solver.upload import upload
+from nuno.solver.upload import upload, upload_blocks
 from nuno.solver.wide import run_fine_wide, run_wide, widen_topology
 
 if TYPE_CHECKING:
@@ -72,8 +72,6 @@ BLOCK_PARTICLES = 4096
 """Above this a world does not fit a block well and takes a device's blocks together."""
 TEAM_PARTICLES = 1024
 """Particles of a smaller world for each block of a team that takes less time than one block alone (an H200)."""
-LARGE = ("grid", "large")
-"""Plans in which many blocks work on a world."""
 SHARED_OUT = 7.0
 """Of the plan "grid", see `nuno.solver.grid_plan.teams_of`; 6,561 vertices on an H200, 1 to 132 blocks; 23 for
 16,641."""
@@ -83,8 +81,6 @@ waits for no other's candidates. With the largest thickness, half a cell, it is 
 still has no candidates."""
 STRETCHED = 1.2
 """How many times as long as at rest an edge is taken to be at most, where it is asked what may touch it."""
-CPU_SHARES = 5
-"""Blocks of such a plan on the CPU, one after the other: enough to test how work is shared."""
 PASSES = 2
 """Times that contacts are solved in a substep. Once leaves some of an approach undone where a particle has several: a
 pair that is pressed on comes through bit by bit, and what is left over turns into spin."""
@@ -106,8 +102,7 @@ class ClothSolver(ParticleSolver):
         friction: Friction coefficient of the body; None takes the material's. A number or one per world.
         self_contact: Whether the cloth collides with itself.
         plan: "auto", "fused" (a thread per world or sixteen worlds, or a block per world), "vector" (one world on
-            the CPU by sixteen elements at a time), "grid" (all blocks of a CUDA device together) or "large" (a launch
-            per phase).
+            the CPU by sixteen elements at a time) or "grid" (all blocks of a CUDA device together).
 
     Limitations: one pass a substep, or a few, so that what is much stiffer than m / dt^2 comes out softer than stated,
     by as much as ``resolution`` says, except along a sheet's yarns, which are solved exactly; damping acts on bending
@@ -129,9 +124,10 @@ class ClothSolver(ParticleSolver):
         self_contact: bool = True,
         plan: str = "auto",
     ) -> None:
-        # the large plans keep one world after the other, also where it is tried out on the CPU
-        self._prepare(positions, device, gravity, frame_rate, lanes=plan not in LARGE)
+        # teams of blocks have one world after the other, also where that is tried out on the CPU
+        self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
         self.topology, self._cell_size = topology, topology.cell_size
+        self._launches = RecordedLaunches(self.device, 1)
         down = float(np.linalg.norm(self.gravity))
         values = material.resolved(self.world_count, topology.element_count)
         rigidity = max(float(values[f"bending_rigidity_{side}"].max()) for side in ("warp", "weft"))
@@ -148,16 +144,21 @@ class ClothSolver(ParticleSolver):
         self.resolution = self._resolution(bool(substeps), wanted_substeps(topology, *rule), soft, density, rigidity)
         self.self_contact = self_contact
         self.passes = PASSES  # over contacts of the cloth with itself, in a substep
+        self._all_edges = False  # whether a sheet's diagonals collide with all edges
+        # see `nuno.impacts`: frames for which the cloth is guarded, and how often it was tried in vain to take it apart
+        self.guarded, self.tangled = np.zeros((2, self.world_count), dtype=np.int32)
         self.shared_memory = True
         if plan == "auto":
             plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
             if self._cuda and (self.particle_count > BLOCK_PARTICLES or self._team_pays()):
                 plan = "grid"
         self.plan = plan
-        self._large: LargePlan | GridPlan | None = None
+        self._grid: GridPlan | None = None
+        self._left_out = False
         self._wide: Any = None
-        # what the large plans share out, and their room for listing pairs
-        self._shared: tuple[Any, Any] | None = None
+        # what a team shares out, and its room for listing pairs
+        self._shares: tuple[int, Any] | None = None
+        self._lists: Any = None
         self._build(values, friction)
         self._start(positions, velocities)
 
@@ -176,6 +177,11 @@ class ClothSolver(ParticleSolver):
         parts = share["stretch"], share["shear"], bending
         return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
+    @property
+    def _fine_rate(self) -> float:
+        """Substeps a second [1/s] from which on coordinates are doubles: any, where the rule chose them."""
+        return FINE_RATE if self.resolution.given else 0.0
+
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count
         state = StateLanes() if self.lanes > 1 else StateFloat()
@@ -187,7 +193,7 @@ class ClothSolver(ParticleSolver):
         topo.particles, topo.blocks, topo.columns = n, topology.blocks.count, topology.blocks.columns
         put_sides(topo, topology, self.device, STRETCHED)
         self._size, self._state, self._topology, self._surface = size, state, topo, topo
-        self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine)
+        self._fine = FinePlaces(self, StateFineLanes if self.lanes > 1 else StateFine, self._fine_rate)
 
         soft = compliances(topology, values)
         for kind in ("stretch", "shear", "bend"):
@@ -220,21 +226,18 @@ class ClothSolver(ParticleSolver):
         size.blocks = 6 * (blocks.count + -(-blocks.count // GROUP))
         size.listed = 3 * n + 8 if self.self_contact else 1
         size.near_blocks = 1
-        if self._cuda and self.self_contact and (self.plan not in LARGE or self._fits_block):
+        if self._cuda and self.self_contact and self.plan != "grid":
             # and boxes of what each block moved; pairs of blocks: all, or of many 128 each
             size.blocks += 6 * blocks.count
             size.near_blocks = 1 + min(blocks.count * (blocks.count + 1) // 2, 128 * blocks.count)
-        if self.plan in LARGE:
-            size.blocks = max(size.blocks, bounds_room(blocks.count))
-        elements = len(blocks.face), len(blocks.edge)
-        # spheres of all elements, or on the CPU the room in which one world after the other is listed
-        alone = not self._cuda and self.plan not in LARGE
-        middle = -(-listing_room(n, *elements, blocks.count) // self.lanes) if alone else 4 * sum(elements)
-        size.middle = middle if self.self_contact else 1
+        if self.plan == "grid":
+            # see `nuno.contact.closing`
+            size.blocks = max(size.blocks, 2 * 6 * boxes(blocks.count))
+        size.middle = self._listing_numbers() if self.self_contact else 1
         size_lists(size, n, self.world_count)
         if not self.self_contact:
             size.vertex_triangle = size.edge_edge = 1
-        size.moved = 4 * n if self._cuda or self.plan in LARGE else 1
+        size.moved = 4 * n if self._cuda or self.plan == "grid" else 1
 
         self._allocate_particles()
         size.edges = max(1, len(self.topology.edges))
@@ -252,6 +255,58 @@ class ClothSolver(ParticleSolver):
         state.moved = empty(size.moved, int)
         self._allocate_lists()
 
+    def save_state(self) -> dict[str, np.ndarray]:
+        """As of all particles, and for how many frames more the cloth is guarded: see `nuno.impacts`."""
+        return super().save_state() | {"guarded": self.guarded.copy()}
+
+    def load_state(self, state: dict[str, np.ndarray]) -> None:
+        """As of all particles; a state without it is of a cloth that is not guarded."""
+        super().load_state(state)
+        self.guarded = np.array(np.broadcast_to(state.get("guarded", np.int32(0)), (self.world_count,)))
+
+    def keep(self) -> Any:
+        """As of all particles, and for how many frames more the cloth is guarded."""
+        return super().keep(), self.guarded.copy()
+
+    def put_back(self, kept: Any) -> None:
+        """Set the state that `keep` kept."""
+        super().put_back(kept[0])
+        self.guarded = kept[1].copy()
+
+    def velocities_apart(self, kept: Any = None) -> tuple[np.ndarray, ...]:
+        """As of all particles."""
+        return super().velocities_apart(None if kept is None else kept[0])
+
+    def guard(self, passes: int, diagonals: bool) -> None:
+        """Set how contacts of the cloth with itself are found and solved in what runs next, which lists pairs anew.
+
+        Args:
+            passes: Over contacts in a substep.
+            diagonals: Whether a sheet's diagonals collide with all edges, or at creases alone.
+        """
+        self.passes = passes
+        if not self.self_contact or not len(self.topology.cells) or diagonals == self._all_edges:
+            return
+        self._all_edges = diagonals
+        for name, array in upload_blocks(self.topology, diagonals, self.device).items():
+            setattr(self._topology, name, array)
+        room = self._listing_numbers()
+        if room > self._size.middle:
+            self._size.middle = room
+            self._state.middle = self._empty(room, self._number)
+        notes = self._get(self._state.notes, NOTES).copy()
+        notes[:, TRAVEL] = 1.0e9
+        wp.copy(self._state.notes, self._put(notes))
+        self._forget_launches()
+
+    def _listing_numbers(self) -> int:
+        """Room a world or group of lanes for spheres of all elements, or on the CPU for the listing of one world."""
+        blocks = self.topology.blocks
+        elements = len(blocks.face), len(blocks.edge) + (len(self.topology.cells) if self._all_edges else 0)
+        if self._cuda or self.plan == "grid":
+            return 4 * sum(elements)
+        return -(-listing_room(self.particle_count, *elements, blocks.count) // self.lanes)
+
     def _allocate_lists(self) -> None:
         """Room for candidate pairs, none of them listed.
 
@@ -263,12 +318,9 @@ class ClothSolver(ParticleSolver):
         state.edge_edge = self._list(4 * size.edge_edge)
         state.pair_count = empty(COUNTS, self._integer)
         state.touch_count = empty(2, self._integer)
-        if self.plan == "large":  # solves all listed pairs and picks none
-            state.touch_triangle, state.touch_edge = state.vertex_triangle, state.edge_edge
-        else:
-            state.touch_triangle = self._list(4 * size.vertex_triangle)
-            state.touch_edge = self._list(4 * size.edge_edge)
-        if self._cuda or self.plan in LARGE:  # solve all that is picked
+        state.touch_triangle = self._list(4 * size.vertex_triangle)
+        state.touch_edge = self._list(4 * size.edge_edge)
+        if self._cuda or self.plan == "grid":  # solve all that is picked
             state.picked_triangle, state.picked_edge = state.touch_triangle, state.touch_edge
             state.picked_count = state.touch_count
         else:
@@ -291,7 +343,7 @@ class ClothSolver(ParticleSolver):
     def _allocate_help(self) -> None:
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
         state, worlds, cores = self._state, self.world_count, 0
-        if self._cuda and self.plan not in LARGE and self.self_contact:
+        if self._cuda and self.plan != "grid" and self.self_contact:
             cores = cores_of(self.device)
         state.helpers = max(0, min(cores - worlds, MOST_HELPERS * worlds))
         room = state.helpers * 4 * self._size.edge_edge
@@ -314,20 +366,22 @@ class ClothSolver(ParticleSolver):
         kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
         for (array, room), count in zip(kinds, self.pair_counts[world], strict=True):
             numbers = array.numpy().ravel()[4 * room * world : 4 * room * (world + 1)]
-            by_pair = self._cuda or self.plan in LARGE
+            by_pair = self._cuda or self.plan == "grid"
             rows.append((numbers.reshape(room, 4) if by_pair else numbers.reshape(4, room).T)[:count])
         return rows
 
     def make_room(self) -> bool:
-        """Make lists longer that were too short by the last counts; return whether any is.
+        """Make lists longer that were too short by the last counts; return whether the run's state is not to be used.
 
-        The run's state is then not to be used: contacts were passed over in it.
+        So it is where contacts were passed over in it, or parts of substeps as blocks found no room on the device.
         """
+        left_out = self._left_out or (self._grid is not None and self._grid.left_out())
+        self._left_out = False
         counts = self._get(self._state.pair_count, COUNTS) if self._counted is None else self._counted
         self._counted = None
         missed = find_missed(self._size, counts)
         if not missed.any():
-            return False
+            return left_out
         rows = max(self.group_count, self._state.helpers)
         longer = lengthen_lists(self._size, counts, self.group_count * self.lanes, rows, self.device)
         if longer:
@@ -340,7 +394,7 @@ class ClothSolver(ParticleSolver):
         notes = self._get(self._state.notes, NOTES).copy()
         notes[:, TRAVEL] = 1.0e9
         wp.copy(self._state.notes, self._put(notes))
-        return longer
+        return longer or left_out
 
     def settings(self, time: float, dt: float, frame: int) -> Settings:
         """As of all particles, with lists as wide as the plan wants them."""
@@ -355,17 +409,17 @@ class ClothSolver(ParticleSolver):
     def _advance(self, run: Settings, substeps: int) -> None:
         fine = self._fine.bring(run)
         states = [self._state] if fine is None else [fine, self._state]
-        if self.plan in LARGE:
-            if self._large is None:
-                self._large = self._large_plan()
-            self._large.run(run, substeps, fine)
+        if self.plan == "grid":
+            if self._grid is None:
+                self._grid = self._grid_plan()
+            self._grid.run(run, substeps, fine)
         elif self._cuda:
             self._launch_blocks(run, substeps, fine)
         elif self.plan == "vector":
             if self._wide is None:
                 self._wide = widen_topology(self.topology, self._topology)
             inputs = [*states, self._topology, self._wide, self._size, run, self._shapes, substeps]
-            wp.launch(run_wide if fine is None else run_fine_wide, dim=1, inputs=inputs, device=self.device)
+            self._launches.launch(run_wide if fine is None else run_fine_wide, 1, inputs)
         else:
             kernels = (run_lanes, run_fine_lanes) if self.lanes > 1 else (run_worlds, run_fine_worlds)
             kernel = kernels[fine is not None]
@@ -412,32 +466,30 @@ class ClothSolver(ParticleSolver):
     def _team_pays(self) -> bool:
         """Whether a world beyond a block's memory is quicker by a team; with doubles the bits are the same."""
         share = cores_of(self.device) // self.world_count
-        fine = self.frame_rate * self.substeps >= FINE_RATE
+        fine = self.frame_rate * self.substeps >= self._fine_rate
         return fine and FINE_PARTICLES < self.particle_count <= TEAM_PARTICLES * share
 
-    @property
-    def _fits_block(self) -> bool:
-        """Whether a block does what a team cannot: parts of a substep, and all where a device is too busy."""
-        return self._cuda and self.particle_count <= BLOCK_PARTICLES
-
     def _forget_launches(self) -> None:
-        self._large = None
+        if self._grid is not None:
+            self._left_out |= self._grid.left_out()
+        self._grid = None
 
-    def _large_plan(self) -> LargePlan | GridPlan:
-        grid = self.plan == "grid"
-        teams, blocks = teams_of(self.world_count if grid else 1, cores_of(self.device), SHARED_OUT)
-        stages = divide(self.topology, blocks if grid or self._cuda else CPU_SHARES, self.sweeps)
-        if self._shared is None:
-            work = make_work(self.topology, self._soft, stages, self.device)
-            self._shared = work, make_lists(self._topology, self.world_count, self.device)
-        work, lists = self._shared
-        parts = (self._state, self._topology, self._size, self._shapes)
-        launches = LargePlan(*parts, self.device, self.world_count, work, stages.first, lists)
-        if not grid:
-            return launches
-        otherwise = self._launch_blocks if self._fits_block else launches.run
+    def _grid_plan(self) -> GridPlan:
+        teams, blocks = teams_of(self.world_count, cores_of(self.device), SHARED_OUT)
+        if self._lists is None:
+            self._lists = make_lists(self._topology, self.world_count, self.device)
         before, speeds = (self._topology, self._size), wp.zeros(2 * self.world_count, dtype=float, device=self.device)
-        after = (self._shapes, work, lists, speeds)
-        kernels = run_grid, run_fine_grid
-        blocks = work.step.shape[0] // (4 * work.steps)
-        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, otherwise)
+
+        def after(blocks: int) -> tuple[Any, ...]:
+            return self._shapes, self._work(blocks), self._lists, speeds
+
+        return GridPlan(
+            (run_grid, run_fine_grid), self._state, before, after, self.device, self.world_count, teams, blocks, THREADS
+        )
+
+    def _work(self, blocks: int) -> Any:
+        """The elements in the shares of so many blocks, kept for the next launch."""
+        if self._shares is None or self._shares[0] != blocks:
+            stages = divide(self.topology, blocks, self.sweeps)
+            self._shares = blocks, make_work(self.topology, self._soft, stages, self.device)
+        return self._shares[1]

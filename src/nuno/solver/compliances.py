@@ -11,6 +11,8 @@ from nuno.scene.yarns import string_yarns
 
 SOFTEST = 1.0e-12
 """The least stiffness [N/m] and rigidity [N m], so that a cloth without any has a finite compliance."""
+UNIFORM_BENDS = 9
+"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each of three kinds."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +71,15 @@ def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compl
     twists, twist = _of_elements(topology, topology.twists, bend)
     soft, patch = _of_elements(topology, topology.patches, bend)
     twist, patch = twist + lines.shape[1], patch + lines.shape[1] + twists.shape[1]
+    bending = np.concatenate([lines, twists, soft], axis=1)
+    if _differ(bend):
+        # the strips on CUDA tell by the count that elements have their own numbers, however few there are
+        bending = np.pad(bending, ((0, 0), (0, max(0, UNIFORM_BENDS + 1 - bending.shape[1]))), mode="edge")
     indices = (edge, places, cell[: len(topology.cells)], line, twist, patch)
     return Compliances(
         stretch_soft,
         shear_soft,
-        np.concatenate([lines, twists, soft], axis=1),
+        bending,
         *(np.ascontiguousarray(index, dtype=np.int32) for index in indices),
     )
 

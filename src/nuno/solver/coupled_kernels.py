@@ -2,20 +2,22 @@
 
 import warp as wp
 
+from nuno.contact.convex import Parts
 from nuno.contact.coupled_joints import begin_joint, joint_at, project_joint, settle_spins, sum_joint, turns_of
 from nuno.contact.coupled_particles import Particles, bound_all
 from nuno.contact.coupled_rows import Rows, drag_row, forget_sharers, join_row, push_row, take_sums
 from nuno.contact.coupled_ties import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
 from nuno.contact.joint_block import Joints
+from nuno.contact.joint_contacts import press_entries, press_others
+from nuno.contact.rigid_manifolds import Contacts
 from nuno.solver.lanes import barrier
+from nuno.solver.passing import ENOUGH, Passing, begin_pass, end_pass, goes_on, note_wrong, party_of
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.warps import anyone
 
 LAST_PASSES = wp.constant(4)
 """Passes over friction alone at the end: what the last pushes moved sideways, by normals that differ a little, would
 otherwise creep."""
-ENOUGH = wp.constant(1.0e-8)
-"""[m] Passes end once nothing is farther than this from where it should be."""
 
 
 @wp.struct
@@ -44,73 +46,6 @@ class Layout:
     PZ: wp.array(dtype=wp.float64)
     origin: wp.array(dtype=wp.vec3)  # (worlds), the solver's
     offset: wp.array(dtype=wp.vec3)  # (worlds), from the origin of the body's party to the solver's
-
-
-@wp.struct
-class Passing:
-    """How far the passes have come, by world and body: of a party, the first body's is that of all.
-
-    What goes together in a world ends its passes by itself, so that a party is what it is without the others.
-    """
-
-    bodies: int
-    many: int  # whether any world has more than one party
-    party: wp.array(dtype=int)
-    wrong: wp.array(dtype=float)  # the farthest from where it should be, of this pass [m]
-    done: wp.array(dtype=int)
-
-
-@wp.func
-def party_of(passing: Passing, world: int, body: int):
-    """Where the figures of a body's party are; none are kept where each world has one party."""
-    k = int(-1)
-    if passing.many != 0:
-        k = world * passing.bodies + passing.party[world * passing.bodies + body]
-    return k
-
-
-@wp.func
-def goes_on(passing: Passing, k: int):
-    """Whether a party's passes are not at their end."""
-    on = bool(True)
-    if k >= 0:
-        on = passing.done[k] == 0
-    return on
-
-
-@wp.func
-def note_wrong(passing: Passing, k: int, wrong: float, threads: int):
-    """Raise a party's largest distance."""
-    if k >= 0:
-        if wrong > passing.wrong[k]:
-            if threads > 1:
-                wp.atomic_max(passing.wrong, k, wrong)
-            else:
-                passing.wrong[k] = wrong
-
-
-@wp.func
-def begin_pass(passing: Passing, world: int, first: int, thread: int, threads: int):
-    """Forget distances; before the ``first`` pass of a substep all parties go on."""
-    if passing.many != 0:
-        for b in range(thread, passing.bodies, threads):
-            k = world * passing.bodies + b
-            passing.wrong[k] = 0.0
-            if first != 0:
-                passing.done[k] = 0
-        barrier(threads)
-
-
-@wp.func
-def end_pass(passing: Passing, world: int, thread: int, threads: int):
-    """End the passes of parties that are where they should be."""
-    if passing.many != 0:
-        barrier(threads)
-        for b in range(thread, passing.bodies, threads):
-            k = world * passing.bodies + b
-            if passing.wrong[k] < ENOUGH:
-                passing.done[k] = 1
-        barrier(threads)
 
 
 @wp.func
@@ -177,8 +112,8 @@ def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
 
 @wp.kernel(enable_backward=False)
 def solve(
-    particles: Particles, rigid: RigidState, rows: Rows, ties: Ties, holds: Holds, joints: Joints, passing: Passing,
-    dt: float, fraction: float, passes: int, at_once: int, threads: int,
+    particles: Particles, rigid: RigidState, parts: Parts, manifolds: Contacts, rows: Rows, ties: Ties, holds: Holds,
+    joints: Joints, passing: Passing, dt: float, fraction: float, passes: int, at_once: int, threads: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
@@ -223,11 +158,14 @@ def solve(
             if at_once != 0:
                 take_sums(particles, rigid, first, start, thread, threads)
                 barrier(threads)
+            if joints.count > 0:
+                off = press_entries(rigid, parts, manifolds, joints, passing, world, dt, k_pass, thread, threads)
+                wrong = wp.max(wrong, off)
             if thread == 0:
                 for k in range(ties.count):
                     party = party_of(passing, world, ties.body[k])
                     if goes_on(passing, party):
-                        off = project_tie(particles, rigid, ties, world, k, dt)
+                        off = project_tie(particles, rigid, ties, world, k, dt, fraction)
                         note_wrong(passing, party, off, threads)
                         wrong = wp.max(wrong, off)
                 for k in range(holds.count):
@@ -255,7 +193,7 @@ def solve(
         for k in range(joints.count):
             settle_spins(rigid, joints, world, k, dt)
         for k in range(ties.count):
-            sum_tie(particles, rigid, ties, world, k, dt)
+            sum_tie(particles, rigid, ties, world, k, dt, fraction)
         for k in range(holds.count):
             sum_hold(rigid, holds, world, k, dt, fraction)
         for k in range(joints.count):
@@ -264,3 +202,12 @@ def solve(
         bound_all(particles, world, thread, threads)
         barrier(threads)
         forget_sharers(particles, rigid, first, start, thread, threads)
+
+
+@wp.kernel(enable_backward=False)
+def end_contacts(
+    rigid: RigidState, parts: Parts, manifolds: Contacts, joints: Joints, passing: Passing, dt: float, threads: int
+):
+    """One pass over the positions of rigid bodies that touch, where joints are: those without any had none yet."""
+    tid = wp.tid()
+    press_others(rigid, parts, manifolds, joints, passing, tid / threads, dt, tid % threads, threads)

@@ -8,15 +8,19 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from nuno.contact.convex import Parts
 from nuno.contact.coupled_geometry import measure_rows
-from nuno.contact.coupled_lists import Elements, bound_triangles, list_rows
+from nuno.contact.coupled_lists import Elements, bound_triangles, keep_rows, list_rows
 from nuno.contact.coupled_particles import MOST, Particles
 from nuno.contact.coupled_rows import Rows
 from nuno.contact.coupled_shapes import Surroundings, bound_particles
 from nuno.contact.coupled_ties import Holds, Ties
 from nuno.contact.joint_block import Joints
-from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, Passing, add_impulses, collect, scatter, solve
+from nuno.contact.rigid_manifolds import Contacts
+from nuno.solver.coupled_kernels import IMPULSE_UNIT, Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.passing import Passing
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.rigid_body import RigidState
 from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
 
@@ -50,6 +54,11 @@ class Coupling:
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
         joints: Rigid bodies that are joined.
+
+    Attributes:
+        led: Slots of rigid bodies that others lead.
+        tie_places: (worlds, ties, 2, 3) float64 [m], where ties to places are led in the next frame, from and to; None
+            where there are none.
     """
 
     def __init__(
@@ -70,24 +79,33 @@ class Coupling:
         self.device, self.world_count = str(first.device), int(first.world_count)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
         self._at_once = solves_at_once(self.device)
+        self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
         self._state = RigidState() if rigid is None else rigid.state
         self._bodies = int(elements.bodies)
         self._party = np.zeros((0, 0), dtype=int)
         self._passing = Passing()
         for name, kind in (("wrong", float), ("done", int)):
             setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
+        numbers = np.full(max(1, int(self._state.capacity)), -1, dtype=np.int32)
+        numbers[self._slots] = np.arange(len(self._solvers), self._bodies)
+        self._passing.body_of = wp.array(numbers, dtype=int, device=self.device)
         self._impulses = wp.zeros(3 * self.world_count * self._bodies**2, dtype=wp.int64, device=self.device)
         firsts = np.cumsum([0, *(solver.particle_count for solver in self._solvers)])
         self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
         self._layouts: list[Layout] = []
         self._particles = self._room(total)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
-        sizes = [solver._cell_size for solver in self._solvers]
-        self._margin = 0.5 * min(sizes) if sizes else 0.01
-        self._apart = 2.0 * float(elements.radius.numpy().max(initial=0.0))
+        self._cells = np.full(self._bodies, np.inf)
+        self._cells[: len(self._solvers)] = [solver._cell_size for solver in self._solvers]
+        self._radii = elements.radius.numpy().reshape(self.world_count, self._bodies).T.astype(float)
+        self._touches_itself = elements.touch.numpy()[:: self._bodies + 1][: self._bodies] != 0
+        tied = set(ties.body.numpy()[: ties.count].tolist())
+        self._is_tied = np.array([k in tied for k in range(self._bodies)])
         self._rows = self._row_room(4 * total + 512)
+        self._kept = wp.zeros(self.world_count, dtype=int, device=self.device)
         self._bvh: Any = None
         self.led: list[int] = []
+        self.tie_places: np.ndarray | None = None
 
     def _room(self, total: int) -> Particles:
         worlds, capacity = self.world_count, max(1, int(self._state.capacity))
@@ -159,6 +177,10 @@ class Coupling:
             self._elements.party = wp.array(party.T.astype(np.int32).ravel(), dtype=int, device=self.device)
             self._passing.bodies, self._passing.party = self._bodies, self._elements.party
             self._passing.many = int((party != party[0]).any())
+            joined = np.zeros(party.shape, dtype=bool)
+            for body in self.joints.body.numpy() if self.joints.count else ():
+                joined |= party == party[body]
+            self._passing.jointed = wp.array(joined.T.astype(np.int32).ravel(), dtype=int, device=self.device)
         # what all places of a party are relative to: the rigid scene's where a rigid body is in it, which has no other
         own = np.stack([solver.origin for solver in self._solvers] or [np.zeros((worlds, 3))])  # (solvers, worlds, 3)
         self._origins = np.zeros((worlds, self._bodies, 3))
@@ -188,7 +210,8 @@ class Coupling:
         self._impulses.zero_()
         for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
-        self.holds.step = 1.0 / substeps
+        self._ties.step = self.holds.step = 1.0 / substeps
+        self._place_ties()
         if self.joints.count:
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
@@ -197,83 +220,124 @@ class Coupling:
         # what diverges is told of after the run
         speeds = np.nan_to_num(self._speeds(), nan=FAST, posinf=FAST)
         reaches = 2.0 * (QUICKER * np.minimum(speeds, FAST) + 10.0 * duration + 0.1) * dt
-        self._elements.reach.assign(reaches.T.astype(np.float32).ravel())
-        reach = float(reaches.max())
-        margin = max(min(self._margin, (1 + substeps / 3) * reach), 1.5 * reach)
-        every = max(1, int((margin - reach) / reach))
-        if self._is_apart(substeps * reach):
+        self._put(self._elements.reach, reaches)
+        apart = self._find_apart(substeps * reaches)
+        if apart.all() and len(self._solvers) == self._bodies == 1:
             self._solvers[0]._launch(time, dt, substeps, substeps)
             return
+        self._plan_listings(substeps, reaches, apart)
         for k in range(substeps):
             for solver in self._solvers:
                 solver.step_parts(k, MOTION | PULLS | LAYERS)
             if self._rigid is not None:
                 self._rigid.predict()
-            self._touch(k, every, margin, dt, (k + 1) / substeps)
-            if self._rigid is not None:
+            self._touch(k, dt, (k + 1) / substeps)
+            if self.joints.count:
+                wp.launch(
+                    end_contacts, dim=self.world_count * self._threads, device=self.device, block_dim=BLOCK_THREADS,
+                    inputs=[self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads],
+                )  # fmt: skip
+            elif self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
                 solver.step_parts(k, SHAPES | VELOCITIES)
             if self._rigid is not None:
                 self._rigid.finish()
 
-    def _is_apart(self, reach: float) -> bool:
-        """Whether this is one body that touches itself, and no two of its parts come nearer than ``reach`` [m].
+    def _place_ties(self) -> None:
+        """Bring the places to which ties are led, relative to what all places of a party are relative to."""
+        if self.tie_places is not None:
+            owners = self._ties.body.numpy()
+            relative = self.tie_places - self._origins[:, owners][:, :, None]
+            table = np.ascontiguousarray(relative.reshape(-1, 3), dtype=np.float32)
+            self._ties.place.assign(wp.array(table, dtype=wp.vec3, device=self.device))
 
-        It then goes through the frame in one launch, with the same bits.
+    def _find_apart(self, reaches: np.ndarray) -> np.ndarray:
+        """Return (bodies, worlds) bool, which bodies only touch themselves, with no two parts within ``reaches`` [m].
+
+        No row of theirs can push in this frame. One that is by itself goes through it in one launch, with the same
+        bits.
         """
-        if len(self._solvers) > 1 or self._rigid is not None or self._ties.count:
-            return False
-        layout = self._layouts[0]
-        wp.launch(
-            collect, dim=(self.world_count, layout.particles), inputs=[layout, self._particles, self._start],
-            device=self.device,
-        )  # fmt: skip
-        self._list(reach)
-        return self._listed == 0
+        column = np.arange(self.world_count)
+        members = np.zeros_like(self._party)
+        np.add.at(members, (self._party, column), 1)
+        apart = (members[self._party, column] == 1) & (self._touches_itself & ~self._is_tied)[:, None]
+        if not apart.any():
+            return apart
+        self._collect()
+        self._list(np.where(apart, self._contact_distances() + reaches, -1.0), from_start=True)
+        counts, most = self._rows.count.numpy(), self._listed
+        if most:
+            listed = self._rows.bodies.reshape((self.world_count, self._rows.room))[:, :most].numpy()
+            for world in np.flatnonzero(counts):
+                apart[listed[world, : counts[world], 0], world] = False
+        return apart
 
-    def _touch(self, k: int, every: int, margin: float, dt: float, fraction: float) -> None:
-        worlds, particles, rows, elements = self.world_count, self._particles, self._rows, self._elements
+    def _contact_distances(self) -> np.ndarray:
+        """(bodies, worlds) [m], how far apart the surfaces of each one's party are kept at most."""
+        return 2.0 * self._over_party(np.maximum, self._radii)
 
-        def go(kernel: Any, dim: Any, *inputs: Any) -> None:
-            wp.launch(kernel, dim=dim, inputs=list(inputs), device=self.device, block_dim=BLOCK_THREADS)
+    def _plan_listings(self, substeps: int, reaches: np.ndarray, apart: np.ndarray) -> None:
+        """Decide how far the rows of each party look, and after how many substeps they are listed anew.
 
-        for layout in self._layouts:
-            go(collect, (worlds, layout.particles), layout, particles, self._start)
-        if k % every == 0:
-            self._list(margin)
-            rows = self._rows
+        Both are the party's own: it must go as it would alone, and rows depend on when and how far was looked.
+        """
+        cells = self._over_party(np.minimum, np.broadcast_to(self._cells[:, None], reaches.shape))
+        margins = np.maximum(np.minimum(0.5 * cells, (1 + substeps / 3) * reaches), 1.5 * reaches)
+        self._far = self._contact_distances() + margins
+        self._every = np.maximum(1, ((margins - reaches) / reaches).astype(int))
+        self._apart = apart
+
+    def _collect(self) -> None:
+        for body, layout in enumerate(self._layouts):
+            self._go(collect, (self.world_count, layout.particles), layout, self._particles, self._start, body=body)
+
+    def _go(self, kernel: Any, dim: Any, *inputs: Any, body: int = 0) -> None:
+        self._launches.launch(kernel, dim, inputs, body)
+
+    def _touch(self, k: int, dt: float, fraction: float) -> None:
+        worlds, particles, elements = self.world_count, self._particles, self._elements
+        self._collect()
+        due = (k % self._every == 0) & ~self._apart
+        if k == 0 or due.any():
+            self._list(np.where(due, self._far, -1.0), from_start=bool((due | self._apart).all()))
+        rows = self._rows
         # ties are solved where nothing touches, too: none of the rows and bounds of before is left
         rows.active_count.zero_()
         particles.bounded_count.zero_()
         if self._listed:
-            go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
+            self._go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
             for body, (layout, around) in enumerate(zip(self._layouts, self._around, strict=True)):
                 if around.shapes.count:
-                    go(
+                    self._go(
                         bound_particles, (worlds, layout.particles), layout, particles, elements, around, body, k + 1,
-                        dt,
+                        dt, body=body,
                     )  # fmt: skip
         if self._listed or self._ties.count or self.holds.count or self.joints.count:
-            go(
-                solve, worlds * self._threads, particles, self._state, rows, self._ties, self.holds, self.joints,
-                self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once),
-                self._threads,
+            self._go(
+                solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
+                self.holds, self.joints, self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
+                int(self._at_once), self._threads,
             )  # fmt: skip
             if self._listed:
-                go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
-            for layout in self._layouts:
-                go(scatter, (worlds, layout.particles), layout, particles, self._start)
+                self._go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
+            for body, layout in enumerate(self._layouts):
+                self._go(scatter, (worlds, layout.particles), layout, particles, self._start, body=body)
 
-    def _list(self, margin: float) -> None:
-        """Find the candidates anew, in more room where they do not fit."""
+    def _manifolds(self) -> tuple[Parts, Contacts]:
+        """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""
+        return (Parts(), Contacts()) if self._rigid is None else (self._rigid.table.parts, self._rigid.manifolds)
+
+    def _list(self, far: np.ndarray, from_start: bool) -> None:
+        """Find the candidates of bodies anew up to ``far`` (bodies, worlds) [m], in more room where they do not fit.
+
+        Rows of bodies where it is negative stay, or with ``from_start`` go.
+        """
         worlds, elements = self.world_count, self._elements
+        self._put(elements.far, far)
         bvh = wp.uint64(0)
         if elements.triangles:
-            wp.launch(
-                bound_triangles, dim=(worlds, elements.triangles), inputs=[self._particles, elements],
-                device=self.device,
-            )  # fmt: skip
+            self._go(bound_triangles, (worlds, elements.triangles), self._particles, elements)
             if self._bvh is None:
                 owner = np.repeat(np.arange(worlds, dtype=np.int32), elements.triangles)
                 groups: Any = wp.array(owner, dtype=int, device=self.device)
@@ -281,16 +345,43 @@ class Coupling:
             else:
                 self._bvh.refit()
             bvh = self._bvh.id
-        while True:
+        if from_start:
             self._rows.count.zero_()
-            wp.launch(
-                list_rows, dim=worlds * self._threads, block_dim=BLOCK_THREADS, device=self.device,
-                inputs=[self._particles, self._state, elements, self._rows, bvh, self._apart + margin, self._threads],
+        else:
+            self._go(keep_rows, worlds, elements, self._rows)
+            wp.copy(self._kept, self._rows.count)
+        while True:
+            self._go(
+                list_rows, worlds * self._threads, self._particles, self._state, elements, self._rows, bvh,
+                self._threads,
             )  # fmt: skip
             self._listed = int(self._rows.count.numpy().max())
             if self._listed <= self._rows.room:
                 return
-            self._rows = self._row_room(self._listed + self._listed // 2)
+            before, self._rows = self._rows, self._row_room(self._listed + self._listed // 2)
+            if not from_start:
+                self._keep_listed(before)
+
+    def _keep_listed(self, before: Rows) -> None:
+        """Take over the rows that stay from an array that was too short."""
+        for name in ("kind", "corners", "slot", "part", "bodies", "point"):
+            known = getattr(before, name).numpy().reshape(self.world_count, before.room, -1)
+            table = getattr(self._rows, name)
+            longer = np.zeros((self.world_count, self._rows.room, known.shape[-1]), dtype=known.dtype)
+            longer[:, : before.room] = known
+            table.assign(longer.reshape(table.numpy().shape))
+        wp.copy(self._rows.count, self._kept)
+
+    def _put(self, table: wp.array, values: np.ndarray) -> None:
+        """Write numbers (bodies, worlds) to a table by world and body."""
+        table.assign(values.T.astype(np.float32).ravel())
+
+    def _over_party(self, function: Any, values: np.ndarray) -> np.ndarray:
+        """Return (bodies, worlds), the largest or least of each one's party."""
+        column = np.arange(self.world_count)
+        found = np.full(self._party.shape, np.inf if function is np.minimum else 0.0)
+        function.at(found, (self._party, column), values)
+        return found[self._party, column]
 
     def _speeds(self) -> np.ndarray:
         """The largest speed in each one's party, (bodies, worlds) [m/s]."""
@@ -302,9 +393,7 @@ class Coupling:
 
             radius = self._rigid.rules.radius.numpy()[self._slots]
             own += list((sizes(self._state.velocity) + sizes(self._state.spin) * radius).T.astype(float))
-        most, column = np.zeros(self._party.shape), np.arange(self.world_count)
-        np.maximum.at(most, (self._party, column), np.array(own))
-        return most[self._party, column]
+        return self._over_party(np.maximum, np.array(own))
 
     # -- what the last frame took
 

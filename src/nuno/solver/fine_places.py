@@ -11,8 +11,9 @@ from nuno.solver.fine import fine, fine_lane
 from nuno.solver.state import PLACES, Settings
 
 FINE_RATE = 1500.0
-"""[1/s] From so many substeps a second on, 25 a frame of 1/60 s, coordinates are doubles (see `nuno.solver.fine`).
-Gravity then moves a vertex by 4 um in one, and a float at half a metre has steps of 0.03 to 0.06 um."""
+"""[1/s] From so many substeps a second on, 25 a frame of 1/60 s, coordinates are doubles (see `nuno.solver.fine`); of a
+cloth whose substeps the rule chooses in any case. Gravity then moves a vertex by 4 um in one, and a float at half a
+metre has steps of 0.03 to 0.06 um."""
 
 
 @wp.kernel(enable_backward=False, module="nuno.solver.widen")
@@ -31,10 +32,11 @@ class FinePlaces:
     Args:
         solver: A `nuno.solver.particle_solver.ParticleSolver`.
         kind: The class of its state with coordinates as doubles.
+        rate: Substeps a second [1/s] from which on doubles count.
     """
 
-    def __init__(self, solver: Any, kind: Any) -> None:
-        self._solver, self._kind = solver, kind
+    def __init__(self, solver: Any, kind: Any, rate: float = FINE_RATE) -> None:
+        self._solver, self._kind, self._rate = solver, kind, rate
         self._state: Any = None
         self.count = False  # whether the doubles are what counts
 
@@ -50,7 +52,7 @@ class FinePlaces:
 
     def bring(self, run: Settings) -> Any:
         """The state with doubles that count from now on, or None where a run has so few substeps that floats do."""
-        if self._solver.frame_rate * run.frame < FINE_RATE:
+        if self._solver.frame_rate * run.frame < self._rate:
             self.count = False
             return None
         state, floats = self._made(), self._solver._state

@@ -17,6 +17,7 @@ from nuno.contact.sharp_turns import touch_awake, touch_sharp, travel
 from nuno.contact.still_shapes import touch_shapes_together
 from nuno.solver.bending import bend_line, bend_patch, bend_twist
 from nuno.solver.cloth_ahead import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
+from nuno.solver.damping import damp_bends
 from nuno.solver.fine_yarns import PAIR_EDGES, WARP_EDGES, stretch_fine_yarns
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
@@ -24,7 +25,6 @@ from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.sheet_strips import bend_in_strips, fits_strips
 from nuno.solver.state import (
-    DAMPING,
     LAYERS,
     MOTION,
     PULLS,
@@ -41,7 +41,7 @@ from nuno.solver.state import (
     view,
 )
 from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
-from nuno.solver.vector import at, corner, scaled, spread
+from nuno.solver.vector import at, corner, scaled
 from nuno.solver.warps import WARP, in_warps
 from nuno.solver.yarns import YARN_EDGES, stretch_yarns_together
 
@@ -53,37 +53,34 @@ STRETCH_KINDS = wp.constant(2)
 def bend_lines(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The line bends of one colour."""
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
         alpha = scaled(at(t.bend_soft, table.line_soft[k]), table.line_scale[k] * rate)
         a = corner(table.line, k, 0, 3)
         b = corner(table.line, k, 1, 3)
         c = corner(table.line, k, 2, 3)
-        bend_line(t, a, b, c, alpha, run.damped, spread(alpha, damping))
+        bend_line(t, a, b, c, alpha)
 
 
 @wp.func
 def bend_twists(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The cell twists of one colour."""
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
         alpha = scaled(at(t.bend_soft, table.twist_soft[k]), table.twist_scale[k] * rate)
         a = corner(table.twist, k, 0, 4)
         b = corner(table.twist, k, 1, 4)
         c = corner(table.twist, k, 2, 4)
         d = corner(table.twist, k, 3, 4)
-        bend_twist(t, a, b, c, d, alpha, run.damped, spread(alpha, damping))
+        bend_twist(t, a, b, c, d, alpha)
 
 
 @wp.func
 def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The triangles' curvatures of one colour."""
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for k in range(first + thread, last, threads):
         alpha = scaled(at(t.bend_soft, table.patch_soft[k]), rate)
-        bend_patch(t, table, k, alpha, run.damped, spread(alpha, damping))
+        bend_patch(t, table, k, alpha)
 
 
 @wp.func
@@ -365,6 +362,8 @@ def advance(t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, su
             barrier(threads)
             if run.touching != 0:
                 renew_lists(near, topo, run, thread, threads)
+            if run.damped != 0:
+                damp_bends(t, topo, run, thread, threads, threads)
             predict(t, n, run, thread, threads)
             barrier(threads)
             hold_vertices(t, run, thread, threads)

@@ -1,7 +1,7 @@
 """A cloth's frame by a team of blocks, for `nuno.solver.grid_plan.GridPlan`.
 
-The phases are those of `nuno.solver.large`, but blocks wait for each other inside of the launch, and lists that still
-hold cost nothing. Every block keeps the figures that all threads read in shared memory, its own copy.
+The phases are those of `nuno.solver.frame`, so that colours come in the same order and give the same bits; blocks wait
+for each other inside of the launch. Every block keeps the figures that all threads read in shared memory, its own copy.
 """
 
 from __future__ import annotations
@@ -15,15 +15,34 @@ from nuno.contact.shapes import measure_box, reset_box, select_shapes, sort_shap
 from nuno.contact.sharp_shapes import forget_sharp, list_sharp, mark_sharp
 from nuno.contact.sharp_turns import touch_sharp
 from nuno.contact.team_listing import Lists, renew_by_team
-from nuno.solver.grips import forget_loads, pull_points
-from nuno.solver.integrate import reset_speed, tick
+from nuno.solver.damping import damp_bends
+from nuno.solver.frame import meet_shapes
+from nuno.solver.grips import forget_loads, pull_points, read_loads
+from nuno.solver.integrate import read_velocities, reset_speed, round_places, tick
 from nuno.solver.lanes import barrier
-from nuno.solver.large import THREADS, come_to_rest
 from nuno.solver.shared_memory import MOST_STEPS, figures, program
 from nuno.solver.stages import Work, go_through, grips_on, steps_of
-from nuno.solver.state import NOTES, SPEED, Settings, Shapes, Sizes, StateFine, StateFloat, Topology, view
+from nuno.solver.state import (
+    LAYERS,
+    MOTION,
+    NOTES,
+    PULLS,
+    SHAPES,
+    SPEED,
+    VELOCITIES,
+    Settings,
+    Shapes,
+    Sizes,
+    StateFine,
+    StateFloat,
+    Topology,
+    view,
+)
 from nuno.solver.team import Team, begin_to_meet, call_roll, meet, team_of
 from nuno.solver.warps import in_warps
+
+THREADS = 512
+"""Threads of a block."""
 
 for _name in ("run_grid", "run_fine_grid"):
     wp.get_module(f"nuno.solver.{_name}").options["fast_math"] = True  # as in the plans for a block
@@ -63,11 +82,37 @@ def share_speed(t: Any, speeds: wp.array(dtype=float), own: int, other: int, tea
 
 
 @wp.func
+def come_to_rest(
+    t: Any, near: Any, n: int, run: Settings, shapes: Shapes, grips: int, first: int, last: int, thread: int,
+    threads: int,
+):  # fmt: skip
+    """What ends a substep of the particles first to last: sums of contact, stiff grips, shapes, velocities.
+
+    ``grips`` is none where no stiff grip is on one of these; ``near`` is as `nuno.solver.frame.advance` has it.
+    """
+    if run.parts & LAYERS != 0 and run.touching != 0:
+        for i in range(first + thread, last, threads):
+            take_moves(t, n, i, n)
+    if run.parts & SHAPES != 0:
+        if grips > 0:
+            barrier(threads)
+            for g in range(thread, grips, threads):
+                i = t.grip_corner[3 * g]
+                if i >= first and i < last:
+                    read_loads(t, run, g, grips)
+            barrier(threads)
+        meet_shapes(t, last, shapes, run.dt, first + thread, threads)
+    if run.parts & VELOCITIES != 0:
+        read_velocities(t, last, run, first + thread, threads)
+        round_places(near, t, last, first + thread, threads)
+
+
+@wp.func
 def advance_by_team(
     t: Any, near: Any, topo: Topology, work: Work, steps: wp.array(dtype=int), run: Settings, shapes: Shapes,
     lists: Lists, speeds: wp.array(dtype=float), world: int, substeps: int, team: Team,
 ):  # fmt: skip
-    """The phases of ``substeps`` substeps, the first of which begins a frame.
+    """The phases of ``substeps`` substeps: all of them, or those of the parts that are asked for.
 
     ``near`` is as `nuno.solver.frame.advance` has it.
     """
@@ -77,21 +122,26 @@ def advance_by_team(
     # the first step is that of the particles
     led = grips_on(t, run, steps[2], steps[3])
     held = grips_on(t, run, first, last)
-    forget_loads(t, run, team.turn, team.turns)
     if team.turn == 0:
         speeds[2 * world] = 0.0
-    near_shapes(near, topo, run, shapes, team)
+    meet(team)
     for k in range(substeps):
-        tick(t, run, team.thread)
-        barrier(team.threads)
-        if run.touching != 0:
-            renew_by_team(near, topo, run, lists, world, team)
-        go_through(t, topo, work, steps, run, led, 0, work.steps, team)
-        meet(team)
-        if run.pulled != 0:
+        if run.parts & MOTION != 0:
+            if (run.first + k) % run.frame == 0:
+                forget_loads(t, run, team.turn, team.turns)
+                near_shapes(near, topo, run, shapes, team)
+            tick(t, run, team.thread)
+            barrier(team.threads)
+            if run.touching != 0:
+                renew_by_team(near, topo, run, lists, world, team)
+            if run.damped != 0:
+                damp_bends(t, topo, run, team.turn, team.turns, team)
+            go_through(t, topo, work, steps, run, led, 0, work.steps, team)
+            meet(team)
+        if run.pulled != 0 and run.parts & PULLS != 0:
             pull_points(t, run, team.turn, 1)
             meet(team)
-        if run.touching != 0:
+        if run.touching != 0 and run.parts & LAYERS != 0:
             for again in range(run.passes):
                 if again > 0:
                     for i in range(first + team.thread, last, team.threads):
@@ -100,8 +150,8 @@ def advance_by_team(
                 touch_edge_edge(t, n, run, team.turn, team.turns)
                 touch_vertex_triangle(t, n, run, team.turn, team.turns)
                 meet(team)
-        if t.sharp[0] > 0:
-            if run.touching != 0:
+        if t.sharp[0] > 0 and run.parts & SHAPES != 0:
+            if run.touching != 0 and run.parts & LAYERS != 0:
                 for i in range(first + team.thread, last, team.threads):
                     take_moves(t, n, i, n)
                 meet(team)
@@ -109,10 +159,12 @@ def advance_by_team(
             if team.block == 0:
                 touch_sharp(t, topo, run, shapes, team.thread, team.threads)
             meet(team)
-        reset_speed(t, team.thread)
-        barrier(team.threads)
+        if run.parts & VELOCITIES != 0:
+            reset_speed(t, team.thread)
+            barrier(team.threads)
         come_to_rest(t, near, n, run, shapes, held, first, last, team.thread, team.threads)
-        share_speed(t, speeds, 2 * world + k % 2, 2 * world + (k + 1) % 2, team)
+        if run.parts & VELOCITIES != 0:
+            share_speed(t, speeds, 2 * world + k % 2, 2 * world + (k + 1) % 2, team)
 
 
 @wp.func
@@ -169,9 +221,9 @@ def run_grid(
     speeds: wp.array(dtype=float), gate: wp.array(dtype=int), call: int, substeps: int, teams: int, blocks: int,
     threads: int,
 ):  # fmt: skip
-    """A frame, or the beginning of one, of every world by a team of blocks; nothing where not all are there."""
+    """A frame, or some of one, of every world by a team of blocks; nothing where not all are there."""
     first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
-    if call_roll(gate, call, teams, teams * blocks):
+    if blocks == 1 or call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
         run_teams(s, s, topo, size, run, shapes, work, lists, speeds, first, substeps, teams, team)
 
@@ -184,6 +236,6 @@ def run_fine_grid(
 ):  # fmt: skip
     """`run_grid` where coordinates are doubles."""
     first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
-    if call_roll(gate, call, teams, teams * blocks):
+    if blocks == 1 or call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
         run_teams(s, floats, topo, size, run, shapes, work, lists, speeds, first, substeps, teams, team)

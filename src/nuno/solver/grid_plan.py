@@ -2,7 +2,7 @@
 
 Each world has a team of blocks, which takes more worlds in turn where there are many. Blocks wait for each other inside
 of the launch (`nuno.solver.team`), which takes half as long as beginning another. Where the device has no room for all
-blocks at once, other launches take over.
+blocks at once, each world has a single block, which waits for nobody.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from nuno.solver.team import ARRIVED, COUNT, VERDICT, counts_of
 
 log = logging.getLogger(__name__)
 
+CALLS = 64
+"""Launches of parts of substeps between two looks at whether all blocks found room."""
+
 
 class GridPlan:
     """A launch a frame of as many blocks as there are multiprocessors.
@@ -26,46 +29,90 @@ class GridPlan:
         kernels: For coordinates as floats, and as doubles.
         state: The state of all worlds, coordinates as floats.
         before: What the kernels take between states and settings.
-        after: What they take behind these; then come the launch's counts, its number, substeps, teams, and the blocks
-            and threads of each.
+        after: Gives, for the blocks of a team, what they take behind these; then come the launch's counts, its number,
+            substeps, teams, and the blocks and threads of each.
         device: "cuda:0" ..., or "cpu", where one thread does everything.
-        teams: How many worlds are gone through at once, each by a team of blocks.
+        worlds: How many there are.
+        teams: How many of them are gone through at once, each by a team of blocks.
         blocks: Of a team.
         threads: Of a block.
-        otherwise: Does what a launch of this plan cannot: parts of a substep, and all where not all blocks find room on
-            the device. It takes the settings, the substeps and the state with doubles, or None.
+        parts: Does parts of a substep where the kernels cannot. It takes the settings, the substeps and the state with
+            doubles, or None.
     """
 
     def __init__(
-        self, kernels: tuple[Any, Any], state: Any, before: Sequence[Any], after: Sequence[Any], device: str,
-        teams: int, blocks: int, threads: int, otherwise: Callable[[Any, int, Any], None],
+        self, kernels: tuple[Any, Any], state: Any, before: Sequence[Any], after: Callable[[int], Sequence[Any]],
+        device: str, worlds: int, teams: int, blocks: int, threads: int,
+        parts: Callable[[Any, int, Any], None] | None = None,
     ) -> None:  # fmt: skip
         self._kernels, self._state, self._before, self._after = kernels, state, before, after
-        self._device, self._teams, self._blocks = device, teams, blocks
+        self._device, self._worlds, self._teams, self._blocks = device, worlds, teams, blocks
         self._threads = threads if device.startswith("cuda") else 1
-        self._otherwise = otherwise
-        self._crowded = False
+        self._parts = parts
+        # counts of the launches that did parts of substeps and were not looked at yet, and how many these are
+        self._counts: wp.array | None = None
+        self._calls = 0
+        self._left_out = False
 
     def run(self, run: Any, substeps: int, fine: Any = None) -> None:
         """Advance by ``substeps`` substeps under the settings ``run``, coordinates as doubles if there is ``fine``."""
-        if run.parts != ALL_PARTS or self._crowded:
-            self._otherwise(run, substeps, fine)
+        if run.parts != ALL_PARTS:
+            (self._parts or self._run_parts)(run, substeps, fine)
             return
         frames = range(0, substeps, run.frame)
-        gate = wp.zeros(len(frames) * counts_of(self._teams), dtype=int, device=self._device)
-        states = [self._state] if fine is None else [fine, self._state]
-        kernel = self._kernels[fine is not None]
+        counts = self._new_counts(len(frames))
         for call, first in enumerate(frames):
-            inputs = [*states, *self._before, run, *self._after, gate, call, min(run.frame, substeps - first)]
-            inputs += [self._teams, self._blocks, self._threads]
-            dim = self._teams * self._blocks * self._threads
-            wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
-        verdicts = gate.numpy().reshape(len(frames), ARRIVED + self._teams, COUNT)[:, VERDICT, 0]
-        if (verdicts != 1).any():
-            self._crowded = True
-            log.warning("a CUDA device is too busy for a launch of %d blocks: smaller ones go on", self._blocks)
-            run.first = int((verdicts == 1).sum()) * run.frame
-            self._otherwise(run, substeps - run.first, fine)
+            self._launch(run, min(run.frame, substeps - first), fine, counts, call)
+        if self._blocks > 1:
+            done = self._find_done(counts, len(frames))
+            if done < len(frames):
+                self._give_up_teams()
+                run.first = done * run.frame
+                self._launch(run, substeps - run.first, fine, counts, 0)
+
+    def left_out(self) -> bool:
+        """Return whether parts of substeps since this was asked last were not done, as blocks found no room.
+
+        All that came after them is then to be gone through again.
+        """
+        self._look_back()
+        left_out, self._left_out = self._left_out, False
+        return left_out
+
+    def _run_parts(self, run: Any, substeps: int, fine: Any) -> None:
+        """Launch without a look at whether all blocks found room: see `left_out`."""
+        if self._calls == CALLS:
+            self._look_back()
+        if self._counts is None:
+            self._counts = self._new_counts(CALLS)
+        self._launch(run, substeps, fine, self._counts, self._calls)
+        self._calls += 1
+
+    def _look_back(self) -> None:
+        if self._calls and self._blocks > 1 and self._find_done(self._counts, self._calls) < self._calls:
+            self._give_up_teams()
+            self._left_out = True
+        self._counts, self._calls = None, 0
+
+    def _new_counts(self, calls: int) -> wp.array:
+        return wp.zeros(calls * counts_of(self._teams), dtype=int, device=self._device)
+
+    def _find_done(self, counts: Any, calls: int) -> int:
+        """Return the first of the launches whose blocks were not all there, or ``calls``."""
+        verdicts = counts.numpy().reshape(-1, ARRIVED + self._teams, COUNT)[:calls, VERDICT, 0]
+        return int((verdicts == 1).sum())  # after one that failed all do
+
+    def _give_up_teams(self) -> None:
+        log.warning("a CUDA device is too busy for a launch of %d blocks: each world has one from now on", self._blocks)
+        self._teams, self._blocks = self._worlds, 1  # which wait for nobody, and give the same bits
+
+    def _launch(self, run: Any, substeps: int, fine: Any, counts: Any, call: int) -> None:
+        states = [self._state] if fine is None else [fine, self._state]
+        inputs = [*states, *self._before, run, *self._after(self._blocks), counts, call, substeps]
+        inputs += [self._teams, self._blocks, self._threads]
+        dim = self._teams * self._blocks * self._threads
+        kernel = self._kernels[fine is not None]
+        wp.launch(kernel, dim=dim, inputs=inputs, device=self._device, block_dim=self._threads)
 
 
 def teams_of(worlds: int, cores: int, shared: float) -> tuple[int, int]:

@@ -45,6 +45,21 @@ def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]])
     solver._last_dt = last
 
 
+def move_particles(solver: ParticleSolver, moved: dict[int, np.ndarray]) -> None:
+    """Put the particles of some worlds elsewhere: positions (n, 3) [m] by world. They go on as fast as they were."""
+    if not moved:
+        return
+    made, worlds = copy_particles(solver), np.zeros(solver.world_count, dtype=bool)
+    for world, positions in moved.items():
+        worlds[world] = True
+        for axis, name in enumerate("xyz"):
+            local = positions[:, axis] - solver.origin[world, axis]
+            for kept in (name, f"fine_{name}"):
+                if kept in made:
+                    made[kept][world] = local
+    mix_particles(solver, [(made, worlds)])
+
+
 def _mix_doubles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
     """The same for coordinates that are doubles in some copies; in the others they are the floats'."""
     if not solver._fine.count and not any("fine_x" in copied for copied, _ in made):

@@ -34,6 +34,7 @@ class RigidState:
     inverse_inertia: wp.array(dtype=wp.mat33)
     weight: wp.array(dtype=float)  # the inverse mass in this run [1/kg], negative once a hold says where it is
     give: wp.array(dtype=wp.mat33)  # the inverse inertia in this run, world frame, of where the substep began
+    joined: wp.array(dtype=int)  # 1 once joints say where it is in this substep
 
 
 @wp.func
@@ -89,6 +90,13 @@ def shift_body(s: RigidState, i: int, d: wp.vec3):
 
 
 @wp.func
+def turn_body(s: RigidState, i: int, turn: wp.vec3):
+    """Turn a body; one that corrections do not move keeps every bit, which rounding would not leave it."""
+    if s.weight[i] > 0.0:
+        s.rotation[i] = turned(s.rotation[i], turn)
+
+
+@wp.func
 def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.vec3):
     """Move a body by a positional impulse [kg m] at ``arm`` from its centre of mass (equations 6 to 9).
 
@@ -96,8 +104,7 @@ def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.v
     the body on the other side is -dlambda n.
     """
     shift_body(s, i, s.weight[i] * correction)
-    turn = s.give[i] * wp.cross(arm, correction)
-    s.rotation[i] = turned(s.rotation[i], turn)
+    turn_body(s, i, s.give[i] * wp.cross(arm, correction))
 
 
 @wp.func
@@ -118,6 +125,7 @@ def begin_body(s: RigidState, i: int, role: int):
     q = s.rotation[i]
     s.position_before[i] = s.position[i]
     s.rotation_before[i] = q
+    s.joined[i] = 0
     w = s.inverse_mass[i]
     if role == 1 and w > 0.0:
         s.weight[i] = w
@@ -155,7 +163,8 @@ def move_body(s: RigidState, i: int, role: int, dt: float):
         half = in_world(turned_by(0.5 * dt * spin, q), s.inverse_inertia[i]) * momentum
         q = turned_by(dt * (spin + (half - there)), q)
         s.spin[i] = spin + (in_world(q, s.inverse_inertia[i]) * momentum - there)
-    elif role == 2:
+    elif role == 2 and wp.length_sq(v) + wp.length_sq(spin) > 0.0:
+        # what stands in this world and is led in others keeps its rotation, which would be rounded
         x = x + dt * v
         q = turned_by(dt * spin, q)
     s.position[i] = x

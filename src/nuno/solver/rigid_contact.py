@@ -251,6 +251,15 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
     """
     m = meeting_of(s, parts, c, world, e)
     note_impulse(parts, c, m, e, dt)
+    # a light body on a joint would go aside for a heavy one on it, and a motor or friction would not bring it back
+    stays = s.joined[m.i] != s.joined[m.j] and wp.min(m.wa, m.wb) > 0.0
+    if stays:
+        if s.joined[m.i] != 0:
+            m.wa = 0.0
+            m.ia = wp.mat33(0.0)
+        else:
+            m.wb = 0.0
+            m.ib = wp.mat33(0.0)
     g = places_of(s, m)
     for h in range(c.count[e]):
         k = c.count[e] - 1 - h
@@ -259,6 +268,8 @@ def mend_entry(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, dt:
         rb = c.arm_b[o]
         start = c.start[o]
         mass = c.mass[o]
+        if stays:
+            mass = wp.vec3(1.0 / ease(m, ra, rb, m.n), 1.0 / ease(m, ra, rb, m.t), 1.0 / ease(m, ra, rb, m.u))
         f = c.force[o]
         went = against(g, ra, rb)
         gap = start[0] + wp.dot(m.n, went)

@@ -16,6 +16,7 @@ from nuno.contact.rigid_manifolds import COUNTS, LEFT, OVERFLOW
 from nuno.quaternion import rotate
 from nuno.scene.rigid_shape import RigidPart
 from nuno.solver.grid_plan import cores_of
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.rigid_arrays import SAVED, RigidArrays
 from nuno.solver.rigid_frame import RigidSettings, run_rigid, run_rigid_team
 from nuno.solver.rigid_saving import load_contacts, load_listing, save_contacts, save_listing
@@ -74,6 +75,7 @@ class RigidSolver(RigidArrays):
         self.passes = PASSES
         self.origin = np.array(np.broadcast_to(np.asarray(origin, dtype=float), (self.world_count, 3)))
         self._cuda = self.device.startswith("cuda")
+        self._launches = RecordedLaunches(self.device, BLOCK_THREADS)
         self._crowded = False  # whether the device once had no room for teams
         self.settings = RigidSettings()
         self._mass: dict[int, np.ndarray] = {}
@@ -305,13 +307,11 @@ class RigidSolver(RigidArrays):
         counts[:, LEFT] = substeps
         while True:
             counts[:, OVERFLOW] = 0
-            self.manifolds.counts.assign(counts.ravel())
+            if self._cuda:  # else they are a view
+                self.manifolds.counts.assign(counts.ravel())
             inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, PHASES[phase]]
             if not self._launch_teams(inputs):
-                wp.launch(
-                    run_rigid, dim=self.world_count * threads, inputs=[*inputs, threads], device=self.device,
-                    block_dim=BLOCK_THREADS,
-                )  # fmt: skip
+                self._launches.launch(run_rigid, self.world_count * threads, [*inputs, threads])
             counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
             if not counts[:, OVERFLOW].any():
                 return

@@ -9,13 +9,13 @@ and where a material is the same everywhere nothing is read of tables but a numb
 
 import warp as wp
 
+from nuno.solver.compliances import UNIFORM_BENDS
 from nuno.solver.lanes import barrier
-from nuno.solver.state import DAMPING, Settings, StateFloat, Topology
+from nuno.solver.state import Settings, StateFloat, Topology
 
 STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(192)
 """Vertices of the longest strip and of the longest line that the 32 threads of a warp take together."""
-BEND_KINDS = wp.constant(9)
-"""Numbers in ``bend_soft`` where they are the same for all elements of a kind."""
+BEND_KINDS = wp.constant(UNIFORM_BENDS)
 
 _BEGIN = """
 #if defined(__CUDA_ARCH__)
@@ -77,11 +77,6 @@ auto soften = [&](int k) { return soft.data[which.data[k]] * (scale.data[k] * ra
 auto project = [&](Vertex& a, Vertex& b, Vertex& c, Vertex& d, float alpha) {
     float cx = a.x - b.x - c.x + d.x, cy = a.y - b.y - c.y + d.y, cz = a.z - b.z - c.z + d.z;
     float weight = a.w + b.w + c.w + d.w;
-    if (damped) {
-        auto bent = [&](const float* p) { return p[a.i] - p[b.i] - p[c.i] + p[d.i]; };
-        cx += gamma * (cx - bent(px.data)); cy += gamma * (cy - bent(py.data)); cz += gamma * (cz - bent(pz.data));
-        weight += gamma * weight;
-    }
     const float s = -1.f / (fmaxf(weight * 0.5f + alpha, weight * 0.8f) + 1.0e-12f);
     move(a, cx, cy, cz, s * a.w);
     move(b, cx, cy, cz, -s * b.w);
@@ -113,9 +108,6 @@ def twist_strips(
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
     w: wp.array(dtype=float),
-    px: wp.array(dtype=float),
-    py: wp.array(dtype=float),
-    pz: wp.array(dtype=float),
     soft: wp.array(dtype=float),
     scale: wp.array(dtype=float),
     which: wp.array(dtype=int),
@@ -125,8 +117,6 @@ def twist_strips(
     odd: int,
     same: float,
     varied: bool,
-    damped: bool,
-    gamma: float,
     rate: float,
     threads: int,
 ):
@@ -137,9 +127,6 @@ def twist_strips(
         y: See ``x``.
         z: See ``x``.
         w: Inverse masses [1/kg].
-        px: Coordinates when the substep began; so are ``py`` and ``pz`` [m].
-        py: See ``px``.
-        pz: See ``px``.
         soft: The world's compliances.
         scale: What the compliance of each element is multiplied with.
         which: The place of each in ``soft``.
@@ -149,8 +136,6 @@ def twist_strips(
         odd: Whether the first strip is that after row 1, instead of row 0.
         same: The compliance of all over dt^2, where they do not differ.
         varied: Whether they do.
-        damped: Whether there is damping.
-        gamma: Damping over dt.
         rate: 1 / dt^2 [1/s2].
         threads: Threads of the block, whole warps.
     """
@@ -187,11 +172,6 @@ auto soften = [&](int k) { return soft.data[which.data[k]] * (scale.data[k] * ra
 auto project = [&](Vertex& a, Vertex& b, Vertex& c, float alpha) {
     float cx = a.x - b.x * 2.f + c.x, cy = a.y - b.y * 2.f + c.y, cz = a.z - b.z * 2.f + c.z;
     float weight = a.w + b.w * 4.f + c.w;
-    if (damped) {
-        auto bent = [&](const float* p) { return p[a.i] - p[b.i] * 2.f + p[c.i]; };
-        cx += gamma * (cx - bent(px.data)); cy += gamma * (cy - bent(py.data)); cz += gamma * (cz - bent(pz.data));
-        weight += gamma * weight;
-    }
     const float s = -1.f / (fmaxf(weight * 0.5f + alpha, weight * 0.8f) + 1.0e-12f);
     move(a, cx, cy, cz, s * a.w);
     move(b, cx, cy, cz, s * b.w * -2.f);
@@ -249,9 +229,6 @@ def bend_strips(
     y: wp.array(dtype=float),
     z: wp.array(dtype=float),
     w: wp.array(dtype=float),
-    px: wp.array(dtype=float),
-    py: wp.array(dtype=float),
-    pz: wp.array(dtype=float),
     soft: wp.array(dtype=float),
     scale: wp.array(dtype=float),
     which: wp.array(dtype=int),
@@ -261,8 +238,6 @@ def bend_strips(
     upright: int,
     give: float,
     varied: bool,
-    damped: bool,
-    gamma: float,
     rate: float,
     threads: int,
 ):
@@ -286,8 +261,6 @@ def bend_in_strips(t: StateFloat, table: Topology, run: Settings, threads: int):
     columns = table.columns
     rows = table.particles / columns
     rate = 1.0 / (run.dt * run.dt)
-    damped = run.damped != 0
-    gamma = t.scalars[DAMPING] * (1.0 / run.dt)
     varied = t.bend_soft.shape[0] > BEND_KINDS
     # early, for it comes from far away
     twist = t.bend_soft[table.twist_soft[0]] * (table.twist_scale[0] * rate)
@@ -295,15 +268,15 @@ def bend_in_strips(t: StateFloat, table: Topology, run: Settings, threads: int):
     halves = int(2)  # a variable, or Warp would unroll the loops
     for odd in range(halves):
         twist_strips(
-            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.bend_soft, table.twist_scale, table.twist_soft,
-            table.twist_colour, columns, rows, odd, twist, varied, damped, gamma, rate, threads,
+            t.x, t.y, t.z, t.w, t.bend_soft, table.twist_scale, table.twist_soft,
+            table.twist_colour, columns, rows, odd, twist, varied, rate, threads,
         )  # fmt: skip
         barrier(threads)
     for upright in range(halves):
         give = t.bend_soft[table.line_soft[table.line_colour[3 * upright]]]
         bend_strips(
-            t.x, t.y, t.z, t.w, t.px, t.py, t.pz, t.bend_soft, table.line_scale, table.line_soft,
-            table.line_colour, columns, rows, upright, give, varied, damped, gamma, rate, threads,
+            t.x, t.y, t.z, t.w, t.bend_soft, table.line_scale, table.line_soft,
+            table.line_colour, columns, rows, upright, give, varied, rate, threads,
         )  # fmt: skip
         barrier(threads)
     if run.sweeps > 0:

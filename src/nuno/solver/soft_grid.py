@@ -146,7 +146,7 @@ def run_soft_grid(
 ):  # fmt: skip
     """A frame, or the beginning of one, of every world by a team of blocks; nothing where not all are there."""
     first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
-    if call_roll(gate, call, teams, teams * blocks):
+    if blocks == 1 or call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
         run_teams(s, s, topo, sides, size, run, shapes, told, first, substeps, teams, team)
 
@@ -159,6 +159,6 @@ def run_soft_fine_grid(
 ):  # fmt: skip
     """`run_soft_grid` where coordinates are doubles."""
     first, team = team_of(wp.tid(), gate, call, teams, blocks, threads)
-    if call_roll(gate, call, teams, teams * blocks):
+    if blocks == 1 or call_roll(gate, call, teams, teams * blocks):
         begin_to_meet(team)
         run_teams(s, floats, topo, sides, size, run, shapes, told, first, substeps, teams, team)

@@ -19,6 +19,7 @@ from nuno.solver.grid_plan import GridPlan, cores_of, teams_of
 from nuno.solver.groups import run_groups
 from nuno.solver.lanes import LANES, lane, lane_int
 from nuno.solver.particle_solver import ParticleSolver
+from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.shared_memory import FINE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.solver.sides import put_sides
 from nuno.solver.soft_blocks import FAR, FEW_THREADS, MANY_THREADS, SHARP
@@ -111,6 +112,7 @@ class SoftSolver(ParticleSolver):
     ) -> None:
         self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
         self.topology, self._cell_size = topology, topology.cell_size
+        self._launches = RecordedLaunches(self.device, 1)
         values = material.resolved(self.world_count, topology.element_count)
         self._speed = wave_speed(values)
         self.substeps = int(substeps) if substeps else soft_substeps(topology, 1.0 / frame_rate, self._speed)
@@ -258,7 +260,7 @@ class SoftSolver(ParticleSolver):
                 self._wide = self._widen()
             inputs = [*states, self._topology, self._wide, self._surface, self._size, run, self._shapes, substeps]
             kernel = run_soft_wide if fine is None else run_soft_fine_wide
-            wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
+            self._launches.launch(kernel, 1, inputs)
         else:
             lanes, worlds = (run_soft_lanes, run_soft_fine_lanes), (run_soft_worlds, run_soft_fine_worlds)
             kernel = (lanes if self.lanes > 1 else worlds)[fine is not None]
@@ -286,7 +288,10 @@ class SoftSolver(ParticleSolver):
         told = wp.zeros(TOLD * self.world_count, dtype=float, device=self.device)
         before, after = (self._topology, self._surface, self._size), (self._shapes, told)
         kernels = run_soft_grid, run_soft_fine_grid
-        return GridPlan(kernels, self._state, before, after, self.device, teams, blocks, THREADS, self._launch_worlds)
+        return GridPlan(
+            kernels, self._state, before, lambda _: after, self.device, self.world_count, teams, blocks, THREADS,
+            self._launch_worlds,
+        )  # fmt: skip
 
     def _forget_launches(self) -> None:
         self._grid = None

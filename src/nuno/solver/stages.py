@@ -21,7 +21,7 @@ from nuno.solver.grips import hold_vertices
 from nuno.solver.integrate import predict
 from nuno.solver.lanes import barrier, product, window
 from nuno.solver.membrane import shear_cell
-from nuno.solver.state import DAMPING, Settings, Topology
+from nuno.solver.state import Settings, Topology
 from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.solver.team import Team, meet
 
@@ -138,12 +138,12 @@ def read(work: Work, world: int, kind: int, k: int, last: int):
 
 
 @wp.func
-def solve(t: Any, run: Settings, kind: int, e: Element, rate: float, damping: float):
+def solve(t: Any, kind: int, e: Element, rate: float):
     """One bend or shear, as in `nuno.solver.frame`."""
     if kind == TWISTS:
-        bend_twist(t, e.a, e.b, e.c, e.d, product(e.soft, e.scale * rate), run.damped, damping)
+        bend_twist(t, e.a, e.b, e.c, e.d, product(e.soft, e.scale * rate))
     elif kind == LINES:
-        bend_line(t, e.a, e.b, e.c, product(e.soft, e.scale * rate), run.damped, damping)
+        bend_line(t, e.a, e.b, e.c, product(e.soft, e.scale * rate))
     else:
         shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.soft, e.scale * 4.0 * rate), 0.0, 0.0, 0.0)
 
@@ -208,7 +208,6 @@ def go_through(
     thread = team.thread
     threads = team.threads
     rate = 1.0 / (run.dt * run.dt)
-    damping = t.scalars[DAMPING] * (1.0 / run.dt)
     kind = steps[4 * begin]
     ready = read(work, t.group, kind, steps[4 * begin + 2] + thread, steps[4 * begin + 3])
     for step in range(begin, end):
@@ -222,7 +221,7 @@ def go_through(
         if is_sorted(what):
             k = first + thread
             while k < last:
-                solve(t, run, what, now, rate, damping)
+                solve(t, what, now, rate)
                 k += threads
                 if k < last:
                     now = read(work, t.group, what, k, last)

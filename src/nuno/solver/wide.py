@@ -17,6 +17,7 @@ import warp as wp
 from nuno.contact.renewal import renew_lists
 from nuno.contact.self_contact import touch_edge_edge, touch_vertex_triangle
 from nuno.contact.shapes import touch_shapes
+from nuno.solver.damping import damp_bends
 from nuno.solver.fine import fine, fine_lane
 from nuno.solver.frame import (
     bend_lines,
@@ -203,6 +204,8 @@ def advance_wide(
             tick(t, run, 0)
             if run.touching != 0:
                 renew_lists(near, topo, run, 0, 1)
+            if run.damped != 0:
+                damp_bends(t, wide, run, 0, 1, 1)
             predict(p, m, run, 0, 1)
             hold_vertices(t, run, 0, 1)
             elastic_wide(t, wide, run)

@@ -1,0 +1,103 @@
+"""A world of a batch is the world alone, to the bit, also where the batch's worlds differ from each other."""
+
+import pytest
+
+import nuno
+from random_worlds import RandomWorld, differences, state_of, wrenches_of
+from varied_worlds import Variation, run
+
+SHORT, LONG = (5, 6, 8, 10, 18, 19, 25, 29, 36, 41, 55, 58, 104, 106, 127), range(1000, 1400)
+"""Seeds; the short ones are some in which a world differed: where lists of contacts and the ends of pushes were the
+batch's, then where a step's length was rounded, where a body was led in one world and stood in others, and where one
+was put elsewhere in some."""
+WORLDS, ROUNDS = 3, 4
+
+
+def check_worlds(seed, device):
+    """Make a world by random operations and its copies different, run them, and compare each with itself alone.
+
+    Returns:
+        Names of the changes that happened, and what differs.
+    """
+    world = RandomWorld(seed, device=device).happen(10).world
+    variation, found = Variation(7000 + seed, world, WORLDS), []
+
+    def compare(what, adopted=False):
+        for k, single in enumerate(variation.singles):
+            copy = (variation.batch, k)
+            if adopted:
+                world.adopt(variation.batch, k)
+                copy = (world, None)
+            # what grips bore is not told of a world that has another past
+            for extract in (state_of,) if adopted else (state_of, wrenches_of):
+                told = differences(extract(*copy), extract(single))
+                found.extend(f"{what}, world {k}: {each}" for each in told)
+
+    try:
+        for number in range(ROUNDS):
+            variation.happen(3)
+            compare(f"changed {number} times")
+            variation.do(run)
+            compare(f"run {number} times")
+            if found:
+                return variation.log, found
+    except nuno.SimulationDiverged:
+        return variation.log, found
+    compare("adopted", adopted=True)
+    return variation.log, found
+
+
+def check(seeds, device):
+    """Check many batches; tell of all that differ, by seed."""
+    wrong, happened = [], set()
+    for seed in seeds:
+        try:
+            log, found = check_worlds(seed, device)
+        except Exception as error:
+            raise AssertionError(f"seed {seed}: {type(error).__name__}: {error}") from error
+        happened |= set(log)
+        if found:
+            wrong.append(f"seed {seed} after {', '.join(log)}:\n    " + "\n    ".join(found[:8]))
+    assert not wrong, f"{len(wrong)} of {len(seeds)} batches\n" + "\n".join(wrong[:5])
+    return happened
+
+
+def test_worlds_of_a_batch_that_differ():
+    """Other places, velocities, pushes, paths, grips and friction in each world: each is what it is alone."""
+    happened = check(SHORT, "cpu")
+    assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "run"}
+
+
+def test_a_push_that_is_nothing_in_one_world_ends_its_frame_too():
+    """A frame is cut where a push ends in any world: one that is pushed by nothing alone goes in the same steps."""
+
+    def pushed(world, force):
+        ball = world.attach(world.add(nuno.sphere(0.05, position=(0.0, 0.0, 1.0))))
+        batch = world.imagine(len(force)) if len(force) > 1 else world
+        batch.push(ball, force if len(force) > 1 else force[0], duration=0.04)
+        batch.run(0.1)
+        return batch.find(ball.name).position
+
+    both = pushed(nuno.World(device="cpu"), [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+    assert both[1].tolist() == pushed(nuno.World(device="cpu"), [(0.0, 0.0, 0.0)]).tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", range(LONG[0], LONG[-1], 50))
+def test_many_worlds_of_batches_that_differ(start):
+    """The same for hundreds of batches."""
+    check(range(start, start + 50), "cpu")
+
+
+@pytest.mark.cuda
+def test_worlds_of_a_batch_that_differ_on_cuda():
+    """The same on CUDA."""
+    check(range(40), "cuda:0")
+
+
+@pytest.mark.cuda
+@pytest.mark.slow
+@pytest.mark.parametrize("start", range(LONG[0], LONG[-1], 50))
+def test_many_worlds_of_batches_that_differ_on_cuda(start):
+    """The same for hundreds of batches on CUDA."""
+    check(range(start, start + 50), "cuda:0")
