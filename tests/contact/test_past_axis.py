@@ -4,6 +4,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.between_vertices import past_axis
+from nuno.solver.vec3 import vec3
 
 
 @wp.kernel(enable_backward=False, module="test_past_axis")
@@ -12,7 +13,7 @@ def parts(start: wp.array(dtype=wp.vec3), way: wp.array(dtype=wp.vec3), half: fl
     k = wp.tid()
     a = start[k]
     w = way[k]
-    found[k] = past_axis(a[0], a[1], a[2], w[0], w[1], w[2], half)
+    found[k] = past_axis(vec3(a[0], a[1], a[2]), vec3(w[0], w[1], w[2]), half)
 
 
 def test_an_edge_is_nowhere_nearer_to_an_axis_than_where_it_is_found():

@@ -12,6 +12,7 @@ from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
     choose,
+    div,
     fill,
     lane,
     least,
@@ -24,6 +25,7 @@ from nuno.solver.lanes import (  # noqa: F401
     times,
 )
 from nuno.solver.state import Shapes
+from nuno.solver.vec3 import dot, vec3
 
 BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH, HULL = range(8)
 
@@ -91,42 +93,41 @@ def distance_round(x: Any, y: Any, z: Any, r: Any, half: Any):
 
 
 @wp.func
-def distance_solid(kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
-    """Signed distance and normal of a primitive shape of sizes a, b, c."""
+def distance_solid(kind: int, p: Any, a: Any, b: Any, c: Any):
+    """Signed distance and normal of a primitive shape of sizes a, b, c at the point p."""
     if kind == BOX:
-        return distance_box(x, y, z, a, b, c)
+        gap, nx, ny, nz = distance_box(p.x, p.y, p.z, a, b, c)
+        return gap, vec3(nx, ny, nz)
     if kind == CYLINDER:
-        return distance_cylinder(x, y, z, a, b)
+        gap, nx, ny, nz = distance_cylinder(p.x, p.y, p.z, a, b)
+        return gap, vec3(nx, ny, nz)
     if kind == SPHERE or kind == CAPSULE:
-        return distance_round(x, y, z, a, b)
-    return z, fill(z, 0.0), fill(z, 0.0), fill(z, 1.0)
+        gap, nx, ny, nz = distance_round(p.x, p.y, p.z, a, b)
+        return gap, vec3(nx, ny, nz)
+    return p.z, vec3(fill(p.z, 0.0), fill(p.z, 0.0), fill(p.z, 1.0))
 
 
 @wp.func
-def way_in(kind: int, x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, a: Any, b: Any, c: Any):
-    """Where a way of the substep that ends at x, y, z and is u long enters a convex shape.
+def way_in(kind: int, p: Any, u: Any, a: Any, b: Any, c: Any):
+    """Where a way of the substep that ends at p and is u long enters a convex shape.
 
     Returns:
-        The distance of x, y, z from the plane that touches the shape there, its normal, and whether the way enters
-        at all (positive). A way that starts inside enters at the side that is nearest to its start.
+        The distance of p from the plane that touches the shape there, its normal, and whether the way enters at all
+        (positive). A way that starts inside enters at the side that is nearest to its start.
     """
-    one = fill(x, 1.0)
-    zero = fill(x, 0.0)
-    length = root(times(ux, ux) + times(uy, uy) + times(uz, uz) + fill(x, 1.0e-24))
-    part = fill(x, 0.0)  # of the way, from its start
+    one = fill(p.x, 1.0)
+    zero = fill(p.x, 0.0)
+    length = root(dot(u, u) + 1.0e-24)
+    part = fill(p.x, 0.0)  # of the way, from its start
     gap = zero
-    nx = zero
-    ny = zero
-    nz = one
+    n = vec3(zero, zero, one)
     steps = int(TRACE_STEPS)
     for _k in range(steps):
         # the shape is at least as far away as its distance says: go that far
-        part = least(part + over(most(gap, zero), length), one)
-        rest = one - part
-        gap, nx, ny, nz = distance_solid(kind, x - times(rest, ux), y - times(rest, uy), z - times(rest, uz), a, b, c)
+        part = least(part + most(gap, zero) / length, one)
+        gap, n = distance_solid(kind, p - (one - part) * u, a, b, c)
     rest = one - part
-    beyond = times(rest, times(ux, nx) + times(uy, ny) + times(uz, nz))
-    return gap + beyond, nx, ny, nz, rest
+    return gap + rest * dot(u, n), n, rest
 
 
 @wp.func

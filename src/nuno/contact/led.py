@@ -10,6 +10,7 @@ import warp as wp
 
 from nuno.solver.lanes import add, fill, mul, over, per_world, root, sub, times  # noqa: F401
 from nuno.solver.state import Shapes
+from nuno.solver.vec3 import mat3, vec3
 
 FRAMES = 32
 """Frames of a run, at most 30 whole ones and a shorter last one, and one that begins where it ends."""
@@ -79,3 +80,11 @@ def led_turn(like: Any, shapes: Shapes, slot: int, clock: int, group: int, world
     r21 = (times(y, z) + times(w, x)) * 2.0
     r22 = one - (times(x, x) + times(y, y)) * 2.0
     return r00, r01, r02, r10, r11, r12, r20, r21, r22
+
+
+@wp.func
+def led_pose(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, origin: Any):
+    """Position [m] relative to the origin, and rotation, shape to world."""
+    x, y, z = led_place(like, shapes, slot, clock, group, worlds, origin.x, origin.y, origin.z)
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = led_turn(like, shapes, slot, clock, group, worlds)
+    return vec3(x, y, z), mat3(vec3(r00, r01, r02), vec3(r10, r11, r12), vec3(r20, r21, r22))

@@ -10,7 +10,6 @@ import warp as wp
 from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     add,
     fill,
-    gather,
     lane,
     lane_int,
     least,
@@ -22,6 +21,7 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     times,
 )
 from nuno.solver.state import Topology
+from nuno.solver.vec3 import cross, dot, gather_position
 from nuno.solver.warps import leads_warp, most_of_warp
 
 GROUP = 8
@@ -240,51 +240,30 @@ def near_triangle(t: Any, i: Any, f0: Any, f1: Any, f2: Any, far2: Any):
 
     Height over the plane and the excess over the worst of the three edge lines bound the distance from below.
     """
-    ax = gather(t.x, f1) - gather(t.x, f0)
-    ay = gather(t.y, f1) - gather(t.y, f0)
-    az = gather(t.z, f1) - gather(t.z, f0)
-    bx = gather(t.x, f2) - gather(t.x, f0)
-    by = gather(t.y, f2) - gather(t.y, f0)
-    bz = gather(t.z, f2) - gather(t.z, f0)
-    dx = gather(t.x, i) - gather(t.x, f0)
-    dy = gather(t.y, i) - gather(t.y, f0)
-    dz = gather(t.z, i) - gather(t.z, f0)
-    cx = bx - ax
-    cy = by - ay
-    cz = bz - az
-    nx = times(ay, bz) - times(az, by)
-    ny = times(az, bx) - times(ax, bz)
-    nz = times(ax, by) - times(ay, bx)
-    h = times(dx, nx) + times(dy, ny) + times(dz, nz)
-    nn = times(nx, nx) + times(ny, ny) + times(nz, nz)
-    v = times(times(dy, bz) - times(dz, by), nx)
-    v = v + times(times(dz, bx) - times(dx, bz), ny)
-    v = v + times(times(dx, by) - times(dy, bx), nz)
-    w = times(times(ay, dz) - times(az, dy), nx)
-    w = w + times(times(az, dx) - times(ax, dz), ny)
-    w = w + times(times(ax, dy) - times(ay, dx), nz)
-    outside = least(least(nn - v - w, fill(h, 0.0)), least(v, w))
-    aa = times(ax, ax) + times(ay, ay) + times(az, az)
-    bb = times(bx, bx) + times(by, by) + times(bz, bz)
-    cc = times(cx, cx) + times(cy, cy) + times(cz, cz)
-    longest = most(aa, most(bb, cc))
-    return times(longest, times(far2, nn) - times(h, h)) - times(outside, outside)
+    corner = gather_position(t, f0)
+    a = gather_position(t, f1) - corner
+    b = gather_position(t, f2) - corner
+    d = gather_position(t, i) - corner
+    c = b - a
+    n = cross(a, b)
+    h = dot(d, n)
+    nn = dot(n, n)
+    # weights of the corners b and a, times nn, where the vertex is over the triangle
+    v = dot(cross(d, b), n)
+    w = dot(cross(a, d), n)
+    outside = least(least(nn - v - w, 0.0), least(v, w))
+    longest = most(dot(a, a), most(dot(b, b), dot(c, c)))
+    return longest * (far2 * nn - h * h) - outside * outside
 
 
 @wp.func
 def near_edges(t: Any, e0: Any, e1: Any, f0: Any, f1: Any, far2: Any):
     """Positive where two edges are nearer to each other than the root of ``far2``."""
-    rx = gather(t.x, e0) - gather(t.x, f0)
-    ry = gather(t.y, e0) - gather(t.y, f0)
-    rz = gather(t.z, e0) - gather(t.z, f0)
-    ax = gather(t.x, e1) - gather(t.x, e0)
-    ay = gather(t.y, e1) - gather(t.y, e0)
-    az = gather(t.z, e1) - gather(t.z, e0)
-    bx = gather(t.x, f1) - gather(t.x, f0)
-    by = gather(t.y, f1) - gather(t.y, f0)
-    bz = gather(t.z, f1) - gather(t.z, f0)
-    s, q = closest_on_edges(rx, ry, rz, ax, ay, az, bx, by, bz)
-    cx = rx + times(s, ax) - times(q, bx)
-    cy = ry + times(s, ay) - times(q, by)
-    cz = rz + times(s, az) - times(q, bz)
-    return far2 - times(cx, cx) - times(cy, cy) - times(cz, cz)
+    first = gather_position(t, e0)
+    second = gather_position(t, f0)
+    r = first - second
+    a = gather_position(t, e1) - first
+    b = gather_position(t, f1) - second
+    s, q = closest_on_edges(r.x, r.y, r.z, a.x, a.y, a.z, b.x, b.y, b.z)
+    c = r + s * a - q * b
+    return far2 - c.x * c.x - c.y * c.y - c.z * c.z

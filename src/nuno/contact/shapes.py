@@ -24,25 +24,34 @@ from nuno.contact.distances import (
     way_in,
 )
 from nuno.contact.hull import distance_hull, way_into_hull
-from nuno.contact.led import led_place, led_turn
+from nuno.contact.led import led_place, led_pose
 from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
     choose,
+    div,
     fill,
     largest,
     least,
-    minus,
     most,
     mul,
-    over,
     per_world,
     root,
+    rough,
     sub,
-    times,
 )
 from nuno.solver.state import CLOCK, FRICTION, ORIGIN, SPEED, THICKNESS, Shapes
-from nuno.solver.vector import at, put
+from nuno.solver.vec3 import (
+    dot,
+    less_product,
+    mat3,
+    position,
+    put_position,
+    start_position,
+    transposed_mul,
+    vec3,
+)
+from nuno.solver.vector import at
 from nuno.solver.warps import leads_warp, most_of_warp
 
 COLUMNS = 20
@@ -58,24 +67,18 @@ SWIFT = wp.constant(10.0)
 
 
 @wp.func
-def press(t: Any, i: int, gap: Any, nx: Any, ny: Any, nz: Any, ux: Any, uy: Any, uz: Any, un: Any, mu: Any, leave: Any):
-    """Push particle i out along the normal until it leaves by ``leave`` a substep at the most, with friction.
+def press(t: Any, i: int, gap: Any, n: Any, u: Any, un: Any, mu: Any, leave: Any):
+    """Push particle i out along the normal n until it leaves by ``leave`` a substep at the most, with friction.
 
-    u is what it moved in the substep, less what the shape's surface moved, and un its part along the normal.
+    It moves by p n - min(mu p / |u_t|, 1) u_t, where p is the push, u what it moved in the substep, less what the
+    shape's surface moved, un = u . n, and u_t = u - un n.
     """
     zero = fill(gap, 0.0)
     push = least(most(-gap, zero), most(leave - un, zero))
-    tx = ux - times(un, nx)
-    ty = uy - times(un, ny)
-    tz = uz - times(un, nz)
-    slip = root(times(tx, tx) + times(ty, ty) + times(tz, tz) + fill(gap, 1.0e-24))
-    hold = least(over(times(mu, push), slip), fill(gap, 1.0))
-    free = choose(at(t.w, i), fill(gap, 1.0), zero)
-    push = times(push, free)
-    hold = times(hold, free)
-    put(t.x, i, at(t.x, i) + times(push, nx) - times(hold, tx))
-    put(t.y, i, at(t.y, i) + times(push, ny) - times(hold, ty))
-    put(t.z, i, at(t.z, i) + times(push, nz) - times(hold, tz))
+    slip = u - un * n
+    hold = least(mu * push / root(dot(slip, slip) + 1.0e-24), 1.0)
+    free = choose(at(t.w, i), 1.0, zero)
+    put_position(t, i, position(t, i) + push * free * n - hold * free * slip)
 
 
 # Functions that return from their branches: a vector that is assigned in a branch goes through memory afterwards, for
@@ -86,7 +89,8 @@ def press(t: Any, i: int, gap: Any, nx: Any, ny: Any, nz: Any, ux: Any, uy: Any,
 def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, near: Any):
     """Signed distance and normal of shape s, of a mesh those of its bounding box."""
     if kind < SOLID_MESH:
-        return distance_solid(kind, x, y, z, a, b, c)
+        solid, n = distance_solid(kind, vec3(x, y, z), a, b, c)
+        return solid, n.x, n.y, n.z
     gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
     if kind == HULL and anywhere(near - gap):
         return distance_hull(shapes, s, x, y, z, near)
@@ -94,32 +98,45 @@ def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a:
 
 
 @wp.func
-def way_into(
-    shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, ux: Any, uy: Any, uz: Any, a: Any, b: Any, c: Any
-):
-    """Where a way that ends at x, y, z and is u long enters a convex shape: see `nuno.contact.distances.way_in`."""
+def way_into(shapes: Shapes, s: int, kind: int, p: Any, u: Any, a: Any, b: Any, c: Any):
+    """Where a way that ends at p and is u long enters a convex shape: see `nuno.contact.distances.way_in`."""
     if kind == HULL:
-        return way_into_hull(shapes, s, x, y, z, ux, uy, uz)
-    return way_in(kind, x, y, z, ux, uy, uz, a, b, c)
+        gap, nx, ny, nz, met = way_into_hull(shapes, s, p.x, p.y, p.z, u.x, u.y, u.z)
+        return gap, vec3(nx, ny, nz), met
+    return way_in(kind, p, u, a, b, c)
 
 
 @wp.func
-def less_surface(slot: int, u: Any, e: Any, d0: Any, d1: Any, d2: Any, x: Any, y: Any, z: Any):
-    """What a particle moves along one axis, less what a shape's surface moves there."""
+def less_surface(slot: int, u: Any, e: Any, d: Any, p: Any):
+    """What a particle moves, less what a shape's surface moves there: e and d p."""
     if slot < 0:
         return u
-    return u - e - times(d0, x) - times(d1, y) - times(d2, z)
+    return less_product(u - e, d, p)
 
 
 @wp.func
-def turned(
-    r00: Any, r01: Any, r02: Any, r10: Any, r11: Any, r12: Any, r20: Any, r21: Any, r22: Any, x: Any, y: Any, z: Any
-):
-    """A direction, turned by a matrix of three rows."""
-    wx = times(r00, x) + times(r01, y) + times(r02, z)
-    wy = times(r10, x) + times(r11, y) + times(r12, z)
-    wz = times(r20, x) + times(r21, y) + times(r22, z)
-    return wx, wy, wz
+def origin_of(t: Any):
+    """What the world's positions are relative to."""
+    return vec3(t.scalars[ORIGIN], t.scalars[ORIGIN + 1], t.scalars[ORIGIN + 2])
+
+
+@wp.func
+def three_of(like: Any, t: Any, shapes: Shapes, entry: int):
+    """Three numbers of a shape's row in the table."""
+    g = t.group
+    x = per_world(like, shapes.table, g, shapes.stride, t.worlds, entry)
+    y = per_world(like, shapes.table, g, shapes.stride, t.worlds, entry + 1)
+    z = per_world(like, shapes.table, g, shapes.stride, t.worlds, entry + 2)
+    return vec3(x, y, z)
+
+
+@wp.func
+def rotation_of(like: Any, t: Any, shapes: Shapes, row: int):
+    """The rotation, shape to world, of a shape that stands still."""
+    x = three_of(like, t, shapes, row + 3)
+    y = three_of(like, t, shapes, row + 6)
+    z = three_of(like, t, shapes, row + 9)
+    return mat3(x, y, z)
 
 
 @wp.func
@@ -127,103 +144,58 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     """All particles against one shape."""
     row = s * COLUMNS
     like = fill(t.x[0], 0.0)
-    stride = shapes.stride
     g = t.group
     w = t.worlds
-    cx = per_world(like, shapes.table, g, stride, w, row) - t.scalars[ORIGIN]
-    cy = per_world(like, shapes.table, g, stride, w, row + 1) - t.scalars[ORIGIN + 1]
-    cz = per_world(like, shapes.table, g, stride, w, row + 2) - t.scalars[ORIGIN + 2]
-    r00 = per_world(like, shapes.table, g, stride, w, row + 3)
-    r01 = per_world(like, shapes.table, g, stride, w, row + 4)
-    r02 = per_world(like, shapes.table, g, stride, w, row + 5)
-    r10 = per_world(like, shapes.table, g, stride, w, row + 6)
-    r11 = per_world(like, shapes.table, g, stride, w, row + 7)
-    r12 = per_world(like, shapes.table, g, stride, w, row + 8)
-    r20 = per_world(like, shapes.table, g, stride, w, row + 9)
-    r21 = per_world(like, shapes.table, g, stride, w, row + 10)
-    r22 = per_world(like, shapes.table, g, stride, w, row + 11)
-    sa = per_world(like, shapes.table, g, stride, w, row + 12)
-    sb = per_world(like, shapes.table, g, stride, w, row + 13)
-    sc = per_world(like, shapes.table, g, stride, w, row + 14)
-    mean = root(times(t.scalars[FRICTION], per_world(like, shapes.table, g, stride, w, row + 15)))
-    pair = per_world(like, shapes.table, g, stride, w, row + 16)
-    mu = choose(pair + fill(like, 0.5), pair, mean)
-    radius = t.scalars[THICKNESS] * 0.5 + per_world(like, shapes.table, g, stride, w, row + 17)
+    origin = origin_of(t)
+    centre = three_of(like, t, shapes, row) - origin
+    r = rotation_of(like, t, shapes, row)
+    size = three_of(like, t, shapes, row + 12)
+    mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, g, shapes.stride, w, row + 15))
+    pair = per_world(like, shapes.table, g, shapes.stride, w, row + 16)
+    mu = choose(pair + 0.5, pair, mean)
+    radius = t.scalars[THICKNESS] * 0.5 + per_world(like, shapes.table, g, shapes.stride, w, row + 17)
     leave = fill(like, LEAVE_SPEED * dt)
     kind = shapes.kind[s]
     slot = shapes.slot[s]
     # what the surface moves in this substep: e of the shape's centre, d of its axes
-    ex = cx
-    ey = cy
-    ez = cz
-    d00 = r00
-    d01 = r01
-    d02 = r02
-    d10 = r10
-    d11 = r11
-    d12 = r12
-    d20 = r20
-    d21 = r21
-    d22 = r22
+    e = centre
+    d = r
     if slot >= 0:
         clock = int(largest(t.notes[CLOCK]))
-        ox = t.scalars[ORIGIN]
-        oy = t.scalars[ORIGIN + 1]
-        oz = t.scalars[ORIGIN + 2]
-        ex, ey, ez = led_place(like, shapes, slot, clock - 1, g, w, ox, oy, oz)
-        cx, cy, cz = led_place(like, shapes, slot, clock, g, w, ox, oy, oz)
-        d00, d01, d02, d10, d11, d12, d20, d21, d22 = led_turn(like, shapes, slot, clock - 1, g, w)
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = led_turn(like, shapes, slot, clock, g, w)
-        ex = cx - ex
-        ey = cy - ey
-        ez = cz - ez
-        d00 = r00 - d00
-        d01 = r01 - d01
-        d02 = r02 - d02
-        d10 = r10 - d10
-        d11 = r11 - d11
-        d12 = r12 - d12
-        d20 = r20 - d20
-        d21 = r21 - d21
-        d22 = r22 - d22
+        before, turn_before = led_pose(like, shapes, slot, clock - 1, g, w, origin)
+        centre, r = led_pose(like, shapes, slot, clock, g, w, origin)
+        e = centre - before
+        d = r - turn_before
     # what comes nearer than this may have passed through within the substep
-    near = radius + fill(like, SWIFT * dt)
+    near = radius + SWIFT * dt
     for i in range(thread, n, threads):
-        dx = minus(at(t.x, i), cx)
-        dy = minus(at(t.y, i), cy)
-        dz = minus(at(t.z, i), cz)
-        # into the shape's frame
-        x, y, z = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, dx, dy, dz)
-        gap, nx, ny, nz = distance_shape(shapes, s, kind, x, y, z, sa, sb, sc, near)
+        # in the shape's frame
+        p = transposed_mul(r, rough(position(t, i) - centre))
+        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, size.x, size.y, size.z, near)
         if anywhere(near - gap):
-            ux = less_surface(slot, at(t.x, i) - at(t.px, i), ex, d00, d01, d02, x, y, z)
-            uy = less_surface(slot, at(t.y, i) - at(t.py, i), ey, d10, d11, d12, x, y, z)
-            uz = less_surface(slot, at(t.z, i) - at(t.pz, i), ez, d20, d21, d22, x, y, z)
-            wx, wy, wz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, nx, ny, nz)
-            un = times(ux, wx) + times(uy, wy) + times(uz, wz)
+            u = less_surface(slot, position(t, i) - start_position(t, i), e, d, p)
+            local = vec3(nx, ny, nz)
+            normal = r * local
+            un = dot(u, normal)
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
             passed = -least(gap, gap - un)
             # a lane is looked at because another is near: what is swifter must not see more than it would alone
             within = near - gap
             passed = least(passed, within)
             if kind == SOLID_MESH or kind == SHELL_MESH:
-                lx, ly, lz = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, ux, uy, uz)
-                deep, ax, ay, az = gap_mesh(shapes, s, g, w, within, x, y, z, lx, ly, lz, sa, sb, sc, radius)
-                bx, by, bz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, ax, ay, az)
-                bn = times(ux, bx) + times(uy, by) + times(uz, bz)
-                press(t, i, deep - radius, bx, by, bz, ux, uy, uz, bn, mu, leave)
+                way = transposed_mul(r, u)
+                deep, ax, ay, az = gap_mesh(
+                    shapes, s, g, w, within, p.x, p.y, p.z, way.x, way.y, way.z, size.x, size.y, size.z, radius
+                )
+                out = r * vec3(ax, ay, az)
+                press(t, i, deep - radius, out, u, dot(u, out), mu, leave)
             elif kind != PLANE and anywhere(passed):
-                lx, ly, lz = turned(r00, r10, r20, r01, r11, r21, r02, r12, r22, ux, uy, uz)
-                deep, ax, ay, az, met = way_into(shapes, s, kind, x, y, z, lx, ly, lz, sa, sb, sc)
+                deep, entered, met = way_into(shapes, s, kind, p, transposed_mul(r, u), size.x, size.y, size.z)
                 met = least(met, passed)
-                ax = choose(met, ax, nx)
-                ay = choose(met, ay, ny)
-                az = choose(met, az, nz)
-                bx, by, bz = turned(r00, r01, r02, r10, r11, r12, r20, r21, r22, ax, ay, az)
-                bn = times(ux, bx) + times(uy, by) + times(uz, bz)
-                press(t, i, choose(met, deep, gap) - radius, bx, by, bz, ux, uy, uz, bn, mu, leave)
+                out = r * choose(met, entered, local)
+                press(t, i, choose(met, deep, gap) - radius, out, u, dot(u, out), mu, leave)
             elif anywhere(radius - gap):
-                press(t, i, gap - radius, wx, wy, wz, ux, uy, uz, un, mu, leave)
+                press(t, i, gap - radius, normal, u, un, mu, leave)
 
 
 @wp.func
@@ -282,7 +254,7 @@ def measure_box(t: Any, n: int, thread: int, threads: int):
 def along_box(t: Any, shapes: Shapes, row: int, axis: int, centre: Any):
     """The least of the box's corners along a plane's normal, by one coordinate."""
     n = per_world(centre, shapes.table, t.group, shapes.stride, t.worlds, row + 5 + 3 * axis)
-    return least(times(n, t.box[axis] - centre), times(n, t.box[3 + axis] - centre))
+    return least(n * (t.box[axis] - centre), n * (t.box[3 + axis] - centre))
 
 
 @wp.func
@@ -292,9 +264,9 @@ def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
     That is within ``ahead`` seconds.
     """
     # 1.5 times the present speed, what gravity adds in the time, and 2 cm for what constraints throw
-    grow = root(t.notes[SPEED]) * (1.5 * ahead) + fill(t.x[0], 10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
+    grow = root(t.notes[SPEED]) * (1.5 * ahead) + (10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
     # and as far as the fastest shape may throw it
-    return grow + fill(t.x[0], shapes.haste[0] * ahead)
+    return grow + shapes.haste[0] * ahead
 
 
 @wp.func

@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.shapes import COLUMNS, LEAVE_SPEED
+from nuno.contact.shapes import COLUMNS, LEAVE_SPEED, three_of
 from nuno.contact.sharp_shapes import QUICK, ROUND, pose_of
 from nuno.solver.lanes import (  # noqa: F401
     add,
@@ -16,26 +16,23 @@ from nuno.solver.lanes import (  # noqa: F401
     per_world,
     root,
     sub,
-    times,
 )
 from nuno.solver.state import CLOCK, FRICTION, THICKNESS, Settings, Shapes
+from nuno.solver.vec3 import LaneMat3, LaneVec3, Mat3, Vec3
 
-NUMBERS = (
-    "cx", "cy", "cz", "r00", "r01", "r02", "r10", "r11", "r12", "r20", "r21", "r22",
-    "ex", "ey", "ez", "d00", "d01", "d02", "d10", "d11", "d12", "d20", "d21", "d22",
-    "sa", "sb", "sc", "mu", "leave", "radius", "reach",
-)  # fmt: skip
-"""Place [m] and rotation (row major, shape to world) when the substep began, and what they change in it; sizes [m],
-friction; how far what is too near is let go at most, half the cloth's thickness, and what is not farther when the
+NUMBERS = ("mu", "leave", "radius", "reach")
+"""Friction; how far what is too near is let go at most, half the cloth's thickness, and what is not farther when the
 substep begins may be reached in it [m]."""
 
 
-def _make(name: str, number: type) -> Any:
-    fields: dict[str, Any] = {name: number for name in NUMBERS} | {"broad": float, "kind": int, "slot": int}
+def _make(name: str, number: type, vector: type, matrix: type) -> Any:
+    fields: dict[str, Any] = {"centre": vector, "turn": matrix}  # when the substep began: place [m], shape to world
+    fields |= {"e": vector, "d": matrix}  # what they change in it
+    fields |= {"size": vector} | {name: number for name in NUMBERS} | {"broad": float, "kind": int, "slot": int}
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 
-SharpFloat, SharpLanes = _make("SharpFloat", float), _make("SharpLanes", lane)
+SharpFloat, SharpLanes = _make("SharpFloat", float, Vec3, Mat3), _make("SharpLanes", lane, LaneVec3, LaneMat3)
 
 
 @wp.func
@@ -57,42 +54,20 @@ def measured(h: Any, like: Any, t: Any, run: Settings, shapes: Shapes, s: int):
     clock = int(largest(t.notes[CLOCK]))
     h.kind = shapes.kind[s]
     h.slot = shapes.slot[s]
-    cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose_of(like, t, shapes, s, clock - 1)
-    h.cx = cx
-    h.cy = cy
-    h.cz = cz
-    h.r00 = r00
-    h.r01 = r01
-    h.r02 = r02
-    h.r10 = r10
-    h.r11 = r11
-    h.r12 = r12
-    h.r20 = r20
-    h.r21 = r21
-    h.r22 = r22
+    centre, turn = pose_of(like, t, shapes, s, clock - 1)
+    h.centre = centre
+    h.turn = turn
     if h.slot >= 0:
-        ex, ey, ez, d00, d01, d02, d10, d11, d12, d20, d21, d22 = pose_of(like, t, shapes, s, clock)
-        h.ex = ex - cx
-        h.ey = ey - cy
-        h.ez = ez - cz
-        h.d00 = d00 - r00
-        h.d01 = d01 - r01
-        h.d02 = d02 - r02
-        h.d10 = d10 - r10
-        h.d11 = d11 - r11
-        h.d12 = d12 - r12
-        h.d20 = d20 - r20
-        h.d21 = d21 - r21
-        h.d22 = d22 - r22
+        after, turn_after = pose_of(like, t, shapes, s, clock)
+        h.e = after - centre
+        h.d = turn_after - turn
     row = s * COLUMNS
-    h.sa = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 12)
-    h.sb = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 13)
-    h.sc = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 14)
-    mean = root(times(t.scalars[FRICTION], per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15)))
+    h.size = three_of(like, t, shapes, row + 12)
+    mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15))
     pair = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 16)
-    h.mu = choose(pair + fill(like, 0.5), pair, mean)
+    h.mu = choose(pair + 0.5, pair, mean)
     h.radius = t.scalars[THICKNESS] * 0.5
     h.leave = fill(like, LEAVE_SPEED * run.dt)
-    h.reach = h.radius + fill(like, QUICK * run.dt)
+    h.reach = h.radius + QUICK * run.dt
     h.broad = ROUND * run.cell
     return h

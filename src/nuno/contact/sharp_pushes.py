@@ -4,7 +4,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, anywhere, choose, fill, least, most, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, anywhere, choose, div, fill, least, most, mul, root, sub  # noqa: F401
+from nuno.solver.vec3 import dot, less_product, move, position, start_position
 
 PATIENCE = wp.constant(0.8)
 """Of what an element is too near when a substep begins, so much may stay in it. Neighbours share their vertices and
@@ -16,8 +17,7 @@ and to push it would not part them."""
 
 @wp.func
 def push_apart(
-    t: Any, h: Any, i: int, j: int, k: int, bi: Any, bj: Any, bk: Any, x: Any, y: Any, z: Any, nx: Any, ny: Any,
-    nz: Any, gap: Any, on: Any,
+    t: Any, h: Any, i: int, j: int, k: int, bi: Any, bj: Any, bk: Any, p: Any, local: Any, gap: Any, on: Any
 ):  # fmt: skip
     """Push a point of an element out of a shape along the normal, with friction, as a particle is.
 
@@ -30,88 +30,44 @@ def push_apart(
         bi: The weight of the first vertex in the point; ``bj`` and ``bk`` those of the others.
         bj: See ``bi``.
         bk: See ``bi``.
-        x: The point in the shape's frame when the substep began, with ``y`` and ``z`` [m].
-        y: See ``x``.
-        z: See ``x``.
-        nx: The normal there, with ``ny`` and ``nz``.
-        ny: See ``nx``.
-        nz: See ``nx``.
+        p: The point in the shape's frame when the substep began [m].
+        local: The normal there, in the shape's frame.
         gap: How far it was from where it must stay [m].
         on: Positive where it counts.
     """
     # what the point moved in the substep, less what the surface did
-    ux = times(bi, t.x[i] - t.px[i]) + times(bj, t.x[j] - t.px[j])
-    uy = times(bi, t.y[i] - t.py[i]) + times(bj, t.y[j] - t.py[j])
-    uz = times(bi, t.z[i] - t.pz[i]) + times(bj, t.z[j] - t.pz[j])
+    u = bi * (position(t, i) - start_position(t, i)) + bj * (position(t, j) - start_position(t, j))
     if k != i:
-        ux = ux + times(bk, t.x[k] - t.px[k])
-        uy = uy + times(bk, t.y[k] - t.py[k])
-        uz = uz + times(bk, t.z[k] - t.pz[k])
+        u = u + bk * (position(t, k) - start_position(t, k))
     if h.slot >= 0:
-        ux = ux - h.ex - times(h.d00, x) - times(h.d01, y) - times(h.d02, z)
-        uy = uy - h.ey - times(h.d10, x) - times(h.d11, y) - times(h.d12, z)
-        uz = uz - h.ez - times(h.d20, x) - times(h.d21, y) - times(h.d22, z)
-    wx = times(h.r00, nx) + times(h.r01, ny) + times(h.r02, nz)
-    wy = times(h.r10, nx) + times(h.r11, ny) + times(h.r12, nz)
-    wz = times(h.r20, nx) + times(h.r21, ny) + times(h.r22, nz)
-    depth = gap + times(ux, wx) + times(uy, wy) + times(uz, wz)
+        u = less_product(u - h.e, h.d, p)
+    n = h.turn * local
+    depth = gap + u.x * n.x + u.y * n.y + u.z * n.z
     touching = least(on, -depth)
     if anywhere(touching):
-        give_way(t, i, j, k, bi, bj, bk, depth, wx, wy, wz, ux, uy, uz, h.mu, h.leave, touching)
+        give_way(t, i, j, k, bi, bj, bk, depth, n, u, h.mu, h.leave, touching)
 
 
 @wp.func
 def give_way(
-    t: Any,
-    i: int,
-    j: int,
-    k: int,
-    bi: Any,
-    bj: Any,
-    bk: Any,
-    gap: Any,
-    nx: Any,
-    ny: Any,
-    nz: Any,
-    ux: Any,
-    uy: Any,
-    uz: Any,
-    mu: Any,
-    leave: Any,
-    on: Any,
-):
-    """Move the vertices of a point that is too near, by a gap below zero [m], and that moved by u [m]."""
+    t: Any, i: int, j: int, k: int, bi: Any, bj: Any, bk: Any, gap: Any, n: Any, u: Any, mu: Any, leave: Any, on: Any
+):  # fmt: skip
+    """Move the vertices of a point sum b_i x_i that is too near, by a gap below zero [m], and that moved by u [m].
+
+    With p, the push along the normal n, and u_t, the part of u across it, each moves by
+    w_i b_i / (sum w_i b_i^2) times p n - min(mu p / |u_t|, 1) u_t.
+    """
     zero = fill(gap, 0.0)
-    un = times(ux, nx) + times(uy, ny) + times(uz, nz)
+    un = dot(u, n)
     push = least(most(-gap, zero), most(leave - un, zero))
-    tx = ux - times(un, nx)
-    ty = uy - times(un, ny)
-    tz = uz - times(un, nz)
-    slip = root(times(tx, tx) + times(ty, ty) + times(tz, tz) + fill(gap, 1.0e-24))
-    hold = least(over(times(mu, push), slip), fill(gap, 1.0))
-    dx = times(push, nx) - times(hold, tx)
-    dy = times(push, ny) - times(hold, ty)
-    dz = times(push, nz) - times(hold, tz)
-    wi = times(bi, t.w[i])
-    wj = times(bj, t.w[j])
-    wk = times(bk, t.w[k])
-    weight = times(wi, bi) + times(wj, bj) + times(wk, bk) + fill(gap, 1.0e-9)
-    s = choose(on, over(fill(gap, 1.0), weight), zero)
-    shift(t, i, dx, dy, dz, times(s, wi))
-    shift(t, j, dx, dy, dz, times(s, wj))
+    slip = u - un * n
+    hold = least(mu * push / root(dot(slip, slip) + 1.0e-24), 1.0)
+    way = push * n - hold * slip
+    wi = bi * t.w[i]
+    wj = bj * t.w[j]
+    wk = bk * t.w[k]
+    s = choose(on, 1.0 / (wi * bi + wj * bj + wk * bk + 1.0e-9), zero)
+    move(t, i, way * (s * wi))
+    move(t, j, way * (s * wj))
     if k != i:
-        shift(t, k, dx, dy, dz, times(s, wk))
-
-
-@wp.func
-def shift(t: Any, i: int, dx: Any, dy: Any, dz: Any, s: Any):
-    """Move particle i by s (dx, dy, dz)."""
-    t.x[i] = t.x[i] + times(dx, s)
-    t.y[i] = t.y[i] + times(dy, s)
-    t.z[i] = t.z[i] + times(dz, s)
-
-
-@wp.func
-def square_of(x: Any, y: Any, z: Any):
-    """The square of a length."""
-    return times(x, x) + times(y, y) + times(z, z)
+        move(t, k, way * (s * wk))

@@ -12,8 +12,8 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.distances import BOX, CYLINDER, FAR, PLANE
-from nuno.contact.led import led_place, led_turn
-from nuno.contact.shapes import COLUMNS, reach_of_frame
+from nuno.contact.led import led_pose
+from nuno.contact.shapes import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
 from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
@@ -23,13 +23,13 @@ from nuno.solver.lanes import (  # noqa: F401
     least,
     most,
     mul,
-    per_world,
     root,
     size_of,
     sub,
     times,
 )
-from nuno.solver.state import CLOCK, ORIGIN, THICKNESS, Settings, Shapes
+from nuno.solver.state import CLOCK, THICKNESS, Settings, Shapes
+from nuno.solver.vec3 import position, transposed_mul, vec3
 
 ROUND = wp.constant(3.0)
 """Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
@@ -48,66 +48,51 @@ MOST_SLACK = wp.constant(100.0)
 @wp.func
 def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
     """Place [m] and rotation (row major, shape to world) of a shape after ``clock`` substeps."""
-    row = s * COLUMNS
-    stride = shapes.stride
-    ox = t.scalars[ORIGIN]
-    oy = t.scalars[ORIGIN + 1]
-    oz = t.scalars[ORIGIN + 2]
-    cx = per_world(like, shapes.table, t.group, stride, t.worlds, row) - ox
-    cy = per_world(like, shapes.table, t.group, stride, t.worlds, row + 1) - oy
-    cz = per_world(like, shapes.table, t.group, stride, t.worlds, row + 2) - oz
-    r00 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 3)
-    r01 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 4)
-    r02 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 5)
-    r10 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 6)
-    r11 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 7)
-    r12 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 8)
-    r20 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 9)
-    r21 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 10)
-    r22 = per_world(like, shapes.table, t.group, stride, t.worlds, row + 11)
+    origin = origin_of(t)
+    centre = three_of(like, t, shapes, s * COLUMNS) - origin
+    turn = rotation_of(like, t, shapes, s * COLUMNS)
     slot = shapes.slot[s]
     if slot >= 0:
-        cx, cy, cz = led_place(like, shapes, slot, clock, t.group, t.worlds, ox, oy, oz)
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = led_turn(like, shapes, slot, clock, t.group, t.worlds)
-    return cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22
+        centre, turn = led_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+    return centre, turn
 
 
 @wp.func
 def sharp_features(
-    kind: int, x: Any, y: Any, z: Any, hx: Any, hy: Any, hz: Any, sa: Any, sb: Any, sc: Any, broad: float
+    kind: int, p: Any, h: Any, sa: Any, sb: Any, sc: Any, broad: float
 ):  # fmt: skip
-    """Whether what is within a box about x, y, z (half sides h, all in the shape's frame) may touch between vertices.
+    """Whether what is within a box about p (half sides h, all in the shape's frame) may touch between vertices.
 
     Returns:
         Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
         triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
     """
-    x = size_of(x)
-    y = size_of(y)
-    z = size_of(z)
+    x = size_of(p.x)
+    y = size_of(p.y)
+    z = size_of(p.z)
     # how far the box ends beyond the shape's sides: a face has two of three well inside, an edge one, a corner none
     apart = x
     along = x
     point = x
     if kind == BOX:
-        qx = x + hx - sa
-        qy = y + hy - sb
-        qz = z + hz - sc
-        apart = most(most(x - hx - sa, y - hy - sb), z - hz - sc)
+        qx = x + h.x - sa
+        qy = y + h.y - sb
+        qz = z + h.z - sc
+        apart = most(most(x - h.x - sa, y - h.y - sb), z - h.z - sc)
         along = most(most(least(qx, qy), least(qy, qz)), least(qx, qz))
         point = least(least(qx, qy), qz)
     else:
         slim = fill(x, broad) - sa
         rho = root(times(x, x) + times(y, y))
-        wide = root(times(hx, hx) + times(hy, hy))
+        wide = root(times(h.x, h.x) + times(h.y, h.y))
         if kind == CYLINDER:
-            apart = most(rho - wide - sa, z - hz - sb)
-            rim = least(rho + wide - sa, z + hz - sb)
+            apart = most(rho - wide - sa, z - h.z - sb)
+            rim = least(rho + wide - sa, z + h.z - sb)
             along = most(rim, slim)
             point = least(rim, slim)
         else:
             beyond = most(z - sb, fill(x, 0.0))
-            size = root(times(wide, wide) + times(hz, hz))
+            size = root(times(wide, wide) + times(h.z, h.z))
             apart = root(times(rho, rho) + times(beyond, beyond)) - size - sa
             # the outermost point is on the half ball of one end, which may stand through by half a cell
             stands = most(sa, fill(x, broad * (0.5 / ROUND)) - sa)
@@ -148,25 +133,19 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
         s = t.near[1 + near]
         kind = shapes.kind[s]
         if kind < PLANE:
-            cx, cy, cz, r00, r01, r02, r10, r11, r12, r20, r21, r22 = pose_of(like, t, shapes, s, clock)
-            row = s * COLUMNS
-            sa = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 12)
-            sb = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 13)
-            sc = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 14)
+            centre, r = pose_of(like, t, shapes, s, clock)
+            size = three_of(like, t, shapes, s * COLUMNS + 12)
             # the cloth's box as the shape sees it
-            dx = (t.box[0] + t.box[3]) * 0.5 - cx
-            dy = (t.box[1] + t.box[4]) * 0.5 - cy
-            dz = (t.box[2] + t.box[5]) * 0.5 - cz
-            wx = (t.box[3] - t.box[0]) * 0.5
-            wy = (t.box[4] - t.box[1]) * 0.5
-            wz = (t.box[5] - t.box[2]) * 0.5
-            hx = times(size_of(r00), wx) + times(size_of(r10), wy) + times(size_of(r20), wz) + grow
-            hy = times(size_of(r01), wx) + times(size_of(r11), wy) + times(size_of(r21), wz) + grow
-            hz = times(size_of(r02), wx) + times(size_of(r12), wy) + times(size_of(r22), wz) + grow
-            x = times(r00, dx) + times(r10, dy) + times(r20, dz)
-            y = times(r01, dx) + times(r11, dy) + times(r21, dz)
-            z = times(r02, dx) + times(r12, dy) + times(r22, dz)
-            along, point = sharp_features(kind, x, y, z, hx, hy, hz, sa, sb, sc, broad)
+            low = vec3(t.box[0], t.box[1], t.box[2])
+            high = vec3(t.box[3], t.box[4], t.box[5])
+            middle = (low + high) * 0.5 - centre
+            w = (high - low) * 0.5
+            h = vec3(
+                size_of(r.x.x) * w.x + size_of(r.y.x) * w.y + size_of(r.z.x) * w.z + grow,
+                size_of(r.x.y) * w.x + size_of(r.y.y) * w.y + size_of(r.z.y) * w.z + grow,
+                size_of(r.x.z) * w.x + size_of(r.y.z) * w.y + size_of(r.z.z) * w.z + grow,
+            )
+            along, point = sharp_features(kind, transposed_mul(r, middle), h, size.x, size.y, size.z, broad)
             if anywhere(along):
                 if found == 0:
                     for i in range(thread, topo.particles, threads):
@@ -175,15 +154,14 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
                     t.sharp[topo.sharp_colour.shape[0] + found] = s
                 found = found + 1
                 for i in range(thread, topo.particles, threads):
-                    dx = t.x[i] - cx
-                    dy = t.y[i] - cy
-                    dz = t.z[i] - cz
-                    x = times(r00, dx) + times(r10, dy) + times(r20, dz)
-                    y = times(r01, dx) + times(r11, dy) + times(r21, dz)
-                    z = times(r02, dx) + times(r12, dy) + times(r22, dz)
-                    along, point = sharp_features(kind, x, y, z, around, around, around, sa, sb, sc, broad)
+                    p = transposed_mul(r, position(t, i) - centre)
+                    along, point = sharp_features(
+                        kind, p, vec3(around, around, around), size.x, size.y, size.z, broad
+                    )  # fmt: skip
                     if anywhere(along):
-                        at_once, _point = sharp_features(kind, x, y, z, soon, soon, soon, sa, sb, sc, broad)
+                        at_once, _point = sharp_features(
+                            kind, p, vec3(soon, soon, soon), size.x, size.y, size.z, broad
+                        )  # fmt: skip
                         slack = int(1.0e6 * wp.clamp(-largest(at_once), 0.0, MOST_SLACK))
                         mark = t.sharp_mark[i]
                         if mark != 0:

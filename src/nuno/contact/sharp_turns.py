@@ -24,6 +24,7 @@ from nuno.contact.sharp_queue import COLOUR, MOST_COLOURS, QUEUE, forget_queue, 
 from nuno.contact.sharp_shapes import GONE, SOONEST, WAKE
 from nuno.solver.lanes import add, anywhere, barrier, fill, largest, mul, root, sub  # noqa: F401
 from nuno.solver.state import SPEED, Settings, Shapes
+from nuno.solver.vec3 import vec3
 from nuno.solver.warps import WARP, anyone, lowest, union_of_warp
 
 
@@ -117,12 +118,8 @@ def touch_listed(
             bi = zero
             bj = zero
             bk = zero
-            x = zero
-            y = zero
-            z = zero
-            nx = zero
-            ny = zero
-            nz = zero
+            point = vec3(zero, zero, zero)
+            normal = vec3(zero, zero, zero)
             gap = zero
             if element >= edges:
                 if turn == 0:
@@ -130,27 +127,27 @@ def touch_listed(
                     i = corners[0]
                     j = corners[1]
                     k = corners[2]
-                    on, bj, bk, x, y, z, nx, ny, nz, gap = meet_triangle(t, h, entry, gone, i, j, k, run.cell)
+                    on, bj, bk, point, normal, gap = meet_triangle(t, h, entry, gone, i, j, k, run.cell)
                     bi = one - bj - bk
             elif element >= 0:
                 ends = topo.side[element]
                 i = ends[0]
                 j = ends[1]
                 k = i
-                on, more, bj, x, y, z, nx, ny, nz, gap = meet_edge(t, h, entry, gone, i, j, turn, run.cell)
+                on, more, bj, point, normal, gap = meet_edge(t, h, entry, gone, i, j, turn, run.cell)
                 bi = one - bj
             if shares_work(threads):
                 more = 0
                 first = 1 << wp.min(c, MOST_COLOURS)
                 second = wp.where(points > 1, first, 0)
                 if queued > 0:
-                    for point in range(points):
+                    for which in range(points):
                         bits = int(0)
-                        if turn == point and anywhere(on):
+                        if turn == which and anywhere(on):
                             bits = 1 << colour
                         bits = union_of_warp(bits)
                         if thread % WARP == 0 and bits != 0:
-                            wp.atomic_or(t.moved, 1 + point, bits)
+                            wp.atomic_or(t.moved, 1 + which, bits)
                     barrier(threads)
                     second = t.moved[2]
                     first = t.moved[1] | second
@@ -161,14 +158,14 @@ def touch_listed(
                     first = 0
                 while first != 0:
                     now = lowest(first)
-                    for point in range(1 + ((second >> now) & 1)):
-                        if turn == point and wp.min(colour, MOST_COLOURS) == now and anywhere(on):
-                            push_apart(t, h, i, j, k, bi, bj, bk, x, y, z, nx, ny, nz, gap, on)
+                    for which in range(1 + ((second >> now) & 1)):
+                        if turn == which and wp.min(colour, MOST_COLOURS) == now and anywhere(on):
+                            push_apart(t, h, i, j, k, bi, bj, bk, point, normal, gap, on)
                         barrier(threads)
                     first = first & (first - 1)
             else:
                 if anywhere(on):
-                    push_apart(t, h, i, j, k, bi, bj, bk, x, y, z, nx, ny, nz, gap, on)
+                    push_apart(t, h, i, j, k, bi, bj, bk, point, normal, gap, on)
                 more = more * (1 - turn)
                 turn = 1
         start += together

@@ -12,59 +12,48 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.bending import bend_stiffness, total_at, twist_of
-from nuno.solver.lanes import add, lane, mul, over, product, sub, times  # noqa: F401
+from nuno.solver.bending import bend_stiffness, total, twist_of
+from nuno.solver.lanes import add, div, lane, mul, product, sub  # noqa: F401
 from nuno.solver.state import DAMPING, Settings
 from nuno.solver.team import wait_for
-from nuno.solver.vector import at, corner, put, scaled, spread
+from nuno.solver.vec3 import put_velocity, velocity
+from nuno.solver.vector import at, corner, scaled, spread
 
 
 @wp.func
-def hasten(t: Any, i: Any, cx: Any, cy: Any, cz: Any, s: Any):
-    """Change the velocity of particle i by s (cx, cy, cz)."""
-    put(t.vx, i, at(t.vx, i) + times(cx, s))
-    put(t.vy, i, at(t.vy, i) + times(cy, s))
-    put(t.vz, i, at(t.vz, i) + times(cz, s))
-
-
-@wp.func
-def line_of(x: Any, a: Any, b: Any, c: Any):
-    """The velocities' x_0 - 2 x_1 + x_2."""
-    return at(x, a) - at(x, b) * 2.0 + at(x, c)
+def hasten(t: Any, i: Any, change: Any):
+    """Change the velocity of particle i by a vector."""
+    put_velocity(t, i, velocity(t, i) + change)
 
 
 @wp.func
 def damp_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, gamma: Any):
-    """Three vertices in a row."""
-    cx = line_of(t.vx, a, b, c)
-    cy = line_of(t.vy, a, b, c)
-    cz = line_of(t.vz, a, b, c)
+    """Three vertices in a row: c' = v_0 - 2 v_1 + v_2."""
+    rate = velocity(t, a) - velocity(t, b) * 2.0 + velocity(t, c)
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
-    weight = times(gamma, wa + wb * 4.0 + wc)
-    s = over(gamma * -1.0, bend_stiffness(weight, alpha))
-    hasten(t, a, cx, cy, cz, times(s, wa))
-    hasten(t, b, cx, cy, cz, times(s, wb) * -2.0)
-    hasten(t, c, cx, cy, cz, times(s, wc))
+    weight = gamma * (wa + wb * 4.0 + wc)
+    s = gamma * -1.0 / bend_stiffness(weight, alpha)
+    hasten(t, a, rate * (s * wa))
+    hasten(t, b, rate * (s * wb * -2.0))
+    hasten(t, c, rate * (s * wc))
 
 
 @wp.func
 def damp_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, gamma: Any):
-    """The corners of a cell."""
-    cx = twist_of(t.vx, a, b, c, d)
-    cy = twist_of(t.vy, a, b, c, d)
-    cz = twist_of(t.vz, a, b, c, d)
+    """The corners of a cell: c' = v_0 - v_1 - v_2 + v_3."""
+    rate = twist_of(velocity(t, a), velocity(t, b), velocity(t, c), velocity(t, d))
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
     wd = at(t.w, d)
-    weight = times(gamma, wa + wb + wc + wd)
-    s = over(gamma, bend_stiffness(weight, alpha))
-    hasten(t, a, cx, cy, cz, times(s, wa) * -1.0)
-    hasten(t, b, cx, cy, cz, times(s, wb))
-    hasten(t, c, cx, cy, cz, times(s, wc))
-    hasten(t, d, cx, cy, cz, times(s, wd) * -1.0)
+    weight = gamma * (wa + wb + wc + wd)
+    s = gamma / bend_stiffness(weight, alpha)
+    hasten(t, a, rate * (s * wa * -1.0))
+    hasten(t, b, rate * (s * wb))
+    hasten(t, c, rate * (s * wc))
+    hasten(t, d, rate * (s * wd * -1.0))
 
 
 @wp.func
@@ -79,18 +68,22 @@ def damp_patch(t: Any, table: Any, k: int, alpha: Any, gamma: Any):
     parts = int(3)  # a variable: the loop stays a loop, and kernels compile sooner
     for j in range(parts):
         row = 18 * k + 6 * j
-        cx = total_at(t.vx, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
-        cy = total_at(t.vy, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
-        cz = total_at(t.vz, table.patch_weight, row, i0, i1, i2, i3, i4, i5)
+        v0 = velocity(t, i0)
+        v1 = velocity(t, i1)
+        v2 = velocity(t, i2)
+        v3 = velocity(t, i3)
+        v4 = velocity(t, i4)
+        v5 = velocity(t, i5)
+        rate = total(table.patch_weight, row, v0, v1, v2, v3, v4, v5)
         weight = gamma * 0.0
         corners = int(6)
         for q in range(corners):
             share = table.patch_weight[row + q]
-            weight = weight + scaled(scaled(at(t.w, table.patch[6 * k + q]), share), share)
-        s = over(gamma * -1.0, bend_stiffness(times(gamma, weight), alpha))
+            weight = weight + at(t.w, table.patch[6 * k + q]) * share * share
+        s = gamma * -1.0 / bend_stiffness(gamma * weight, alpha)
         for q in range(corners):
             i = table.patch[6 * k + q]
-            hasten(t, i, cx, cy, cz, scaled(times(s, at(t.w, i)), table.patch_weight[row + q]))
+            hasten(t, i, rate * (s * at(t.w, i) * table.patch_weight[row + q]))
 
 
 @wp.func

@@ -86,6 +86,10 @@ def sub(a: fine, b: float):
 def sub(a: fine_lane, b: lane) -> fine_lane: ...
 
 
+@wp.func_native(_doubles(f"{_A} - (double)b"))
+def sub(a: fine_lane, b: float) -> fine_lane: ...
+
+
 @wp.func
 def add(a: fine, b: float):
     return wp.add(a, fine(b))
@@ -93,6 +97,10 @@ def add(a: fine, b: float):
 
 @wp.func_native(_doubles(f"{_A} + {_B}"))
 def add(a: fine_lane, b: lane) -> fine_lane: ...
+
+
+@wp.func_native(_doubles(f"{_A} + (double)b"))
+def add(a: fine_lane, b: float) -> fine_lane: ...
 
 
 @wp.func

@@ -4,47 +4,40 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, choose, fill, most, mul, over, root, rough, sub, times  # noqa: F401
+from nuno.solver.lanes import add, choose, div, fill, most, mul, root, rough, sub  # noqa: F401
 from nuno.solver.state import CLOCK, DRAG, FASTEST, PICKED, SPEED, TRAVEL, Settings, StateFloat, StateLanes
-from nuno.solver.vector import at, put
+from nuno.solver.vec3 import (
+    dot,
+    position,
+    put_position,
+    put_start_position,
+    put_velocity,
+    start_position,
+    vec3,
+    velocity,
+)
+from nuno.solver.vector import at
 from nuno.solver.warps import leads_warp, most_of_warp
 
 
 @wp.func
 def predict(t: Any, n: int, run: Settings, thread: int, threads: int):
-    """Gravity, pushes and air drag (implicit: v / (1 + drag dt)), then x = p + v dt."""
+    """Gravity, pushes and air drag: v = (v + (g + w f) dt) / (1 + drag dt), then x = p + v dt."""
     one = fill(t.x[0], 1.0)
     zero = fill(t.x[0], 0.0)
-    slow = over(one, one + t.scalars[DRAG] * run.dt)
-    gx = fill(one, run.gravity[0] * run.dt)
-    gy = fill(one, run.gravity[1] * run.dt)
-    gz = fill(one, run.gravity[2] * run.dt)
+    slow = one / (one + t.scalars[DRAG] * run.dt)
+    g = run.gravity
+    fall = vec3(fill(one, g[0] * run.dt), fill(one, g[1] * run.dt), fill(one, g[2] * run.dt))
     for i in range(thread, n, threads):
         w = at(t.w, i)
-        free = choose(w, one, zero)
-        ux = at(t.vx, i) + gx
-        uy = at(t.vy, i) + gy
-        uz = at(t.vz, i) + gz
+        v = velocity(t, i) + fall
         if run.pushed != 0:
-            ux = ux + times(w, at(t.fx, i)) * run.dt
-            uy = uy + times(w, at(t.fy, i)) * run.dt
-            uz = uz + times(w, at(t.fz, i)) * run.dt
-        keep = times(free, slow)
-        ux = times(ux, keep)
-        uy = times(uy, keep)
-        uz = times(uz, keep)
-        x = at(t.x, i)
-        y = at(t.y, i)
-        z = at(t.z, i)
-        put(t.px, i, x)
-        put(t.py, i, y)
-        put(t.pz, i, z)
-        put(t.vx, i, ux)
-        put(t.vy, i, uy)
-        put(t.vz, i, uz)
-        put(t.x, i, x + ux * run.dt)
-        put(t.y, i, y + uy * run.dt)
-        put(t.z, i, z + uz * run.dt)
+            v = v + vec3(at(t.fx, i), at(t.fy, i), at(t.fz, i)) * w * run.dt
+        v = v * (choose(w, one, zero) * slow)
+        x = position(t, i)
+        put_start_position(t, i, x)
+        put_velocity(t, i, v)
+        put_position(t, i, x + v * run.dt)
 
 
 @wp.func
@@ -74,13 +67,10 @@ def read_velocities(t: Any, n: int, run: Settings, thread: int, threads: int):
     rate = 1.0 / run.dt
     top = fill(t.x[0], 0.0)
     for i in range(thread, n, threads):
-        vx = at(t.vx, i) + (at(t.x, i) - (at(t.px, i) + at(t.vx, i) * run.dt)) * rate
-        vy = at(t.vy, i) + (at(t.y, i) - (at(t.py, i) + at(t.vy, i) * run.dt)) * rate
-        vz = at(t.vz, i) + (at(t.z, i) - (at(t.pz, i) + at(t.vz, i) * run.dt)) * rate
-        put(t.vx, i, vx)
-        put(t.vy, i, vy)
-        put(t.vz, i, vz)
-        top = most(top, times(vx, vx) + times(vy, vy) + times(vz, vz))
+        v = velocity(t, i)
+        v = v + (position(t, i) - (start_position(t, i) + v * run.dt)) * rate
+        put_velocity(t, i, v)
+        top = most(top, dot(v, v))
     raise_speed(t.notes, top, thread, threads)
 
 
@@ -114,7 +104,7 @@ def reset_speed(t: Any, thread: int):
 def tick(t: Any, run: Settings, thread: int):
     """Advance the clock, which counts substeps, and how far anything may have gone since pairs were listed."""
     if thread == 0:
-        t.notes[CLOCK] = t.notes[CLOCK] + fill(t.x[0], 1.0)
+        t.notes[CLOCK] = t.notes[CLOCK] + 1.0
         t.notes[PICKED] = t.notes[PICKED] + root(t.notes[SPEED]) * run.dt
         t.notes[TRAVEL] = t.notes[TRAVEL] + root(t.notes[SPEED]) * run.dt
         t.notes[FASTEST] = most(t.notes[FASTEST], t.notes[SPEED])

@@ -33,14 +33,36 @@ def _simd(expression: str, *arguments: str) -> str:
     return _native(f"{loads} {_LANE} r; *(V*)&r = {expression}; return r;")
 
 
-# Warp takes add, sub and mul for the operators + - * where a module imports them by these names. Its own loop over
-# the elements of a vector, which would be compiled twice as slowly to much the same code, is left to the rest.
+# Warp takes add, sub, mul and div for the operators + - * / where a module imports them by these names, so that one
+# text serves a float and a lane: a * b, a / b, and a number that is the same in all lanes on either side. Its own loop
+# over the elements of a vector, which would be compiled twice as slowly to much the same code, is left to the rest.
+# What Warp keeps of compiled modules does not see that an operator changed: clear its cache (wp.clear_kernel_cache).
 @wp.func_native(_simd("A + B", "a", "b"))
 def add(a: lane, b: lane) -> lane: ...
 
 
+@wp.func_native(_simd("A + b", "a"))
+def add(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("a + B", "b"))
+def add(a: float, b: lane) -> lane: ...
+
+
 @wp.func_native(_simd("A - B", "a", "b"))
 def sub(a: lane, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A - b", "a"))
+def sub(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("a - B", "b"))
+def sub(a: float, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A * B", "a", "b"))
+def mul(a: lane, b: lane) -> lane: ...
 
 
 @wp.func_native(_simd("A * b", "a"))
@@ -49,6 +71,18 @@ def mul(a: lane, b: float) -> lane: ...
 
 @wp.func_native(_simd("a * B", "b"))
 def mul(a: float, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A / B", "a", "b"))
+def div(a: lane, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("A / b", "a"))
+def div(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("a / B", "b"))
+def div(a: float, b: lane) -> lane: ...
 
 
 # The next three tell coordinates from other numbers, for those may be doubles: see `nuno.solver.fine`.
@@ -185,6 +219,18 @@ def choose(sign: float, a: float, b: float):
 def choose(sign: lane, a: lane, b: lane) -> lane: ...
 
 
+@wp.func_native(_simd("(V)((SIGN > 0.f) ? (I)((V){} + a) : (I)B)", "sign", "b"))
+def choose(sign: lane, a: float, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("(V)((SIGN > 0.f) ? (I)A : (I)((V){} + b))", "sign", "a"))
+def choose(sign: lane, a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("(V)((SIGN > 0.f) ? (I)((V){} + a) : (I)((V){} + b))", "sign"))
+def choose(sign: lane, a: float, b: float) -> lane: ...
+
+
 @wp.func
 def least(a: float, b: float):
     """The elementwise minimum."""
@@ -195,6 +241,14 @@ def least(a: float, b: float):
 def least(a: lane, b: lane) -> lane: ...
 
 
+@wp.func_native(_simd("(V)((A < b) ? (I)A : (I)((V){} + b))", "a"))
+def least(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("(V)((a < B) ? (I)((V){} + a) : (I)B)", "b"))
+def least(a: float, b: lane) -> lane: ...
+
+
 @wp.func
 def most(a: float, b: float):
     """The elementwise maximum."""
@@ -203,6 +257,14 @@ def most(a: float, b: float):
 
 @wp.func_native(_simd("(V)((A > B) ? (I)A : (I)B)", "a", "b"))
 def most(a: lane, b: lane) -> lane: ...
+
+
+@wp.func_native(_simd("(V)((A > b) ? (I)A : (I)((V){} + b))", "a"))
+def most(a: lane, b: float) -> lane: ...
+
+
+@wp.func_native(_simd("(V)((a > B) ? (I)((V){} + a) : (I)B)", "b"))
+def most(a: float, b: lane) -> lane: ...
 
 
 @wp.func

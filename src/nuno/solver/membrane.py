@@ -2,16 +2,17 @@
 
 Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep,
 and the update is d lambda = -(C + alpha lambda) / (grad C . W grad C + alpha), times an over-relaxation where a substep
-makes several sweeps (`nuno.solver.sweeps`). An index may be an int, or a vector of sixteen where sixteen elements are
-projected at once (`nuno.solver.vector`).
+makes several sweeps (`nuno.solver.sweeps`); each particle then moves by w_i d lambda grad_i C. An index may be an int,
+or a vector of sixteen where sixteen elements are projected at once (`nuno.solver.vector`).
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, beside, fill, least, most, mul, over, root, sub, times  # noqa: F401
-from nuno.solver.vector import at, corner, put, scaled, spread
+from nuno.solver.lanes import add, div, fill, least, most, mul, root, sub  # noqa: F401
+from nuno.solver.vec3 import dot, move, offset, position, put_position, vec3
+from nuno.solver.vector import at, corner, put
 
 MOST_RELAXED = wp.constant(1.45)
 """Bound of the over-relaxation: at 2 it would oscillate, and near it short waves take long to die down."""
@@ -25,17 +26,8 @@ def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
     """
     if rise == 0.0:
         return fill(weight, 1.0)
-    q = over(weight - alpha, alpha) * 0.5
-    relax = (root(q) - fill(weight, onset)) * rise + fill(weight, 1.0)
-    return least(most(relax, fill(weight, 1.0)), fill(weight, MOST_RELAXED))
-
-
-@wp.func
-def shift(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
-    """Move particle i by s (dx, dy, dz)."""
-    put(t.x, i, at(t.x, i) + times(dx, s))
-    put(t.y, i, at(t.y, i) + times(dy, s))
-    put(t.z, i, at(t.z, i) + times(dz, s))
+    q = (weight - alpha) / alpha * 0.5
+    return least(most((root(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
 
 
 @wp.func
@@ -61,211 +53,140 @@ def stretch_yarn(
         rate: 1 / dt^2 [1/s2].
     """
     head = corner(table.edge, first, 0, 2)
-    ax = at(t.x, head)
-    ay = at(t.y, head)
-    az = at(t.z, head)
+    a = position(t, head)
     wa = at(t.w, head)
-    one = fill(ax, 1.0)
-    zero = fill(ax, 0.0)
-    tiny = fill(ax, 1.0e-20)
-    ex = zero
-    ey = zero
-    ez = zero
+    zero = fill(a.x, 0.0)
+    before = vec3(zero, zero, zero)  # the direction of the edge before
     pivot = zero
     pull = zero
     for k in range(first, last):
         j = corner(table.edge, k, 1, 2)
-        bx = at(t.x, j)
-        by = at(t.y, j)
-        bz = at(t.z, j)
+        b = position(t, j)
         wb = at(t.w, j)
-        dx = ax - bx
-        dy = ay - by
-        dz = az - bz
-        length = root(times(dx, dx) + times(dy, dy) + times(dz, dz) + tiny)
-        inverse = over(one, length)
-        dx = times(dx, inverse)
-        dy = times(dy, inverse)
-        dz = times(dz, inverse)
+        edge = a - b
+        length = root(dot(edge, edge) + 1.0e-20)
+        direction = edge * (1.0 / length)
         # minus the entry beside the diagonal, shared with the edge before
-        beside = times(wa, times(ex, dx) + times(ey, dy) + times(ez, dz))
-        gain = times(beside, pivot)
+        beside = wa * dot(before, direction)
+        gain = beside * pivot
         if k > first:
             put(gains, k - 1, gain)
-        alpha = scaled(at(t.stretch_soft, table.edge_soft[k]), table.edge_scale[k] * rate)
-        pivot = over(one, wa + wb + alpha + fill(ax, 1.0e-12) - times(beside, gain))
-        pull = times(spread(ax, rest[k]) - length + times(beside, pull), pivot)
+        alpha = at(t.stretch_soft, table.edge_soft[k]) * (table.edge_scale[k] * rate)
+        pivot = 1.0 / (wa + wb + alpha + 1.0e-12 - beside * gain)
+        pull = (rest[k] - length + beside * pull) * pivot
         put(pulls, k, pull)
-        put(inverses, k, inverse)
-        ax = bx
-        ay = by
-        az = bz
+        put(inverses, k, 1.0 / length)
+        a = b
         wa = wb
-        ex = dx
-        ey = dy
-        ez = dz
+        before = direction
     # pull is now the last edge's lambda, and a the last vertex
-    fx = zero
-    fy = zero
-    fz = zero
+    force = vec3(zero, zero, zero)
     for back in range(last - first):
         k = last - 1 - back
         i = corner(table.edge, k, 0, 2)
         j = corner(table.edge, k, 1, 2)
         if back > 0:
-            pull = at(pulls, k) + times(at(gains, k), pull)
-        bx = at(t.x, i)
-        by = at(t.y, i)
-        bz = at(t.z, i)
-        s = times(pull, at(inverses, k))
-        dx = times(bx - ax, s)
-        dy = times(by - ay, s)
-        dz = times(bz - az, s)
-        wj = at(t.w, j)
-        put(t.x, j, ax + times(wj, fx - dx))
-        put(t.y, j, ay + times(wj, fy - dy))
-        put(t.z, j, az + times(wj, fz - dz))
-        ax = bx
-        ay = by
-        az = bz
-        fx = dx
-        fy = dy
-        fz = dz
-    shift(t, head, fx, fy, fz, at(t.w, head))
+            pull = at(pulls, k) + at(gains, k) * pull
+        b = position(t, i)
+        own = (b - a) * (pull * at(inverses, k))
+        put_position(t, j, a + at(t.w, j) * (force - own))
+        a = b
+        force = own
+    move(t, head, force * at(t.w, head))
 
 
 @wp.func
 def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
-    """A rectangular cell: C = F_u . F_v = (|d1|^2 - |d2|^2) / (4 area), d1 and d2 its diagonals.
+    """A rectangular cell: C = F_u . F_v = s (|p|^2 - |q|^2), p = x_d - x_a and q = x_b - x_c its diagonals.
 
-    ``scale`` is 1 / (4 area). Returned is minus the change of lambda; ``past`` is the sum of those of this substep, and
-    the last two are `relaxation`'s.
+    Its gradients are 2 s p at d, -2 s p at a, 2 s q at c and -2 s q at b; ``scale`` is s = 1 / (4 area). Returned is
+    minus the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
     """
-    ax = at(t.x, a)
-    ay = at(t.y, a)
-    az = at(t.z, a)
-    bx = at(t.x, b)
-    by = at(t.y, b)
-    bz = at(t.z, b)
-    cx = at(t.x, c)
-    cy = at(t.y, c)
-    cz = at(t.z, c)
-    dx = at(t.x, d)
-    dy = at(t.y, d)
-    dz = at(t.z, d)
-    d1x = dx - ax
-    d1y = dy - ay
-    d1z = dz - az
-    d2x = bx - cx
-    d2y = by - cy
-    d2z = bz - cz
-    q1 = times(d1x, d1x) + times(d1y, d1y) + times(d1z, d1z)
-    q2 = times(d2x, d2x) + times(d2y, d2y) + times(d2z, d2z)
+    xa = position(t, a)
+    xb = position(t, b)
+    xc = position(t, c)
+    xd = position(t, d)
+    p = xd - xa
+    q = xb - xc
+    pp = dot(p, p)
+    qq = dot(q, q)
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
     wd = at(t.w, d)
-    gradient = times(wa + wd, q1) + times(wb + wc, q2)
-    weight = scaled(gradient, scaled(scale * 4.0, scale)) + alpha + fill(q1, 1.0e-12)
-    gain = over(scaled(q1 - q2, scale) - times(alpha, past), weight)
-    gain = times(gain, relaxation(weight, alpha, rise, onset))
-    s = scaled(gain, scale * 2.0)
-    sa = times(s, wa)
-    sb = times(s, wb)
-    sc = times(s, wc)
-    sd = times(s, wd)
-    put(t.x, a, ax + times(d1x, sa))
-    put(t.y, a, ay + times(d1y, sa))
-    put(t.z, a, az + times(d1z, sa))
-    put(t.x, d, dx - times(d1x, sd))
-    put(t.y, d, dy - times(d1y, sd))
-    put(t.z, d, dz - times(d1z, sd))
-    put(t.x, b, bx + times(d2x, sb))
-    put(t.y, b, by + times(d2y, sb))
-    put(t.z, b, bz + times(d2z, sb))
-    put(t.x, c, cx - times(d2x, sc))
-    put(t.y, c, cy - times(d2y, sc))
-    put(t.z, c, cz - times(d2z, sc))
+    weight = ((wa + wd) * pp + (wb + wc) * qq) * (scale * 4.0 * scale) + alpha + 1.0e-12
+    gain = ((pp - qq) * scale - alpha * past) / weight * relaxation(weight, alpha, rise, onset)
+    s = gain * (scale * 2.0)
+    put_position(t, a, xa + p * (s * wa))
+    put_position(t, d, xd - p * (s * wd))
+    put_position(t, b, xb + q * (s * wb))
+    put_position(t, c, xc - q * (s * wc))
     return gain
 
 
 @wp.func
-def slope(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
+def weighed(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
     """The sum of k_i x_i, the k adding up to zero."""
-    base = at(x, a)
-    near = scaled(beside(base, base), ka) + scaled(beside(at(x, b), base), kb)
-    return near + scaled(beside(at(x, c), base), kc)
+    base = position(t, a)
+    near = offset(base, base) * ka + offset(position(t, b), base) * kb
+    return near + offset(position(t, c), base) * kc
 
 
 @wp.func
 def stretch_triangle(
     t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, rise: float, onset: float
 ):
-    """A triangle along one material direction: C = |F k| - 1, where F k is the sum of k_i x_i.
+    """A triangle along one material direction: C = |f| - 1, f = F k = sum k_i x_i, with the gradients k_i f / |f|.
 
     Returned is the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
     """
-    fx = slope(t.x, a, b, c, ka, kb, kc)
-    fy = slope(t.y, a, b, c, ka, kb, kc)
-    fz = slope(t.z, a, b, c, ka, kb, kc)
-    length = root(times(fx, fx) + times(fy, fy) + times(fz, fz) + fill(fx, 1.0e-20))
-    wa = scaled(at(t.w, a), ka)
-    wb = scaled(at(t.w, b), kb)
-    wc = scaled(at(t.w, c), kc)
-    weight = scaled(wa, ka) + scaled(wb, kb) + scaled(wc, kc)
-    missing = fill(fx, 1.0) - length - times(alpha, past)
-    weight = weight + alpha + fill(fx, 1.0e-12)
-    s = times(over(missing, times(weight, length)), relaxation(weight, alpha, rise, onset))
-    shift(t, a, fx, fy, fz, times(s, wa))
-    shift(t, b, fx, fy, fz, times(s, wb))
-    shift(t, c, fx, fy, fz, times(s, wc))
-    return times(s, length)
+    f = weighed(t, a, b, c, ka, kb, kc)
+    length = root(dot(f, f) + 1.0e-20)
+    wa = at(t.w, a) * ka
+    wb = at(t.w, b) * kb
+    wc = at(t.w, c) * kc
+    weight = wa * ka + wb * kb + wc * kc + alpha + 1.0e-12
+    s = (1.0 - length - alpha * past) / (weight * length) * relaxation(weight, alpha, rise, onset)
+    move(t, a, f * (s * wa))
+    move(t, b, f * (s * wb))
+    move(t, c, f * (s * wc))
+    return s * length
 
 
 @wp.func
 def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
     """The squared gradient |u F_v + v F_u|^2 at a corner with weights u and v."""
-    return scaled(vv, scaled(u, u)) + scaled(uv, scaled(u * 2.0, v)) + scaled(uu, scaled(v, v))
+    return vv * (u * u) + uv * (u * 2.0 * v) + uu * (v * v)
 
 
 @wp.func
 def shear_triangle(
     t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, rise: float, onset: float
 ):
-    """A triangle's shear: C = F_u . F_v; the last three and what is returned as in `stretch_triangle`."""
+    """A triangle's shear: C = F_u . F_v, F_u = sum u_i x_i and F_v = sum v_i x_i, with the gradients u_i F_v + v_i F_u.
+
+    The last three and what is returned as in `stretch_triangle`.
+    """
     ua = corner(table.triangle_u, k, 0, 3)
     ub = corner(table.triangle_u, k, 1, 3)
     uc = corner(table.triangle_u, k, 2, 3)
     va = corner(table.triangle_v, k, 0, 3)
     vb = corner(table.triangle_v, k, 1, 3)
     vc = corner(table.triangle_v, k, 2, 3)
-    ux = slope(t.x, a, b, c, ua, ub, uc)
-    uy = slope(t.y, a, b, c, ua, ub, uc)
-    uz = slope(t.z, a, b, c, ua, ub, uc)
-    vx = slope(t.x, a, b, c, va, vb, vc)
-    vy = slope(t.y, a, b, c, va, vb, vc)
-    vz = slope(t.z, a, b, c, va, vb, vc)
-    uu = times(ux, ux) + times(uy, uy) + times(uz, uz)
-    vv = times(vx, vx) + times(vy, vy) + times(vz, vz)
-    uv = times(ux, vx) + times(uy, vy) + times(uz, vz)
+    fu = weighed(t, a, b, c, ua, ub, uc)
+    fv = weighed(t, a, b, c, va, vb, vc)
+    uu = dot(fu, fu)
+    vv = dot(fv, fv)
+    uv = dot(fu, fv)
     wa = at(t.w, a)
     wb = at(t.w, b)
     wc = at(t.w, c)
-    weight = fill(ux, 1.0e-12) + alpha
-    weight = weight + times(wa, shear_gradient(ua, va, uu, vv, uv))
-    weight = weight + times(wb, shear_gradient(ub, vb, uu, vv, uv))
-    weight = weight + times(wc, shear_gradient(uc, vc, uu, vv, uv))
-    s = times(over(-uv - times(alpha, past), weight), relaxation(weight, alpha, rise, onset))
-    shift_sheared(t, a, ua, va, ux, uy, uz, vx, vy, vz, times(s, wa))
-    shift_sheared(t, b, ub, vb, ux, uy, uz, vx, vy, vz, times(s, wb))
-    shift_sheared(t, c, uc, vc, ux, uy, uz, vx, vy, vz, times(s, wc))
+    weight = 1.0e-12 + alpha
+    weight = weight + wa * shear_gradient(ua, va, uu, vv, uv)
+    weight = weight + wb * shear_gradient(ub, vb, uu, vv, uv)
+    weight = weight + wc * shear_gradient(uc, vc, uu, vv, uv)
+    s = (-uv - alpha * past) / weight * relaxation(weight, alpha, rise, onset)
+    move(t, a, (fv * ua + fu * va) * (s * wa))
+    move(t, b, (fv * ub + fu * vb) * (s * wb))
+    move(t, c, (fv * uc + fu * vc) * (s * wc))
     return s
-
-
-@wp.func
-def shift_sheared(t: Any, i: Any, u: Any, v: Any, ux: Any, uy: Any, uz: Any, vx: Any, vy: Any, vz: Any, s: Any):
-    """Move particle i by s (u F_v + v F_u)."""
-    dx = scaled(vx, u) + scaled(ux, v)
-    dy = scaled(vy, u) + scaled(uy, v)
-    dz = scaled(vz, u) + scaled(uz, v)
-    shift(t, i, dx, dy, dz, s)
