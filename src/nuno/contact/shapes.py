@@ -149,7 +149,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     origin = origin_of(t)
     centre = three_of(like, t, shapes, row) - origin
     r = rotation_of(like, t, shapes, row)
-    size = three_of(like, t, shapes, row + 12)
+    extent = three_of(like, t, shapes, row + 12)
     mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, g, shapes.stride, w, row + 15))
     pair = per_world(like, shapes.table, g, shapes.stride, w, row + 16)
     mu = choose(pair + 0.5, pair, mean)
@@ -171,7 +171,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
     for i in range(thread, n, threads):
         # in the shape's frame
         p = transposed_mul(r, rough(position(t, i) - centre))
-        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, size.x, size.y, size.z, near)
+        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, extent.x, extent.y, extent.z, near)
         if anywhere(near - gap):
             u = less_surface(slot, position(t, i) - start_position(t, i), e, d, p)
             local = vec3(nx, ny, nz)
@@ -185,12 +185,12 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, thread: int, 
             if kind == SOLID_MESH or kind == SHELL_MESH:
                 way = transposed_mul(r, u)
                 deep, ax, ay, az = gap_mesh(
-                    shapes, s, g, w, within, p.x, p.y, p.z, way.x, way.y, way.z, size.x, size.y, size.z, radius
+                    shapes, s, g, w, within, p.x, p.y, p.z, way.x, way.y, way.z, extent.x, extent.y, extent.z, radius
                 )
                 out = r * vec3(ax, ay, az)
                 press(t, i, deep - radius, out, u, dot(u, out), mu, leave)
             elif kind != PLANE and anywhere(passed):
-                deep, entered, met = way_into(shapes, s, kind, p, transposed_mul(r, u), size.x, size.y, size.z)
+                deep, entered, met = way_into(shapes, s, kind, p, transposed_mul(r, u), extent.x, extent.y, extent.z)
                 met = least(met, passed)
                 out = r * choose(met, entered, local)
                 press(t, i, choose(met, deep, gap) - radius, out, u, dot(u, out), mu, leave)

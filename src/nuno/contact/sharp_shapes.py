@@ -134,7 +134,7 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
         kind = shapes.kind[s]
         if kind < PLANE:
             centre, r = pose_of(like, t, shapes, s, clock)
-            size = three_of(like, t, shapes, s * COLUMNS + 12)
+            extent = three_of(like, t, shapes, s * COLUMNS + 12)
             # the cloth's box as the shape sees it
             low = vec3(t.box[0], t.box[1], t.box[2])
             high = vec3(t.box[3], t.box[4], t.box[5])
@@ -145,7 +145,7 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
                 size_of(r.x.y) * w.x + size_of(r.y.y) * w.y + size_of(r.z.y) * w.z + grow,
                 size_of(r.x.z) * w.x + size_of(r.y.z) * w.y + size_of(r.z.z) * w.z + grow,
             )
-            along, point = sharp_features(kind, transposed_mul(r, middle), h, size.x, size.y, size.z, broad)
+            along, point = sharp_features(kind, transposed_mul(r, middle), h, extent.x, extent.y, extent.z, broad)
             if anywhere(along):
                 if found == 0:
                     for i in range(thread, topo.particles, threads):
@@ -156,11 +156,11 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
                 for i in range(thread, topo.particles, threads):
                     p = transposed_mul(r, position(t, i) - centre)
                     along, point = sharp_features(
-                        kind, p, vec3(around, around, around), size.x, size.y, size.z, broad
+                        kind, p, vec3(around, around, around), extent.x, extent.y, extent.z, broad
                     )  # fmt: skip
                     if anywhere(along):
                         at_once, _point = sharp_features(
-                            kind, p, vec3(soon, soon, soon), size.x, size.y, size.z, broad
+                            kind, p, vec3(soon, soon, soon), extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
                         slack = int(1.0e6 * wp.clamp(-largest(at_once), 0.0, MOST_SLACK))
                         mark = t.sharp_mark[i]
