@@ -142,7 +142,7 @@ def _serve(options: argparse.Namespace) -> int:
 
 def _compile(options: argparse.Namespace) -> int:
     from nuno.errors import InvalidInputError
-    from nuno.kernel_cache import compile_kernels
+    from nuno.kernels.kernel_cache import compile_kernels
 
     if options.jobs is not None and options.jobs < 1:
         raise InvalidInputError(f"--jobs must be at least 1, got {options.jobs}")

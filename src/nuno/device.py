@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from nuno.errors import InvalidInputError
-from nuno.kernel_cache import take_machine_code
+from nuno.kernels.kernel_cache import take_machine_code
 
 
 def checked_device(name: Any) -> str:

@@ -20,7 +20,6 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table, table_margin
-from nuno.compile_watch import Stages, compiling_watched
 from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
@@ -34,6 +33,7 @@ from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, 
 from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
 from nuno.estimate.together import Ahead, has_room
 from nuno.estimate.turns import TURNS, checked_turns
+from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.progress import with_bar, with_clock
 from nuno.validation import finite_array, number
 

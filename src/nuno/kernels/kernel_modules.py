@@ -54,7 +54,7 @@ class KernelModule:
 
 def kernel_sources() -> list[str]:
     """Return the names of the Python modules that declare kernels, in order."""
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     declaring = (path for path in root.rglob("*.py") if path != Path(__file__) and "@wp.kernel" in path.read_text())
     return sorted(".".join((root.name, *path.relative_to(root).with_suffix("").parts)) for path in declaring)
 

@@ -11,10 +11,10 @@ import pytest
 import nuno
 from nuno.__main__ import main
 from nuno.errors import InvalidInputError
-from nuno.kernel_cache import compile_kernels
-from nuno.kernel_modules import CPU_ONLY, CUDA_ONLY, kernel_modules, kernel_sources
+from nuno.kernels.kernel_cache import compile_kernels
+from nuno.kernels.kernel_modules import CPU_ONLY, CUDA_ONLY, kernel_modules, kernel_sources
 
-CASE = Path(__file__).parents[1] / "examples" / "pick-case"
+CASE = Path(__file__).parents[2] / "examples" / "pick-case"
 
 
 def run(cache, *arguments, **environment):
@@ -62,7 +62,7 @@ def test_names_in_the_cache_do_not_depend_on_what_was_imported_when(tmp_path):
     told = """
 import warp
 warp.config.log_level = warp.LOG_ERROR
-from nuno.kernel_modules import kernel_modules
+from nuno.kernels.kernel_modules import kernel_modules
 print([each.module.get_module_identifier(block_dim=1) for each in kernel_modules()])
 """
     first = run(tmp_path, "-c", told, PYTHONHASHSEED="1")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from nuno.errors import InvalidInputError
-from nuno.kernel_modules import KernelModule, kernel_modules
+from nuno.kernels.kernel_modules import KernelModule, kernel_modules
 
 
 def compile_kernels(

@@ -7,7 +7,7 @@ import time
 import pytest
 import warp as wp
 
-from nuno.compile_watch import TOLD_AFTER, Stages, compiling_watched
+from nuno.kernels.compile_watch import TOLD_AFTER, Stages, compiling_watched
 
 
 class Heard:

@@ -7,7 +7,7 @@ compiled in its cache, by a hash of the source, so that only what has changed is
 import pytest
 import warp as wp
 
-from nuno.kernel_modules import kernel_modules
+from nuno.kernels.kernel_modules import kernel_modules
 
 ARCHITECTURE = 90
 MODULES = {module.name: module for module in kernel_modules() if "cuda" in module.devices}
