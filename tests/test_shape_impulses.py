@@ -46,7 +46,10 @@ def check_balance(world, body, frames):
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("substeps", [None, 10])
 def test_a_towel_on_a_table(device, substeps):
-    """At rest the table gives m g dt, in a whole frame and in half of one; it is known once a frame was summed up."""
+    """At rest the table gives m g dt, in a whole frame and in half of one; it is known once a frame was summed up.
+
+    Air drag d takes its share of what each substep of h predicts: m g dt / (1 + d h) is left.
+    """
     world = nuno.World(device=device, substeps=substeps)
     table(world)
     body = towel(world)
@@ -54,10 +57,11 @@ def test_a_towel_on_a_table(device, substeps):
     world.run(1.0)
     told = world.contacts(body).impulses
     assert set(told) == {"table"}
-    np.testing.assert_allclose(told["table"], (0.0, 0.0, weight(world, body)), atol=0.01 * weight(world, body))
+    whole = weight(world, body) / (1.0 + body.material.air_drag / world.frame_rate / body.resolution.substeps)
+    np.testing.assert_allclose(told["table"], (0.0, 0.0, whole), atol=TOLD * whole)
     world.run(0.5 / world.frame_rate)
-    half = 0.5 * weight(world, body)
-    np.testing.assert_allclose(world.contacts(body).impulses["table"], (0.0, 0.0, half), atol=0.02 * half)
+    half = 0.5 * whole
+    np.testing.assert_allclose(world.contacts(body).impulses["table"], (0.0, 0.0, half), atol=TOLD * half)
     world.sum_impulses(body, False)
     world.step()
     assert world.contacts(body).impulses == {}
@@ -74,7 +78,7 @@ def test_a_soft_cube_on_the_floor(device):
     assert max(frame["floor"][2] for frame in check_balance(world, cube, 20) if frame) > 2.0 * weight(world, cube)
     world.run(2.0)
     told = world.contacts(cube).impulses["floor"]
-    np.testing.assert_allclose(told, (0.0, 0.0, weight(world, cube)), atol=0.01 * weight(world, cube))
+    np.testing.assert_allclose(told, (0.0, 0.0, weight(world, cube)), atol=TOLD * weight(world, cube))
 
 
 @pytest.mark.parametrize("device", DEVICES)
