@@ -27,7 +27,8 @@ class ContactPoints:
         worlds: (k,) int, the world of a batch that each is in.
         impulses: What contacts with each other body gave this one in the last frame, by the other's name, (3,) or
             (worlds, 3) float [N s]: over the frame's time it is the mean force. Not known, and left out, are those of
-            a cloth or soft body with static ones, and those before the first frame after a restore.
+            a cloth or soft body with static ones where ``World.sum_impulses`` does not ask for them, and those before
+            the first frame after a restore.
     """
 
     points: np.ndarray
@@ -57,6 +58,9 @@ def contact_points(world: Simulation, body: Body, itself: bool = False) -> Conta
     found: list[tuple[Any, ...]] = []
     impulses: dict[str, np.ndarray] = {}
     if isinstance(dynamics, ParticleDynamics):
+        given = dynamics.shape_impulses()
+        there = [(world._bodies[key].name, own) for key, own in given.items() if key in world._bodies]
+        impulses = {name: own.copy() for name, own in there if own.any()}
         found += _on_shapes(world, body, dynamics)
         if itself and isinstance(dynamics.material, Cloth):
             found += _on_itself(world, body, dynamics)
@@ -65,8 +69,8 @@ def contact_points(world: Simulation, body: Body, itself: bool = False) -> Conta
         for k in range(world.world_count):
             for slot, points, normals, forces in dynamics.solver.contacts_of(dynamics.slot, k):
                 found += [(*row, names.get(slot, ""), k) for row in zip(points, normals, forces, strict=True)]
-        given = dynamics.solver.impulses_of(dynamics.slot)
-        impulses = {names[slot]: impulse for slot, impulse in given.items() if slot in names}
+        by_slot = dynamics.solver.impulses_of(dynamics.slot)
+        impulses = {names[slot]: impulse for slot, impulse in by_slot.items() if slot in names}
     for coupled in world._stepping.last:
         found += coupled.contacts(body, itself)
         for name, impulse in coupled.impulses(body).items():
@@ -98,6 +102,8 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
 
     What other bodies press on a shape is known of the last substep instead, from what the two did together.
     """
+    from nuno.solver.shape_forces import shape_forces
+
     world._bring_colliders()
     static = [other for other in world._bodies.values() if other._dynamics is None]
     touched, _ = world._rules.colliders_of(body, static)
@@ -110,7 +116,7 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
             known, contacts = coupled.shape_contacts(body)
             pressed |= known
             found += [(points[k, i], n, force, touched[shape].name, k) for k, i, shape, n, force in contacts]
-    for shape, normals, forces in dynamics.solver.shape_forces(world.time):
+    for shape, normals, forces in shape_forces(dynamics.solver, world.time):
         for k, i in zip(*np.nonzero((np.linalg.norm(normals, axis=-1) > 0.0) & ~pressed), strict=True):
             found.append((points[k, i], normals[k, i], forces[k, i], touched[shape].name, k))
     return found

@@ -17,12 +17,14 @@ class ContactRules:
         friction: The coefficient of each pair that has its own.
         ignored: The pairs that pass through each other.
         held: Those that do while a grip holds one of them; see `set_held`.
+        summed: The bodies for which impulses of static bodies are summed up; see ``World.sum_impulses``.
     """
 
     def __init__(self) -> None:
         self.friction: dict[frozenset[str], Any] = {}
         self.ignored: set[frozenset[str]] = set()
         self.held: set[frozenset[str]] = set()
+        self.summed: set[str] = set()
 
     def set_held(self, grips: Iterable[Grip]) -> None:
         """Take the pairs of all active grips: what holds a rigid body is no obstacle to it."""

@@ -252,6 +252,15 @@ class ParticleDynamics(Dynamics):
             self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
             self._pushing = pushing
 
+    def shape_impulses(self) -> dict[str, np.ndarray]:
+        """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""
+        told: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.told()
+        return told
+
+    def _forget_impulses(self) -> None:
+        if self.solver.sums is not None:
+            self.solver.sums.tell({})
+
     def keep(self) -> Any:
         """Return what `put_back` takes: as `state`, but where the solver has it."""
         return self.solver.keep()
@@ -259,14 +268,16 @@ class ParticleDynamics(Dynamics):
     def put_back(self, kept: Any) -> None:
         """Set the state that `keep` kept."""
         self.solver.put_back(kept)
+        self._forget_impulses()
 
     def state(self) -> State:
         """Return copies of all that the next step depends on."""
         return self.solver.save_state()
 
     def load_state(self, state: State) -> None:
-        """Set the state that `state` gave."""
+        """Set the state that `state` gave; what shapes gave before that was in another past."""
         self.solver.load_state(state)
+        self._forget_impulses()
 
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether all positions and velocities are finite."""

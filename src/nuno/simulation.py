@@ -214,7 +214,10 @@ class Simulation:
         static: list[Body] | None = None
         for body in self._bodies.values():
             dynamics = body._dynamics
-            if not isinstance(dynamics, ParticleDynamics) or dynamics.collider_version == self._collider_version:
+            if not isinstance(dynamics, ParticleDynamics):
+                continue
+            dynamics.solver.sum_impulses(body.key in self._rules.summed)
+            if dynamics.collider_version == self._collider_version:
                 continue
             if static is None:
                 static = [b for b in self._bodies.values() if b._dynamics is None]

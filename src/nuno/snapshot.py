@@ -97,6 +97,7 @@ class Snapshot:
     pair_friction: tuple[tuple[str, str, Any], ...]
     ignored: tuple[tuple[str, str], ...]
     rigid: RigidLayout | None = None
+    summed: tuple[str, ...] = ()
     from_file: bool = field(default=False)
     drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
 
@@ -178,7 +179,7 @@ def capture(world: Simulation) -> Snapshot:
         bodies=tuple(_body_record(body, world) for body in world._bodies.values()),
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
-        ignored=tuple(ignored), rigid=layout_of(world),
+        ignored=tuple(ignored), rigid=layout_of(world), summed=tuple(sorted(rules.summed)),
         drivers=tuple((driver, driver.save()) for driver in world.drivers),
     )  # fmt: skip
 
@@ -226,6 +227,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
         _restore_grip(grip, bodies, world)
     world._rules.friction = {frozenset((a, b)): mu for a, b, mu in snapshot.pair_friction}
     world._rules.ignored = {frozenset(pair) for pair in snapshot.ignored}
+    world._rules.summed = set(snapshot.summed)
     if snapshot.from_file:
         _rename_keys(world, bodies)
     world._colliders_changed()
@@ -367,6 +369,7 @@ def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:
     # rules also speak of bodies that were removed, and may come back
     rules.friction = {frozenset(new.get(key, key) for key in pair): mu for pair, mu in rules.friction.items()}
     rules.ignored = {frozenset(new.get(key, key) for key in pair) for pair in rules.ignored}
+    rules.summed = {new.get(key, key) for key in rules.summed}
 
 
 def _mapped_lead(led: tuple[float, Pose, Pose] | None, batched: Any) -> tuple[float, Pose, Pose] | None:

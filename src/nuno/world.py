@@ -374,6 +374,17 @@ class World(Saving):
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
 
+    def sum_impulses(self, body: Body | str, on: bool = True) -> None:
+        """Sum up what static bodies give a cloth or soft body, from the next frame on, or, with ``on=False``, no more.
+
+        ``world.contacts(body).impulses`` then tells of them too. A body's frames take several times as long while its
+        impulses are summed up; its motion keeps every bit. Copies of the world sum up as it does, and a body that is
+        attached anew as before. For rigid bodies all is summed up in any case.
+        """
+        with self._change("sum_impulses"):
+            own = self._own(body)
+            (self._rules.summed.add if on else self._rules.summed.discard)(own.key)
+
     def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:
         """Return where a dynamic body touches others: points, normals and forces.
 

@@ -49,15 +49,17 @@ class Colliders:
     Attributes:
         shapes: The Warp struct.
         count: Number of shapes.
+        keys: The keys of their bodies, in the table's order.
         led: Bodies with a slot, in the slots' order.
         least_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
     """
 
     def __init__(
-        self, shapes: Shapes, count: int, meshes: list[Any], led: Sequence[Body], centres: Sequence[np.ndarray],
-        least_radius: float,
+        self, shapes: Shapes, keys: Sequence[str], meshes: list[Any], led: Sequence[Body],
+        centres: Sequence[np.ndarray], least_radius: float,
     ) -> None:  # fmt: skip
-        self.shapes, self.count, self.led, self.least_radius = shapes, count, tuple(led), least_radius
+        self.shapes, self.count, self.keys = shapes, len(keys), tuple(keys)
+        self.led, self.least_radius = tuple(led), least_radius
         self._meshes = meshes
         # (worlds, led, 3) [m], where the led bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
@@ -141,7 +143,8 @@ class Colliders:
         shapes.timing = wp.zeros(2, dtype=int, device=device)
         shapes.haste = wp.zeros(1, dtype=float, device=device)
         curved = np.where((kinds == BOX) | (kinds == CYLINDER), 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
-        return cls(shapes, len(bodies), meshes, led, centres, float(curved.min()))
+        keys = [body.key for body in bodies]
+        return cls(shapes, keys, meshes, led, centres, float(curved.min()))
 
     def follow(self, schedule: Schedule) -> None:
         """Take where the led bodies are during the next run; arrays keep their places on the device."""

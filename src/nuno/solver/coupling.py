@@ -22,7 +22,8 @@ from nuno.solver.particle_solver import ParticleSolver
 from nuno.solver.passing import Passing
 from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.rigid_body import RigidState
-from nuno.solver.state import LAYERS, MOTION, NOTES, PARTICLE_ARRAYS, PLACES, PULLS, SHAPES, SPEED, VELOCITIES
+from nuno.solver.shape_impulses import plain
+from nuno.solver.state import NOTES, PARTICLE_ARRAYS, PLACES, SPEED
 
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which handles one world."""
@@ -152,11 +153,11 @@ class Coupling:
         made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, self._firsts[k]
         for name in PARTICLE_ARRAYS:
             if not name.startswith("v"):
-                setattr(made, name, _plain(getattr(solver._state, name), float))
+                setattr(made, name, plain(getattr(solver._state, name), float))
         made.doubles = int(solver._fine.count)
         if made.doubles:
             for name in PLACES:
-                setattr(made, name.upper(), _plain(solver._fine.array(name), wp.float64))
+                setattr(made, name.upper(), plain(solver._fine.array(name), wp.float64))
         made.origin = wp.array(solver.origin.astype(np.float32), dtype=wp.vec3, device=self.device)
         offset = (solver.origin - self._origins[:, k]).astype(np.float32)
         made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
@@ -166,7 +167,7 @@ class Coupling:
     def _surroundings(solver: ParticleSolver) -> Surroundings:
         made, state = Surroundings(), solver._state
         made.shapes, made.worlds, made.stride = solver._shapes, solver.world_count, solver._size.near
-        made.near, made.scalars = state.near, _plain(state.scalars, float)
+        made.near, made.scalars = state.near, plain(state.scalars, float)
         return made
 
     def _set_parties(self, party: np.ndarray) -> None:
@@ -228,7 +229,7 @@ class Coupling:
         self._plan_listings(substeps, reaches, apart)
         for k in range(substeps):
             for solver in self._solvers:
-                solver.step_parts(k, MOTION | PULLS | LAYERS)
+                solver.begin_substep(k)
             if self._rigid is not None:
                 self._rigid.predict()
             self._touch(k, dt, (k + 1) / substeps)
@@ -240,7 +241,7 @@ class Coupling:
             elif self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
-                solver.step_parts(k, SHAPES | VELOCITIES)
+                solver.end_substep(k)
             if self._rigid is not None:
                 self._rigid.finish()
 
@@ -321,6 +322,9 @@ class Coupling:
             )  # fmt: skip
             if self._listed:
                 self._go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
+            for solver, layout in zip(self._solvers, self._layouts, strict=True):
+                if solver.sums is not None:
+                    solver.sums.add_bounds(layout, particles)
             for body, layout in enumerate(self._layouts):
                 self._go(scatter, (worlds, layout.particles), layout, particles, self._start, body=body)
 
@@ -485,9 +489,3 @@ class Coupling:
 
     def _per_world(self, array: wp.array, count: int) -> np.ndarray:
         return array.numpy().reshape(self.world_count, -1, 3)[:, :count].astype(float) * self._scale
-
-
-def _plain(array: wp.array, number: Any) -> wp.array:
-    """An array of numbers or of vectors of them as plain numbers, without a copy."""
-    count = array.capacity // wp.types.type_size_in_bytes(number)
-    return wp.array(ptr=array.ptr, dtype=number, shape=(count,), device=array.device, copy=False)

@@ -25,6 +25,8 @@ def copy_particles(solver: ParticleSolver) -> Copied:
     copied = {name: solver._get(getattr(solver._state, name), count).copy() for name, count in _columns(solver).items()}
     if solver._fine.count:
         copied |= {f"fine_{name}": array.copy() for name, array in _doubles(solver).items()}
+    if solver.sums is not None:
+        copied |= {f"given_{key}": impulse for key, impulse in solver.sums.told().items()}
     return copied | {"last_dt": np.full(solver.world_count, solver._last_dt)}
 
 
@@ -43,6 +45,13 @@ def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]])
     for copied, worlds in made:
         last[worlds] = copied["last_dt"][worlds]
     solver._last_dt = last
+    if solver.sums is not None:
+        given: Copied = {}
+        for copied, worlds in made:
+            for name in (name for name in copied if name.startswith("given_")):
+                whole = given.setdefault(name.removeprefix("given_"), np.zeros((solver.world_count, 3)))
+                whole[worlds] = copied[name][worlds]
+        solver.sums.tell(given)
 
 
 def move_particles(solver: ParticleSolver, moved: dict[int, np.ndarray]) -> None:

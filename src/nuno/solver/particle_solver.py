@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.contact.shapes import COLUMNS
 from nuno.solver.fine_places import FinePlaces
 from nuno.solver.grip_rows import grip_rows
 from nuno.solver.lanes import LANES, lane, lane_int
@@ -29,6 +28,7 @@ from nuno.solver.state import (
     SHAPES,
     SPEED,
     TRAVEL,
+    VELOCITIES,
     Settings,
     Shapes,
 )
@@ -36,6 +36,7 @@ from nuno.solver.state import (
 if TYPE_CHECKING:
     from nuno.grip import GripSpec
     from nuno.scene.colliders import Colliders
+    from nuno.solver.shape_impulses import ShapeImpulses
 
 MU = 15
 """Where a row of the table of static shapes has its friction, and that of the pair."""
@@ -63,6 +64,7 @@ class ParticleSolver:
         lanes: Worlds in a vector, 16 in a batch on the CPU and else 1.
         mass: (worlds, n) [kg].
         missed: (worlds,) bool, where contacts of the body with itself were ever passed over for want of memory.
+        sums: What shapes give the body over a frame, where that is asked for: see `sum_impulses`.
     """
 
     substeps: int
@@ -92,6 +94,7 @@ class ParticleSolver:
         self._number: Any = lane if self.lanes > 1 else float
         self._integer: Any = lane_int if self.lanes > 1 else int
         self.missed = np.zeros(self.world_count, dtype=bool)
+        self.sums: ShapeImpulses | None = None
         self._counts: wp.array | None = None  # read on CUDA along with `finite`, so that nobody waits twice
         self._counted: np.ndarray | None = None
 
@@ -304,6 +307,13 @@ class ParticleSolver:
         self._state.near, self._state.sharp = self._empty(self._size.near, int), self._empty(self._size.sharp, int)
         self._forget_launches()
 
+    def sum_impulses(self, on: bool) -> None:
+        """Sum up what shapes give the body, from the next frame on, or no more. The motion keeps its bits."""
+        if on != (self.sums is not None):
+            from nuno.solver.shape_impulses import ShapeImpulses
+
+            self.sums = ShapeImpulses(self) if on else None
+
     def set_forces(self, forces: np.ndarray | None) -> None:
         """Forces [N] on the vertices, (worlds, n, 3), held until set anew; None for none."""
         s = self._state
@@ -369,63 +379,6 @@ class ParticleSolver:
             first += k
         return result
 
-    def shape_forces(self, time: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """What each static shape nearby would do in the substep that comes next; nothing is changed.
-
-        Returns:
-            The shape's number in the table, the normals (worlds, n, 3) at the particles that it pushes, zero elsewhere,
-            and the forces [N] on them, (worlds, n, 3).
-        """
-        s, saved, loads, last = self._state, self.save_state(), wp.clone(self._state.grip_load), self._last_dt
-        dt = 1.0 / self.frame_rate / self.substeps
-        self.open(time, dt, self.substeps)
-        self.step_parts(0, MOTION | PULLS | LAYERS)
-        lists = {name: getattr(s, name).numpy().reshape(self.group_count, -1).copy() for name in self._shape_lists}
-        near = lists["near"]
-        shapes = sorted({int(k) for row in near for k in row[1 : 1 + row[0]]})
-        before, held = [wp.clone(a) for a in self._fine.arrays], wp.clone(s.w)
-        table: Any = wp.clone(self._shapes.table)
-        slick = table.numpy().reshape(-1, COLUMNS).copy()
-        slick[:, MU : MU + 2] = 0.0
-
-        def moved(shape: int) -> np.ndarray:
-            for array, first in zip(self._fine.arrays, before, strict=True):
-                wp.copy(array, first)
-            wp.copy(s.w, held)
-            self._touch_only(shape, lists)
-            start = self.local_positions().astype(float)
-            self.step_parts(0, SHAPES)
-            return self.local_positions() - start
-
-        result = []
-        for shape in shapes:
-            forces = moved(shape) * (self.mass / dt**2)[..., None]
-            self._shapes.table.assign(slick.ravel())
-            push = moved(shape)
-            self._shapes.table.assign(table)
-            size = np.linalg.norm(push, axis=-1, keepdims=True)
-            forces[self._inverse_mass_now(held) == 0.0] = 0.0
-            if size.any():
-                result.append((shape, np.divide(push, size, out=np.zeros_like(push), where=size > 0.0), forces))
-        self.load_state(saved)
-        wp.copy(s.grip_load, loads)
-        self._last_dt = last
-        return result
-
-    def _touch_only(self, shape: int, lists: dict[str, np.ndarray]) -> None:
-        """Let what comes next touch one shape of ``lists`` alone, until a frame begins."""
-        for name, start in self._shape_lists.items():
-            rows = lists[name].copy()
-            rows[:, 0] = [shape in row[start : start + row[0]] for row in lists[name]]
-            rows[:, start] = shape
-            getattr(self._state, name).assign(rows.ravel())
-        self._state.sharp_wake.zero_()  # what sleeps was far from another shape
-
-    @property
-    def _shape_lists(self) -> dict[str, int]:
-        """The state's lists of shapes nearby, as many as their first number says: at which number they begin."""
-        return {"near": 1, "sharp": len(self._surface.sharp_colour)}
-
     def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
         """(worlds, n), zero for what is held."""
         fixed = self._get(array, self.particle_count).copy()
@@ -452,9 +405,15 @@ class ParticleSolver:
             self._launch(time + whole * frame, rest / last, last, count)
 
     def _launch(self, time: float, dt: float, substeps: int, frame: int) -> None:
-        run = self.settings(time, dt, frame)
-        self._reset_clock()
-        self._advance(run, substeps)
+        if self.sums is None:
+            run = self.settings(time, dt, frame)
+            self._reset_clock()
+            self._advance(run, substeps)
+            return
+        self.open(time, dt, frame)
+        for k in range(substeps):
+            self.begin_substep(k)
+            self.end_substep(k)
 
     def open(self, time: float, dt: float, frame: int) -> None:
         """Begin to advance by parts of a substep of ``dt`` [s], ``frame`` of them a frame; see `step_parts`."""
@@ -466,6 +425,19 @@ class ParticleSolver:
         """Do some parts (see `nuno.solver.state`) of substep ``index`` since `open`."""
         self._opened.first, self._opened.parts = index, parts
         self._advance(self._opened, 1)
+
+    def begin_substep(self, index: int) -> None:
+        """Do substep ``index`` since `open` up to where shapes are met."""
+        self.step_parts(index, MOTION | PULLS | LAYERS)
+        if self.sums is not None and index % self._opened.frame == 0:
+            self.sums.begin()
+
+    def end_substep(self, index: int) -> None:
+        """Do the rest of it."""
+        if self.sums is None:
+            self.step_parts(index, SHAPES | VELOCITIES)
+        else:
+            self.sums.finish(index)
 
     def settings(self, time: float, dt: float, frame: int) -> Settings:
         """The run's settings, paths counted from ``time``, with ``frame`` substeps of ``dt`` [s] a frame."""
