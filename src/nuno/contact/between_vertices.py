@@ -151,8 +151,8 @@ def meet_edge(t: Any, h: Any, entry: int, gone: float, i: int, j: int, turn: int
     like = h.radius
     zero = fill(like, 0.0)
     one = fill(like, 1.0)
-    a = transposed_mul(h.turn, rough(start_position(t, i) - h.centre))
-    way = transposed_mul(h.turn, start_position(t, j) - start_position(t, i))
+    a = transposed_mul(h.rotation, rough(start_position(t, i) - h.centre))
+    way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
     half = vec3(size_of(way.x) * 0.5 + h.reach, size_of(way.y) * 0.5 + h.reach, size_of(way.z) * 0.5 + h.reach)
     on, _point = sharp_features(h.kind, a + way * 0.5, half, h.size.x, h.size.y, h.size.z, h.broad)
     tiny = -fill(like, 1.0e-12)
@@ -241,9 +241,9 @@ def meet_triangle(t: Any, h: Any, entry: int, gone: float, i: int, j: int, k: in
     zero = fill(like, 0.0)
     one = fill(like, 1.0)
     third = float(1.0 / 3.0)
-    a = transposed_mul(h.turn, rough(start_position(t, i) - h.centre))
-    way = transposed_mul(h.turn, start_position(t, j) - start_position(t, i))
-    m = transposed_mul(h.turn, start_position(t, k) - start_position(t, i))
+    a = transposed_mul(h.rotation, rough(start_position(t, i) - h.centre))
+    way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
+    m = transposed_mul(h.rotation, start_position(t, k) - start_position(t, i))
     o = (way + m) * third
     far = most(dot(way - o, way - o), dot(m - o, m - o))
     size = root(most(dot(o, o), far)) + h.reach

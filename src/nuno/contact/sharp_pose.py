@@ -26,7 +26,7 @@ substep begins may be reached in it [m]."""
 
 
 def _make(name: str, number: type, vector: type, matrix: type) -> Any:
-    fields: dict[str, Any] = {"centre": vector, "turn": matrix}  # when the substep began: place [m], shape to world
+    fields: dict[str, Any] = {"centre": vector, "rotation": matrix}  # when the substep began: place [m], shape to world
     fields |= {"e": vector, "d": matrix}  # what they change in it
     fields |= {"size": vector} | {name: number for name in NUMBERS} | {"broad": float, "kind": int, "slot": int}
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
@@ -54,13 +54,13 @@ def measured(h: Any, like: Any, t: Any, run: Settings, shapes: Shapes, s: int):
     clock = int(largest(t.notes[CLOCK]))
     h.kind = shapes.kind[s]
     h.slot = shapes.slot[s]
-    centre, turn = pose_of(like, t, shapes, s, clock - 1)
+    centre, rotation = pose_of(like, t, shapes, s, clock - 1)
     h.centre = centre
-    h.turn = turn
+    h.rotation = rotation
     if h.slot >= 0:
         after, turn_after = pose_of(like, t, shapes, s, clock)
         h.e = after - centre
-        h.d = turn_after - turn
+        h.d = turn_after - rotation
     row = s * COLUMNS
     h.size = three_of(like, t, shapes, row + 12)
     mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15))

@@ -41,7 +41,7 @@ def push_apart(
         u = u + bk * (position(t, k) - start_position(t, k))
     if h.slot >= 0:
         u = less_product(u - h.e, h.d, p)
-    n = h.turn * local
+    n = h.rotation * local
     depth = gap + u.x * n.x + u.y * n.y + u.z * n.z
     touching = least(on, -depth)
     if anywhere(touching):
