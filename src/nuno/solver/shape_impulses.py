@@ -18,7 +18,6 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.shape_moves import ADD_MOVES, NOTE_LENGTHS, add_bounds
-from nuno.solver.fine import fine
 from nuno.solver.recorded_launches import RecordedLaunches
 from nuno.solver.shape_forces import listed_shapes, one_of, shape_lists
 from nuno.solver.state import SHAPES, VELOCITIES
@@ -154,7 +153,7 @@ class ShapeImpulses:
 
     def _places_now(self) -> tuple[list[wp.array], list[wp.array]]:
         """The particles' places, those that count, and room for what they were."""
-        number = fine if self._solver._fine.count else wp.float32
+        number = wp.float64 if self._solver._fine.count else wp.float32
         if number not in self._places:
             arrays = [plain(array, number) for array in self._solver._fine.arrays]
             self._places[number] = arrays, [wp.empty_like(array) for array in arrays]
