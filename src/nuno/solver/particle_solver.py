@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from nuno.scene.colliders import Colliders
     from nuno.solver.shape_impulses import ShapeImpulses
 
-MU = 15
-"""Where a row of the table of static shapes has its friction, and that of the pair."""
 KEPT = ("x", "y", "z", "vx", "vy", "vz", "notes")
 """What a run changes that the next one depends on."""
 Kept = tuple[np.ndarray, list[wp.array], list[wp.array]]

@@ -1,15 +1,20 @@
-"""What static shapes would do to a body in the next substep, asked of its solver without changing anything."""
+"""Forces that static shapes would put on a body in the next substep, asked of its solver without changing anything."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from nuno.contact.shapes import COLUMNS
-from nuno.solver.particle_solver import MU, ParticleSolver
 from nuno.solver.state import LAYERS, MOTION, PULLS, SHAPES
+
+if TYPE_CHECKING:
+    from nuno.solver.particle_solver import ParticleSolver
+
+MU = 15
+"""Where a row of the table of static shapes has its friction, and that of the pair."""
 
 
 def shape_forces(solver: ParticleSolver, time: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
