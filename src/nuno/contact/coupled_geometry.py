@@ -1,8 +1,8 @@
 """Where the candidates of coupled bodies touch: weights, normal and distance of each row for one substep.
 
 All is taken where the substep began, when nothing crossed: that tells the side, and of a face of a solid body the
-outside is known. A row whose parts are too close
-already asks for what they have and a little more, so that they part slowly.
+outside is known. Only a vertex that comes in under an edge in the substep has the normal of the face that it comes to.
+A row whose parts are too close already asks for what they have and a little more, so that they part slowly.
 """
 
 import warp as wp
@@ -23,6 +23,8 @@ of fingers bear what their faces should."""
 SLANT = wp.constant(0.05)
 """Sine of the angle between two edges from which on they cross; less, and their ends touch, not they. By as much a
 normal may lean out of those between the two faces at a sharp edge: an edge that lies on a face leaves it in between."""
+LEANS = wp.constant(0.999)
+"""Cosine of the angle between two normals from which on they are taken as one, which keeps its bits."""
 
 
 @wp.func
@@ -68,6 +70,43 @@ def part_distance(elements: Elements, part: int, x: wp.vec3):
             ny = normal[1]
             nz = normal[2]
     return gap, wp.quat_rotate(elements.part_turn[part], wp.vec3(nx, ny, nz))
+
+
+@wp.func
+def on_its_way(elements: Elements, part: int, x: wp.vec3, go: wp.vec3, gap: float, n: wp.vec3, point: wp.vec3,
+               apart: float, dt: float):  # fmt: skip
+    """The distance of a point outside of a box or cylinder along the normal of where it comes to, and that normal.
+
+    What comes in under an edge lies on the face beyond it when the substep ends. The normal of where it began leans
+    over the edge: it would hold the point back, and throw what the edge belongs to. The normal where it goes to along
+    the surface is taken instead if it is more nearly square to that way, and asks for no smaller distance.
+
+    Args:
+        elements: All.
+        part: Which of the bodies' parts.
+        x: Where the point began, in the body's frame.
+        go: How far it goes in the substep, in the body's frame [m].
+        gap: Its distance where it began [m].
+        n: The normal there.
+        point: The part's nearest point there.
+        apart: The contact distance [m].
+        dt: The substep [s].
+
+    Returns:
+        The distance, the normal and the part's point under it.
+    """
+    kind = elements.part_kind[part]
+    if kind == BOX or kind == CYLINDER:
+        there = x + go - n * wp.dot(go, n)
+        found, normal = part_distance(elements, part, there)
+        if wp.dot(normal, n) < LEANS and found > 0.0 and wp.abs(wp.dot(go, normal)) < wp.abs(wp.dot(go, n)):
+            under = there - normal * found
+            height = wp.dot(x - under, normal)
+            if height + LEAVE_SPEED * dt >= wp.min(apart, gap):
+                gap = height
+                n = normal
+                point = under
+    return gap, n, point
 
 
 @wp.func
@@ -166,8 +205,13 @@ def measure_rows(particles: Particles, rigid: RigidState, elements: Elements, ro
         x = wp.quat_rotate_inv(turn, particles.p[first + q[0]] - rigid.position_before[i])
         signed, normal = part_distance(elements, rows.part[r], x)
         gap = signed
+        point = x - normal * gap
+        if gap > 0.0 and gap <= apart + reach:
+            now = particles.p[first + q[0]] + particles.u[first + q[0]] - rigid.position[i]
+            go = wp.quat_rotate_inv(rigid.rotation[i], now) - x
+            gap, normal, point = on_its_way(elements, rows.part[r], x, go, gap, normal, point, apart, dt)
         n = wp.quat_rotate(turn, normal)
-        rows.point[r] = x - normal * gap
+        rows.point[r] = point
     elif kind == EDGE_RIGID:
         i = world * rigid.capacity + rows.slot[r]
         k_ridge = rows.part[r]

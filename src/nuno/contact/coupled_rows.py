@@ -24,12 +24,11 @@ from nuno.contact.coupled_particles import (
 )
 from nuno.solver.rigid_body import (
     RigidState,
-    apply_rigid_correction,
     inverse_mass_at,
-    point_before,
+    point_motion,
     point_of,
-    shift_body,
-    turned,
+    shift_whole,
+    turn_whole,
 )
 
 LEAVE_SPEED = wp.constant(0.5)
@@ -101,7 +100,7 @@ def row_slip(particles: Particles, rigid: RigidState, first: int, start: int, ro
     slip = blend(particles.u, first, rows.corners[r], rows.weights[r])
     if rows.slot[r] >= 0:
         i = start + rows.slot[r]
-        slip = slip - (point_of(rigid, i, rows.point[r]) - point_before(rigid, i, rows.point[r]))
+        slip = slip - point_motion(rigid, i, rows.point[r])
     return slip
 
 
@@ -200,7 +199,8 @@ def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, r
             fix(particles.body_moved, 2 * i, -impulse * rigid.weight[i])
             fix(particles.body_moved, 2 * i + 1, rigid.give[i] * wp.cross(arm, -impulse))
         else:
-            apply_rigid_correction(rigid, i, arm, -impulse)
+            shift_whole(rigid, i, rigid.weight[i] * -impulse)
+            turn_whole(rigid, i, rigid.give[i] * wp.cross(arm, -impulse))
 
 
 @wp.func
@@ -277,12 +277,12 @@ def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, ro
     """Take back a row's slip, with up to mu times what its push has come to; returns what was left to take [m]."""
     most = rows.friction[r] * rows.push[r]
     old = rows.drag[r]
+    if most <= 0.0 and wp.length_sq(old) == 0.0:
+        return float(0.0)
     slip = row_slip(particles, rigid, first, start, rows, r)
     n = rows.normal[r]
     slip = slip - n * wp.dot(slip, n)
     length = wp.length(slip)
-    if most <= 0.0 and wp.length_sq(old) == 0.0:
-        return float(0.0)
     if rows.slot[r] >= 0 and rows.corners[r][1] < 0:
         c = is_between(particles, first + rows.corners[r][0], n)
         if c >= 0:
@@ -327,11 +327,11 @@ def take_sums(particles: Particles, rigid: RigidState, first: int, start: int, t
     for k in range(thread, rigid.capacity, threads):
         i = start + k
         if particles.body_sharers[i] > 0:
-            shift_body(rigid, i, summed(particles.body_moved, 2 * i))
+            shift_whole(rigid, i, summed(particles.body_moved, 2 * i))
             turn = summed(particles.body_moved, 2 * i + 1)
             # passes over others' contacts must not round it
             if wp.length_sq(turn) > 0.0:
-                rigid.rotation[i] = turned(rigid.rotation[i], turn)
+                turn_whole(rigid, i, turn)
         particles.body_sharers[i] = particles.body_sharers[i] + particles.body_joining[i]
         particles.body_joining[i] = 0
 

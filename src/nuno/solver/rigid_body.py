@@ -23,7 +23,9 @@ class RigidState:
     rotation_before: wp.array(dtype=wp.quat)
     position_free: wp.array(dtype=wp.vec3)  # where the substep would end without contacts
     rotation_free: wp.array(dtype=wp.quat)
-    lost: wp.array(dtype=wp.vec3)  # what rounding took of the substep's corrections by coupled bodies [m]
+    lost: wp.array(dtype=wp.vec3)  # what rounding took of the substep's corrections by ties and joints [m]
+    left: wp.array(dtype=wp.vec3)  # what it left over of those by rows, for the next of them [m]
+    left_turn: wp.array(dtype=wp.vec3)  # and of their turns, as `turn_between` has them
     velocity: wp.array(dtype=wp.vec3)  # of the centre of mass [m/s]
     spin: wp.array(dtype=wp.vec3)  # angular velocity, world frame [rad/s]
     force: wp.array(dtype=wp.vec3)  # [N]
@@ -54,6 +56,17 @@ def turn_between(start: wp.quat, end: wp.quat):
     """The rotation from start to end, world frame, as twice the tangent of half its angle, along its axis."""
     d = end * wp.quat_inverse(start)
     scale = 2.0 / d[3]
+    return wp.vec3(scale * d[0], scale * d[1], scale * d[2])
+
+
+@wp.func
+def fine_turn(start: wp.quat, end: wp.quat):
+    """`turn_between` of rotations that are close, true to all its digits.
+
+    Floats hold the difference of two such quaternions exactly; of their product, 1 and a little, they round the little.
+    """
+    d = (end - start) * wp.quat_inverse(start)
+    scale = 2.0 / (1.0 + d[3])
     return wp.vec3(scale * d[0], scale * d[1], scale * d[2])
 
 
@@ -97,6 +110,31 @@ def turn_body(s: RigidState, i: int, turn: wp.vec3):
 
 
 @wp.func
+def shift_whole(s: RigidState, i: int, d: wp.vec3):
+    """Move a body by d; what is left over where the coordinate is rounded comes with the next such move.
+
+    For what reads off how far the body has come, with all that is left over; what reads off where it is, as joints do,
+    would ask for it again and again.
+    """
+    x = s.position[i]
+    d = d + s.left[i]
+    y = x + d
+    s.left[i] = d - (y - x)
+    s.position[i] = y
+
+
+@wp.func
+def turn_whole(s: RigidState, i: int, turn: wp.vec3):
+    """Turn a body as `shift_whole` moves it; one that corrections do not move keeps every bit."""
+    if s.weight[i] > 0.0:
+        q = s.rotation[i]
+        turn = turn + s.left_turn[i]
+        after = turned(q, turn)
+        s.left_turn[i] = turn - fine_turn(q, after)
+        s.rotation[i] = after
+
+
+@wp.func
 def apply_rigid_correction(s: RigidState, i: int, arm: wp.vec3, correction: wp.vec3):
     """Move a body by a positional impulse [kg m] at ``arm`` from its centre of mass (equations 6 to 9).
 
@@ -117,6 +155,20 @@ def point_of(s: RigidState, i: int, local: wp.vec3):
 def point_before(s: RigidState, i: int, local: wp.vec3):
     """Where a point of the body's frame was when the substep began."""
     return s.position_before[i] + wp.quat_rotate(s.rotation_before[i], local)
+
+
+@wp.func
+def point_motion(s: RigidState, i: int, local: wp.vec3):
+    """How far a point of the body's frame has come in the substep, with what rounding left over.
+
+    The difference of its two places has an error of their last digit, 2 to 4 nm at 5 cm. Friction would take that for a
+    slip in every substep, and what stands would creep by micrometres a second.
+    """
+    arm = wp.quat_rotate(s.rotation_before[i], local)
+    turn = fine_turn(s.rotation_before[i], s.rotation[i]) + s.left_turn[i]
+    swept = wp.cross(turn, arm)
+    swept = (swept + 0.5 * wp.cross(turn, swept)) / (1.0 + 0.25 * wp.dot(turn, turn))
+    return s.position[i] - s.position_before[i] + s.left[i] + swept
 
 
 @wp.func
@@ -172,6 +224,8 @@ def move_body(s: RigidState, i: int, role: int, dt: float):
     s.position_free[i] = x
     s.rotation_free[i] = q
     s.lost[i] = wp.vec3(0.0)
+    s.left[i] = wp.vec3(0.0)
+    s.left_turn[i] = wp.vec3(0.0)
 
 
 @wp.func
@@ -183,8 +237,8 @@ def read_velocity(s: RigidState, i: int, role: int, dt: float):
     the difference between an angle and twice the tangent of its half.
     """
     if role == 1 and s.inverse_mass[i] > 0.0:
-        s.velocity[i] = s.velocity[i] + (s.position[i] - s.position_free[i] + s.lost[i]) / dt
+        s.velocity[i] = s.velocity[i] + (s.position[i] - s.position_free[i] + (s.lost[i] + s.left[i])) / dt
         start = s.rotation_before[i]
         free = turn_between(start, s.rotation_free[i])
         now = turn_between(start, s.rotation[i])
-        s.spin[i] = s.spin[i] + (now - free) / dt
+        s.spin[i] = s.spin[i] + (now - free + s.left_turn[i]) / dt
