@@ -27,12 +27,10 @@ from nuno.solver.lanes import (  # noqa: F401
     least,
     most,
     mul,
-    over,
     root,
     rough,
     size_of,
     sub,
-    times,
 )
 from nuno.solver.vec3 import cross, dot, start_position, transposed_mul, vec3
 
@@ -93,9 +91,9 @@ def across_edge(
     zero = fill(x, 0.0)
     one = fill(x, 1.0)
     # outward normals f and g of the two faces that meet in the shape's edge, and the distances p and q from them
-    rho = root(times(x, x) + times(y, y) + fill(x, 1.0e-20))
-    fx = over(x, rho)
-    fy = over(y, rho)
+    rho = root(x * x + y * y + 1.0e-20)
+    fx = x / rho
+    fy = y / rho
     p = rho - a
     gy = zero
     gz = choose(z, one, -one)
@@ -106,27 +104,27 @@ def across_edge(
         qz = size_of(z) - c
         # along the edge the point is the deepest
         kx = choose(least(qy, qz) - qx, zero, one)
-        kz = choose(times(kx, qy - qz), zero, one)
+        kz = choose(kx * (qy - qz), zero, one)
         gy = choose(y, one, -one)
-        fx = times(choose(x, one, -one), kx)
-        fy = times(gy, one - kx)
-        gy = times(gy, one - kz)
-        gz = times(gz, kz)
+        fx = choose(x, one, -one) * kx
+        fy = gy * (one - kx)
+        gy = gy * (one - kz)
+        gz = gz * kz
         p = choose(kx, qx, qy)
         q = choose(kz, qz, qy)
     # across the edge, where the shape's edge is a point
-    lf = times(fx, way.x) + times(fy, way.y)
-    lg = times(gy, way.y) + times(gz, way.z)
+    lf = fx * way.x + fy * way.y
+    lg = gy * way.y + gz * way.z
     mf = size_of(lg)
     mg = size_of(lf)
     lean = choose(mf - mg, one, -one)
-    alike = times(lf, lg)
-    mf = times(mf, choose(alike, lean, one))
-    mg = times(mg, choose(alike, -lean, one))
-    size = root(times(lf, lf) + times(lg, lg) + fill(x, 1.0e-20))
-    mf = over(mf, size)
-    mg = over(mg, size)
-    deep = times(mf, p) + times(mg, q)
+    alike = lf * lg
+    mf = mf * choose(alike, lean, one)
+    mg = mg * choose(alike, -lean, one)
+    size = root(lf * lf + lg * lg + 1.0e-20)
+    mf = mf / size
+    mg = mg / size
+    deep = mf * p + mg * q
     on = least(least(ROUGH - gap, deep + deepest), least(mf, mg) + SLANT)
     on = least(on, size - SLANT * root(dot(way, way)))
     out = vec3(mf * fx, mf * fy + mg * gy, mg * gz)

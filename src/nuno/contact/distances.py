@@ -18,11 +18,9 @@ from nuno.solver.lanes import (  # noqa: F401
     least,
     most,
     mul,
-    over,
     root,
     size_of,
     sub,
-    times,
 )
 from nuno.solver.state import Shapes
 from nuno.solver.vec3 import dot, vec3
@@ -54,15 +52,15 @@ def distance_box(x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
     # inside and over a face, the nearest face gives distance and normal
     gap = most(qx, most(qy, qz))
     fz = choose(qz - most(qx, qy), one, zero)
-    fx = times(one - fz, choose(qx - qy, one, zero))
+    fx = (one - fz) * choose(qx - qy, one, zero)
     fy = one - fz - fx
     corner = ox + oy + oz - most(gap, zero)
     if not anywhere(corner):
-        return gap, times(sx, fx), times(sy, fy), times(sz, fz)
-    outside = root(times(ox, ox) + times(oy, oy) + times(oz, oz) + fill(x, 1.0e-24))
-    nx = times(sx, choose(corner, over(ox, outside), fx))
-    ny = times(sy, choose(corner, over(oy, outside), fy))
-    nz = times(sz, choose(corner, over(oz, outside), fz))
+        return gap, sx * fx, sy * fy, sz * fz
+    outside = root(ox * ox + oy * oy + oz * oz + 1.0e-24)
+    nx = sx * choose(corner, ox / outside, fx)
+    ny = sy * choose(corner, oy / outside, fy)
+    nz = sz * choose(corner, oz / outside, fz)
     return choose(corner, outside, gap), nx, ny, nz
 
 
@@ -71,25 +69,25 @@ def distance_cylinder(x: Any, y: Any, z: Any, r: Any, half: Any):
     """Signed distance and normal of a cylinder of radius r along z, between -half and half."""
     zero = fill(x, 0.0)
     one = fill(x, 1.0)
-    rho = root(times(x, x) + times(y, y) + fill(x, 1.0e-24))
+    rho = root(x * x + y * y + 1.0e-24)
     qr = rho - r
     qz = size_of(z) - half
     o = most(qr, zero)
     oz = most(qz, zero)
-    outside = root(times(o, o) + times(oz, oz) + fill(x, 1.0e-24))
+    outside = root(o * o + oz * oz + 1.0e-24)
     inside = most(qr, qz)
     side = choose(qr - qz, one, zero)
-    nr = choose(inside, over(o, outside), side)
-    nz = times(choose(z, one, -one), choose(inside, over(oz, outside), one - side))
-    return choose(inside, outside, inside), times(nr, over(x, rho)), times(nr, over(y, rho)), nz
+    nr = choose(inside, o / outside, side)
+    nz = choose(z, one, -one) * choose(inside, oz / outside, one - side)
+    return choose(inside, outside, inside), nr * (x / rho), nr * (y / rho), nz
 
 
 @wp.func
 def distance_round(x: Any, y: Any, z: Any, r: Any, half: Any):
     """Signed distance and normal of a capsule along z (half > 0) or a sphere (half = 0)."""
     d = z - most(least(z, half), -half)
-    length = root(times(x, x) + times(y, y) + times(d, d) + fill(x, 1.0e-24))
-    return length - r, over(x, length), over(y, length), over(d, length)
+    length = root(x * x + y * y + d * d + 1.0e-24)
+    return length - r, x / length, y / length, d / length
 
 
 @wp.func

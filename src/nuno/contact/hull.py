@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, anywhere, choose, fill, least, most, mul, over, size_of, sub, times  # noqa: F401
+from nuno.solver.lanes import add, anywhere, choose, div, fill, least, most, mul, size_of, sub  # noqa: F401
 from nuno.solver.state import Shapes
 
 FAR = wp.constant(1.0e6)
@@ -27,12 +27,12 @@ def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
     ends = shapes.faces[s]
     for k in range(ends[0], ends[1]):
         f = shapes.planes[k]
-        own = x * f[0] + y * f[1] + z * f[2] - fill(x, f[3])
+        own = x * f[0] + y * f[1] + z * f[2] - f[3]
         above = own - gap
         gap = choose(above, own, gap)
-        nx = choose(above, fill(x, f[0]), nx)
-        ny = choose(above, fill(x, f[1]), ny)
-        nz = choose(above, fill(x, f[2]), nz)
+        nx = choose(above, f[0], nx)
+        ny = choose(above, f[1], ny)
+        nz = choose(above, f[2], nz)
         if not anywhere(near - gap):
             break
     return gap, nx, ny, nz
@@ -56,16 +56,16 @@ def way_into_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, ux: Any, uy: A
     ends = shapes.faces[s]
     for k in range(ends[0], ends[1]):
         f = shapes.planes[k]
-        end = x * f[0] + y * f[1] + z * f[2] - fill(x, f[3])
+        end = x * f[0] + y * f[1] + z * f[2] - f[3]
         start = end - (ux * f[0] + uy * f[1] + uz * f[2])
-        part = over(size_of(start), most(size_of(end - start), fill(x, 1.0e-12)))
+        part = size_of(start) / most(size_of(end - start), 1.0e-12)
         outside = choose(end, one, zero)
         beside = most(beside, choose(start, outside, zero))
         earliest = least(earliest, choose(start, one, choose(end, part, one)))
-        later = choose(start, part - times(outside, part), zero) - latest
+        later = choose(start, part - outside * part, zero) - latest
         latest = choose(later, part, latest)
         gap = choose(later, end, gap)
-        nx = choose(later, fill(x, f[0]), nx)
-        ny = choose(later, fill(x, f[1]), ny)
-        nz = choose(later, fill(x, f[2]), nz)
+        nx = choose(later, f[0], nx)
+        ny = choose(later, f[1], ny)
+        nz = choose(later, f[2], nz)
     return gap, nx, ny, nz, choose(beside, zero, least(latest, earliest - latest))

@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, fill, mul, over, per_world, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, div, fill, mul, per_world, root, sub  # noqa: F401
 from nuno.solver.state import Shapes
 from nuno.solver.vec3 import mat3, vec3
 
@@ -65,20 +65,20 @@ def led_turn(like: Any, shapes: Shapes, slot: int, clock: int, group: int, world
     y = led_number(like, shapes, entry + 2, part, group, worlds)
     z = led_number(like, shapes, entry + 3, part, group, worlds)
     one = fill(w, 1.0)
-    scale = over(one, root(times(w, w) + times(x, x) + times(y, y) + times(z, z)))
-    w = times(w, scale)
-    x = times(x, scale)
-    y = times(y, scale)
-    z = times(z, scale)
-    r00 = one - (times(y, y) + times(z, z)) * 2.0
-    r01 = (times(x, y) - times(w, z)) * 2.0
-    r02 = (times(x, z) + times(w, y)) * 2.0
-    r10 = (times(x, y) + times(w, z)) * 2.0
-    r11 = one - (times(x, x) + times(z, z)) * 2.0
-    r12 = (times(y, z) - times(w, x)) * 2.0
-    r20 = (times(x, z) - times(w, y)) * 2.0
-    r21 = (times(y, z) + times(w, x)) * 2.0
-    r22 = one - (times(x, x) + times(y, y)) * 2.0
+    scale = one / root(w * w + x * x + y * y + z * z)
+    w = w * scale
+    x = x * scale
+    y = y * scale
+    z = z * scale
+    r00 = one - (y * y + z * z) * 2.0
+    r01 = (x * y - w * z) * 2.0
+    r02 = (x * z + w * y) * 2.0
+    r10 = (x * y + w * z) * 2.0
+    r11 = one - (x * x + z * z) * 2.0
+    r12 = (y * z - w * x) * 2.0
+    r20 = (x * z - w * y) * 2.0
+    r21 = (y * z + w * x) * 2.0
+    r22 = one - (x * x + y * y) * 2.0
     return r00, r01, r02, r10, r11, r12, r20, r21, r22
 
 

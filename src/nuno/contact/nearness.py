@@ -7,18 +7,17 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.solver.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
     add,
+    div,
     fill,
     lane,
     lane_int,
     least,
     most,
     mul,
-    over,
     root,
     sub,
-    times,
 )
 from nuno.solver.state import Topology
 from nuno.solver.vec3 import cross, dot, gather_position
@@ -171,7 +170,7 @@ def middles(t: Any, topo: Topology, thread: int, threads: int):
             dx = t.x[i] - mx
             dy = t.y[i] - my
             dz = t.z[i] - mz
-            r = most(r, times(dx, dx) + times(dy, dy) + times(dz, dz))
+            r = most(r, dx * dx + dy * dy + dz * dz)
         t.middle[4 * j] = mx
         t.middle[4 * j + 1] = my
         t.middle[4 * j + 2] = mz
@@ -185,7 +184,7 @@ def middles(t: Any, topo: Topology, thread: int, threads: int):
         t.middle[k] = t.x[e[0]] + dx
         t.middle[k + 1] = t.y[e[0]] + dy
         t.middle[k + 2] = t.z[e[0]] + dz
-        t.middle[k + 3] = root(times(dx, dx) + times(dy, dy) + times(dz, dz))
+        t.middle[k + 3] = root(dx * dx + dy * dy + dz * dz)
 
 
 @wp.func
@@ -221,16 +220,16 @@ def closest_on_edges(rx: Any, ry: Any, rz: Any, ax: Any, ay: Any, az: Any, bx: A
     zero = fill(rx, 0.0)
     one = fill(rx, 1.0)
     tiny = fill(rx, 1.0e-16)
-    aa = times(ax, ax) + times(ay, ay) + times(az, az) + tiny
-    bb = times(bx, bx) + times(by, by) + times(bz, bz) + tiny
-    ab = times(ax, bx) + times(ay, by) + times(az, bz)
-    ar = times(ax, rx) + times(ay, ry) + times(az, rz)
-    br = times(bx, rx) + times(by, ry) + times(bz, rz)
-    det = times(aa, bb) - times(ab, ab)
-    s = over(times(ab, br) - times(ar, bb), most(det, times(aa, bb) * 1.0e-6))
+    aa = ax * ax + ay * ay + az * az + tiny
+    bb = bx * bx + by * by + bz * bz + tiny
+    ab = ax * bx + ay * by + az * bz
+    ar = ax * rx + ay * ry + az * rz
+    br = bx * rx + by * ry + bz * rz
+    det = aa * bb - ab * ab
+    s = (ab * br - ar * bb) / most(det, aa * bb * 1.0e-6)
     s = least(most(s, zero), one)
-    q = least(most(over(times(ab, s) + br, bb), zero), one)
-    s = least(most(over(times(ab, q) - ar, aa), zero), one)
+    q = least(most((ab * s + br) / bb, zero), one)
+    s = least(most((ab * q - ar) / aa, zero), one)
     return s, q
 
 

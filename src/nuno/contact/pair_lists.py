@@ -27,7 +27,6 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     mul,
     root,
     sub,
-    times,
     within,
 )
 from nuno.solver.state import (
@@ -75,16 +74,15 @@ def swept(t: Any, run: Settings):
     Little, for a pair that comes in from farther away is found one substep later, unless it is so fast that it
     could be on the other side by then.
     """
-    like = t.x[0]
     thickness = t.scalars[THICKNESS]
-    go = root(t.notes[SPEED]) * (3.0 * run.dt) + fill(like, 10.0 * run.dt * run.dt)
-    return least(most(go - thickness, thickness * 0.1), fill(like, run.reach))
+    go = root(t.notes[SPEED]) * (3.0 * run.dt) + 10.0 * run.dt * run.dt
+    return least(most(go - thickness, thickness * 0.1), run.reach)
 
 
 @wp.func
 def pick_near(t: Any, far: Any, thread: int, threads: int):
     """Add those of the listed pairs that are nearer than ``far`` to those that may touch."""
-    far2 = times(far, far)
+    far2 = far * far
     none = fill(far, -1.0)
     for k in range(thread, wp.min(highest(t.pair_count[0]), t.vertex_triangle.shape[0] / 4), threads):
         a = t.vertex_triangle[4 * k]
@@ -111,7 +109,7 @@ def pick_touching(t: Any, run: Settings, fresh: int, thread: int, threads: int):
     like = t.x[0]
     near = swept(t, run)
     if fresh != 0 or anywhere(t.notes[PICKED] * 2.0 + near - t.notes[PICK_REACH]):
-        ahead = near + root(t.notes[SPEED]) * (2.0 * PICK_AHEAD * run.dt) + fill(like, 0.1 * run.reach)
+        ahead = near + root(t.notes[SPEED]) * (2.0 * PICK_AHEAD * run.dt) + 0.1 * run.reach
         barrier(threads)
         if thread == 0:
             t.touch_count[0] = t.touch_count[0] * 0

@@ -17,7 +17,6 @@ from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them fo
     mul,
     root,
     sub,
-    times,
 )
 from nuno.solver.state import (
     LISTINGS,
@@ -102,7 +101,7 @@ def most_closer(t: Any, topo: Topology, far: Any):
                 a = a + 6 * regions
                 b = b + 6 * regions
                 span = most(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
-                square = square + times(span, span)
+                square = square + span * span
             worst = most(worst, root(square) - most(gap - far, zero))
     return worst
 
@@ -110,7 +109,7 @@ def most_closer(t: Any, topo: Topology, far: Any):
 @wp.func
 def look_ahead(t: Any, run: Settings, near: Any):
     """How far beyond its thickness a pair is picked [m]: for a few substeps, at the speed of the moment."""
-    return near + root(t.notes[SPEED]) * (2.0 * PICK_AHEAD * run.dt) + fill(near, 0.1 * run.reach)
+    return near + root(t.notes[SPEED]) * (2.0 * PICK_AHEAD * run.dt) + 0.1 * run.reach
 
 
 @wp.func
@@ -123,11 +122,11 @@ def renew_lists(t: StateLanes, topo: Topology, run: Settings, thread: int, threa
     # the lanes beyond the last world only repeat it, and nobody looks at them: they go without contact
     worlds = wp.min(lanes, t.worlds - lanes * t.group)
     near = swept(t, run)
-    left = fill(near, run.margin) - near
+    left = run.margin - near
     if anywhere(t.notes[TRAVEL] * 2.0 - left):
         measure_moves(t, topo)
-        worst = most_closer(t, topo, t.scalars[THICKNESS] + fill(near, run.margin))
-        worst = most(worst, t.notes[TRAVEL] - fill(near, FORGET))
+        worst = most_closer(t, topo, t.scalars[THICKNESS] + run.margin)
+        worst = most(worst, t.notes[TRAVEL] - FORGET)
         t.notes[TRAVEL] = worst * 0.5
         late = worst - left
         for k in range(lanes):

@@ -12,23 +12,22 @@ import warp as wp
 
 from nuno.contact.nearness import closest_on_edges
 from nuno.contact.pair_lists import swept
-from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.solver.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
     add,
     anywhere,
     beside,
     choose,
+    div,
     fill,
     gather,
     highest,
     least,
     most,
     mul,
-    over,
     place,
     root,
     size_of,
     sub,
-    times,
     within,
 )
 from nuno.solver.state import DEEPEST, FRICTION, THICKNESS, Settings
@@ -62,9 +61,9 @@ def move(t: Any, n: int, i: int, dx: float, dy: float, dz: float, s: float, g: i
 
 @wp.func
 def move(t: Any, n: int, i: Any, dx: Any, dy: Any, dz: Any, s: Any, g: int, threads: int):
-    place(t.x, i, gather(t.x, i) + times(dx, s))
-    place(t.y, i, gather(t.y, i) + times(dy, s))
-    place(t.z, i, gather(t.z, i) + times(dz, s))
+    place(t.x, i, gather(t.x, i) + dx * s)
+    place(t.y, i, gather(t.y, i) + dy * s)
+    place(t.z, i, gather(t.z, i) + dz * s)
 
 
 @wp.func
@@ -102,8 +101,8 @@ def note_depth(notes: wp.array(dtype=Any), far: Any, threads: int):
 def span(x: Any, a: Any, b: Any, c: Any, d: Any, ka: Any, kb: Any, kc: Any, kd: Any):
     """The sum of k_i x_i, the k adding up to zero."""
     base = gather(x, a)
-    near = times(ka, beside(base, base)) + times(kb, beside(gather(x, b), base))
-    return near + times(kc, beside(gather(x, c), base)) + times(kd, beside(gather(x, d), base))
+    near = ka * beside(base, base) + kb * beside(gather(x, b), base)
+    return near + kc * beside(gather(x, c), base) + kd * beside(gather(x, d), base)
 
 
 @wp.func
@@ -133,38 +132,38 @@ def part(
     gx = span(t.x, a, b, c, d, ka, kb, kc, kd)
     gy = span(t.y, a, b, c, d, ka, kb, kc, kd)
     gz = span(t.z, a, b, c, d, ka, kb, kc, kd)
-    gap = times(gx, nx) + times(gy, ny) + times(gz, nz) - t.scalars[THICKNESS]
+    gap = gx * nx + gy * ny + gz * nz - t.scalars[THICKNESS]
     on = least(on, -gap)
     if anywhere(on):
         note_depth(t.notes, choose(on, -gap, zero), threads)
         ux = gx - pxs
         uy = gy - pys
         uz = gz - pzs
-        un = times(ux, nx) + times(uy, ny) + times(uz, nz)
+        un = ux * nx + uy * ny + uz * nz
         away = most(-un, zero) + leave
         if threads > 1:
             # what an earlier pass did counts
             away = most(leave - un, zero)
         push = least(-gap, away)
-        tx = ux - times(un, nx)
-        ty = uy - times(un, ny)
-        tz = uz - times(un, nz)
-        slip = root(times(tx, tx) + times(ty, ty) + times(tz, tz) + fill(ka, 1.0e-24))
-        hold = least(over(times(t.scalars[FRICTION], push), slip), fill(ka, 1.0))
-        dx = times(push, nx) - times(hold, tx)
-        dy = times(push, ny) - times(hold, ty)
-        dz = times(push, nz) - times(hold, tz)
-        wa = times(ka, gather(t.w, a))
-        wb = times(kb, gather(t.w, b))
-        wc = times(kc, gather(t.w, c))
-        wd = times(kd, gather(t.w, d))
-        weight = times(wa, ka) + times(wb, kb) + times(wc, kc) + times(wd, kd) + fill(ka, 1.0e-9)
-        s = choose(on, over(fill(ka, 1.0), weight), zero)
+        tx = ux - un * nx
+        ty = uy - un * ny
+        tz = uz - un * nz
+        slip = root(tx * tx + ty * ty + tz * tz + 1.0e-24)
+        hold = least(t.scalars[FRICTION] * push / slip, 1.0)
+        dx = push * nx - hold * tx
+        dy = push * ny - hold * ty
+        dz = push * nz - hold * tz
+        wa = ka * gather(t.w, a)
+        wb = kb * gather(t.w, b)
+        wc = kc * gather(t.w, c)
+        wd = kd * gather(t.w, d)
+        weight = wa * ka + wb * kb + wc * kc + wd * kd + 1.0e-9
+        s = choose(on, 1.0 / weight, zero)
         g = heed(t, gap)
-        move(t, n, a, dx, dy, dz, times(s, wa), g, threads)
-        move(t, n, b, dx, dy, dz, times(s, wb), g, threads)
-        move(t, n, c, dx, dy, dz, times(s, wc), g, threads)
-        move(t, n, d, dx, dy, dz, times(s, wd), g, threads)
+        move(t, n, a, dx, dy, dz, s * wa, g, threads)
+        move(t, n, b, dx, dy, dz, s * wb, g, threads)
+        move(t, n, c, dx, dy, dz, s * wc, g, threads)
+        move(t, n, d, dx, dy, dz, s * wd, g, threads)
 
 
 @wp.func
@@ -193,31 +192,21 @@ def touch_vertex_triangle(t: Any, n: int, run: Settings, thread: int, threads: i
         fx = gather(t.px, d) - bx
         fy = gather(t.py, d) - by
         fz = gather(t.pz, d) - bz
-        nx = times(ey, fz) - times(ez, fy)
-        ny = times(ez, fx) - times(ex, fz)
-        nz = times(ex, fy) - times(ey, fx)
-        nn = times(nx, nx) + times(ny, ny) + times(nz, nz) + fill(like, 1.0e-20)
+        nx = ey * fz - ez * fy
+        ny = ez * fx - ex * fz
+        nz = ex * fy - ey * fx
+        nn = nx * nx + ny * ny + nz * nz + 1.0e-20
         length = root(nn)
-        h = over(times(rx, nx) + times(ry, ny) + times(rz, nz), length)
-        on = times(within(like, k, t.touch_count[0]), reach - size_of(h))
+        h = (rx * nx + ry * ny + rz * nz) / length
+        on = within(like, k, t.touch_count[0]) * (reach - size_of(h))
         if anywhere(on):
-            v = over(
-                times(times(ry, fz) - times(rz, fy), nx)
-                + times(times(rz, fx) - times(rx, fz), ny)
-                + times(times(rx, fy) - times(ry, fx), nz),
-                nn,
-            )
-            w = over(
-                times(times(ey, rz) - times(ez, ry), nx)
-                + times(times(ez, rx) - times(ex, rz), ny)
-                + times(times(ex, ry) - times(ey, rx), nz),
-                nn,
-            )
+            v = ((ry * fz - rz * fy) * nx + (rz * fx - rx * fz) * ny + (rx * fy - ry * fx) * nz) / nn
+            w = ((ey * rz - ez * ry) * nx + (ez * rx - ex * rz) * ny + (ex * ry - ey * rx) * nz) / nn
             u = one - v - w
             # edges of the triangle belong to the edge contacts; a little overlap does no harm
-            on = least(on, least(u, least(v, w)) + fill(like, 1.0e-3))
-            s = over(choose(h, one, -one), length)
-            part(t, n, a, b, c, d, one, -u, -v, -w, times(nx, s), times(ny, s), times(nz, s), on, leave, threads)
+            on = least(on, least(u, least(v, w)) + 1.0e-3)
+            s = choose(h, one, -one) / length
+            part(t, n, a, b, c, d, one, -u, -v, -w, nx * s, ny * s, nz * s, on, leave, threads)
 
 
 @wp.func
@@ -226,7 +215,7 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
     like = fill(t.x[0], 0.0)
     count = wp.min(highest(t.touch_count[1]), t.touch_edge.shape[0] / 4)
     reach = t.scalars[THICKNESS] + swept(t, run)
-    reach2 = times(reach, reach)
+    reach2 = reach * reach
     leave = fill(like, LEAVE_SPEED * run.dt)
     one = fill(like, 1.0)
     for k in range(thread, count, threads):
@@ -250,13 +239,13 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
         ry = y0 - y1
         rz = z0 - z1
         s, q = closest_on_edges(rx, ry, rz, ex, ey, ez, fx, fy, fz)
-        cx = rx + times(s, ex) - times(q, fx)
-        cy = ry + times(s, ey) - times(q, fy)
-        cz = rz + times(s, ez) - times(q, fz)
-        cc = times(cx, cx) + times(cy, cy) + times(cz, cz)
-        on = times(within(like, k, t.touch_count[1]), reach2 - cc)
+        cx = rx + s * ex - q * fx
+        cy = ry + s * ey - q * fy
+        cz = rz + s * ez - q * fz
+        cc = cx * cx + cy * cy + cz * cz
+        on = within(like, k, t.touch_count[1]) * (reach2 - cc)
         if anywhere(on):
-            inv = over(one, root(cc + fill(like, 1.0e-20)))
+            inv = one / root(cc + 1.0e-20)
             part(
                 t,
                 n,
@@ -268,9 +257,9 @@ def touch_edge_edge(t: Any, n: int, run: Settings, thread: int, threads: int):
                 s,
                 q - one,
                 -q,
-                times(cx, inv),
-                times(cy, inv),
-                times(cz, inv),
+                cx * inv,
+                cy * inv,
+                cz * inv,
                 on,
                 leave,
                 threads,
@@ -303,4 +292,4 @@ def take_moves(t: Any, n: int, thread: int, threads: int):
 @wp.func
 def apply_move(x: Any, i: int, d: float):
     """Add a float to element i."""
-    x[i] = x[i] + fill(x[i], d)
+    x[i] = x[i] + d

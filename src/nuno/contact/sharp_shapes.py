@@ -14,20 +14,7 @@ import warp as wp
 from nuno.contact.distances import BOX, CYLINDER, FAR, PLANE
 from nuno.contact.led import led_pose
 from nuno.contact.shapes import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
-from nuno.solver.lanes import (  # noqa: F401
-    add,
-    anywhere,
-    barrier,
-    fill,
-    largest,
-    least,
-    most,
-    mul,
-    root,
-    size_of,
-    sub,
-    times,
-)
+from nuno.solver.lanes import add, anywhere, barrier, largest, least, most, mul, root, size_of, sub  # noqa: F401
 from nuno.solver.state import CLOCK, THICKNESS, Settings, Shapes
 from nuno.solver.vec3 import position, transposed_mul, vec3
 
@@ -82,21 +69,21 @@ def sharp_features(
         along = most(most(least(qx, qy), least(qy, qz)), least(qx, qz))
         point = least(least(qx, qy), qz)
     else:
-        slim = fill(x, broad) - sa
-        rho = root(times(x, x) + times(y, y))
-        wide = root(times(h.x, h.x) + times(h.y, h.y))
+        slim = broad - sa
+        rho = root(x * x + y * y)
+        wide = root(h.x * h.x + h.y * h.y)
         if kind == CYLINDER:
             apart = most(rho - wide - sa, z - h.z - sb)
             rim = least(rho + wide - sa, z + h.z - sb)
             along = most(rim, slim)
             point = least(rim, slim)
         else:
-            beyond = most(z - sb, fill(x, 0.0))
-            size = root(times(wide, wide) + times(h.z, h.z))
-            apart = root(times(rho, rho) + times(beyond, beyond)) - size - sa
+            beyond = most(z - sb, 0.0)
+            size = root(wide * wide + h.z * h.z)
+            apart = root(rho * rho + beyond * beyond) - size - sa
             # the outermost point is on the half ball of one end, which may stand through by half a cell
-            stands = most(sa, fill(x, broad * (0.5 / ROUND)) - sa)
-            point = least(slim, size + stands - root(times(rho, rho) + times(z - sb, z - sb)))
+            stands = most(sa, broad * (0.5 / ROUND) - sa)
+            point = least(slim, size + stands - root(rho * rho + (z - sb) * (z - sb)))
             along = slim
     return least(along, -apart), least(point, -apart)
 
@@ -122,11 +109,11 @@ def mark_sharp(t: Any, topo: Any, run: Settings, shapes: Shapes, thread: int, th
     """
     like = t.x[0]
     clock = int(largest(t.notes[CLOCK]))
-    grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + fill(like, QUICK * run.dt)
+    grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + QUICK * run.dt
     # no point of an edge or triangle is farther from the nearest of its vertices than 0.6 of its longest edge
-    around = grow + fill(like, 0.6 * topo.longest)
+    around = grow + 0.6 * topo.longest
     # and within a substep
-    soon = t.scalars[THICKNESS] * 0.5 + fill(like, QUICK * run.dt + 0.6 * topo.longest)
+    soon = t.scalars[THICKNESS] * 0.5 + (QUICK * run.dt + 0.6 * topo.longest)
     broad = ROUND * run.cell
     found = int(0)
     for near in range(t.near[0]):

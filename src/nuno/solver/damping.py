@@ -17,7 +17,7 @@ from nuno.solver.lanes import add, div, lane, mul, product, sub  # noqa: F401
 from nuno.solver.state import DAMPING, Settings
 from nuno.solver.team import wait_for
 from nuno.solver.vec3 import put_velocity, velocity
-from nuno.solver.vector import at, corner, scaled, spread
+from nuno.solver.vector import at, corner, spread
 
 
 @wp.func
@@ -94,12 +94,12 @@ def softness(soft: float, scale: float):
 
 @wp.func
 def softness(soft: lane, scale: float):
-    return scaled(soft, scale)
+    return soft * scale
 
 
 @wp.func
 def softness(soft: lane, scale: lane):
-    return scaled(soft, scale)
+    return soft * scale
 
 
 @wp.func

@@ -19,7 +19,6 @@ from nuno.solver.lanes import (
     lane,
     lane_int,
     lessened,
-    minus,
     place,
     rough,
     sub,
@@ -104,15 +103,6 @@ def add(a: fine_lane, b: float) -> fine_lane: ...
 
 
 @wp.func
-def minus(a: fine, b: float):
-    return float(wp.sub(a, fine(b)))
-
-
-@wp.func_native(_floats(f"{_A} - {_B}"))
-def minus(a: fine_lane, b: lane) -> lane: ...
-
-
-@wp.func
 def rough(a: fine):
     return float(a)
 
@@ -133,12 +123,12 @@ def beside(a: fine_lane, base: fine_lane):
 
 @wp.func
 def beside(a: float, base: fine):
-    return -minus(base, a)
+    return -rough(base - a)
 
 
 @wp.func
 def beside(a: lane, base: fine_lane):
-    return -minus(base, a)
+    return -rough(base - a)
 
 
 @wp.func

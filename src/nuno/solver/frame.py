@@ -21,7 +21,7 @@ from nuno.solver.damping import damp_bends
 from nuno.solver.fine_yarns import PAIR_EDGES, WARP_EDGES, stretch_fine_yarns
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
-from nuno.solver.lanes import add, barrier, fill, mul, over, sub  # noqa: F401
+from nuno.solver.lanes import add, barrier, div, fill, mul, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle, stretch_yarn
 from nuno.solver.sheet_strips import bend_in_strips, fits_strips
 from nuno.solver.state import (
@@ -41,7 +41,7 @@ from nuno.solver.state import (
     view,
 )
 from nuno.solver.sweeps import note_lengths, shear_cells_again, strain_triangles_again
-from nuno.solver.vector import at, corner, scaled
+from nuno.solver.vector import at, corner
 from nuno.solver.warps import WARP, in_warps
 from nuno.solver.yarns import YARN_EDGES, stretch_yarns_together
 
@@ -54,7 +54,7 @@ def bend_lines(t: Any, table: Any, run: Settings, first: int, last: int, thread:
     """The line bends of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
-        alpha = scaled(at(t.bend_soft, table.line_soft[k]), table.line_scale[k] * rate)
+        alpha = at(t.bend_soft, table.line_soft[k]) * (table.line_scale[k] * rate)
         a = corner(table.line, k, 0, 3)
         b = corner(table.line, k, 1, 3)
         c = corner(table.line, k, 2, 3)
@@ -66,7 +66,7 @@ def bend_twists(t: Any, table: Any, run: Settings, first: int, last: int, thread
     """The cell twists of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
-        alpha = scaled(at(t.bend_soft, table.twist_soft[k]), table.twist_scale[k] * rate)
+        alpha = at(t.bend_soft, table.twist_soft[k]) * (table.twist_scale[k] * rate)
         a = corner(table.twist, k, 0, 4)
         b = corner(table.twist, k, 1, 4)
         c = corner(table.twist, k, 2, 4)
@@ -79,7 +79,7 @@ def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, threa
     """The triangles' curvatures of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
-        alpha = scaled(at(t.bend_soft, table.patch_soft[k]), rate)
+        alpha = at(t.bend_soft, table.patch_soft[k]) * rate
         bend_patch(t, table, k, alpha)
 
 
@@ -89,7 +89,7 @@ def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, thread
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         scale = table.cell_scale[k]
-        alpha = scaled(at(t.shear_soft, table.cell_soft[k]), scale * 4.0 * rate)
+        alpha = at(t.shear_soft, table.cell_soft[k]) * (scale * 4.0 * rate)
         a = corner(table.cell, k, 0, 4)
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)
@@ -103,19 +103,19 @@ def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, t
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         area = table.triangle_area[k]
-        scale = over(fill(area, rate), area)
+        scale = rate / area
         a = corner(table.triangle, k, 0, 3)
         b = corner(table.triangle, k, 1, 3)
         c = corner(table.triangle, k, 2, 3)
-        alpha = scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale)
+        alpha = at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)) * scale
         zero = fill(alpha, 0.0)
         shear_triangle(t, table, k, a, b, c, alpha, zero, 0.0, 0.0)
-        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
+        alpha = at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)) * scale
         ka = corner(table.triangle_v, k, 0, 3)
         kb = corner(table.triangle_v, k, 1, 3)
         kc = corner(table.triangle_v, k, 2, 3)
         stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
-        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
+        alpha = at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)) * scale
         ka = corner(table.triangle_u, k, 0, 3)
         kb = corner(table.triangle_u, k, 1, 3)
         kc = corner(table.triangle_u, k, 2, 3)

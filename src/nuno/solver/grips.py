@@ -4,21 +4,20 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.solver.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
     add,
     beside,
     choose,
     clipped,
+    div,
     fill,
     gather,
     known,
     largest,
-    minus,
     mul,
-    over,
     place,
+    rough,
     sub,
-    times,
 )
 from nuno.solver.state import CLOCK, LOADS, Settings
 
@@ -72,8 +71,8 @@ def hold_vertices(t: Any, run: Settings, thread: int, threads: int):
 def off_path(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, path: Any):
     """How far the mean of three coordinates with the weights k is from the path."""
     base = gather(x, a)
-    near = times(ka, beside(base, base)) + times(kb, beside(gather(x, b), base))
-    return near + times(kc, beside(gather(x, c), base)) - beside(path, base)
+    near = ka * beside(base, base) + kb * beside(gather(x, b), base)
+    return near + kc * beside(gather(x, c), base) - beside(path, base)
 
 
 @wp.func
@@ -93,15 +92,15 @@ def pull_points(t: Any, run: Settings, thread: int, threads: int):
                 dx = off_path(t.x, a, b, c, ka, kb, kc, x)
                 dy = off_path(t.y, a, b, c, ka, kb, kc, y)
                 dz = off_path(t.z, a, b, c, ka, kb, kc, z)
-                wa = times(ka, gather(t.w, a))
-                wb = times(kb, gather(t.w, b))
-                wc = times(kc, gather(t.w, c))
-                weight = times(wa, ka) + times(wb, kb) + times(wc, kc)
-                s = over(-on, weight + fill(x, run.grip_soft[g] + 1.0e-9))
+                wa = ka * gather(t.w, a)
+                wb = kb * gather(t.w, b)
+                wc = kc * gather(t.w, c)
+                weight = wa * ka + wb * kb + wc * kc
+                s = -on / (weight + (run.grip_soft[g] + 1.0e-9))
                 add_load(t, g, dx, dy, dz, -s)
-                nudge(t, a, dx, dy, dz, times(s, wa))
-                nudge(t, b, dx, dy, dz, times(s, wb))
-                nudge(t, c, dx, dy, dz, times(s, wc))
+                nudge(t, a, dx, dy, dz, s * wa)
+                nudge(t, b, dx, dy, dz, s * wb)
+                nudge(t, c, dx, dy, dz, s * wc)
 
 
 @wp.func
@@ -113,8 +112,8 @@ def read_loads(t: Any, run: Settings, thread: int, threads: int):
             i = clipped(t.grip_corner[3 * g])
             on = known(x, t.grip_corner[3 * g])
             ghost = t.grip_ghost[g]
-            share = over(on, ghost + fill(x, 1.0e-30))
-            add_load(t, g, minus(gather(t.x, i), x), minus(gather(t.y, i), y), minus(gather(t.z, i), z), share)
+            share = on / (ghost + 1.0e-30)
+            add_load(t, g, rough(gather(t.x, i) - x), rough(gather(t.y, i) - y), rough(gather(t.z, i) - z), share)
             place(t.x, i, choose(on, x, gather(t.x, i)))
             place(t.y, i, choose(on, y, gather(t.y, i)))
             place(t.z, i, choose(on, z, gather(t.z, i)))
@@ -125,10 +124,10 @@ def read_loads(t: Any, run: Settings, thread: int, threads: int):
 def add_load(t: Any, g: int, dx: Any, dy: Any, dz: Any, s: Any):
     """Add s (dx, dy, dz) to a grip's load, one substep's."""
     k = LOADS * g
-    t.grip_load[k] = t.grip_load[k] + times(dx, s)
-    t.grip_load[k + 1] = t.grip_load[k + 1] + times(dy, s)
-    t.grip_load[k + 2] = t.grip_load[k + 2] + times(dz, s)
-    t.grip_load[k + 3] = t.grip_load[k + 3] + fill(dx, 1.0)
+    t.grip_load[k] = t.grip_load[k] + dx * s
+    t.grip_load[k + 1] = t.grip_load[k + 1] + dy * s
+    t.grip_load[k + 2] = t.grip_load[k + 2] + dz * s
+    t.grip_load[k + 3] = t.grip_load[k + 3] + 1.0
 
 
 @wp.func
@@ -141,6 +140,6 @@ def forget_loads(t: Any, run: Settings, thread: int, threads: int):
 @wp.func
 def nudge(t: Any, i: Any, dx: Any, dy: Any, dz: Any, s: Any):
     """Move particle i (its own in each lane) by s (dx, dy, dz)."""
-    place(t.x, i, gather(t.x, i) + times(dx, s))
-    place(t.y, i, gather(t.y, i) + times(dy, s))
-    place(t.z, i, gather(t.z, i) + times(dz, s))
+    place(t.x, i, gather(t.x, i) + dx * s)
+    place(t.y, i, gather(t.y, i) + dy * s)
+    place(t.z, i, gather(t.z, i) + dz * s)

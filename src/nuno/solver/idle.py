@@ -9,16 +9,16 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, anywhere, fill, mul, sub, times  # noqa: F401
+from nuno.solver.lanes import add, anywhere, fill, mul, sub  # noqa: F401
 from nuno.solver.vector import at, put
 
 
 @wp.func
 def move_idly(t: Any, i: Any, x: Any, y: Any, z: Any, s: Any):
     """Note that particle i is moved by s (x, y, z) without speed."""
-    put(t.idle_x, i, at(t.idle_x, i) + times(s, x))
-    put(t.idle_y, i, at(t.idle_y, i) + times(s, y))
-    put(t.idle_z, i, at(t.idle_z, i) + times(s, z))
+    put(t.idle_x, i, at(t.idle_x, i) + s * x)
+    put(t.idle_y, i, at(t.idle_y, i) + s * y)
+    put(t.idle_z, i, at(t.idle_z, i) + s * z)
 
 
 @wp.func
@@ -36,7 +36,7 @@ def forget_idle(t: Any, n: int, thread: int, threads: int):
         x = at(t.idle_x, i)
         y = at(t.idle_y, i)
         z = at(t.idle_z, i)
-        if anywhere(times(x, x) + times(y, y) + times(z, z)):
+        if anywhere(x * x + y * y + z * z):
             put(t.px, i, at(t.px, i) + x)
             put(t.py, i, at(t.py, i) + y)
             put(t.pz, i, at(t.pz, i) + z)

@@ -85,7 +85,7 @@ def div(a: lane, b: float) -> lane: ...
 def div(a: float, b: lane) -> lane: ...
 
 
-# The next three tell coordinates from other numbers, for those may be doubles: see `nuno.solver.fine`.
+# The next two tell coordinates from other numbers, for those may be doubles: see `nuno.solver.fine`.
 @wp.func
 def rough(a: float):
     """A coordinate as a float."""
@@ -98,16 +98,6 @@ def rough(a: lane):
 
 
 @wp.func
-def minus(a: float, b: float):
-    """How much a coordinate exceeds a number."""
-    return a - b
-
-
-@wp.func_native(_simd("A - B", "a", "b"))
-def minus(a: lane, b: lane) -> lane: ...
-
-
-@wp.func
 def beside(a: float, base: float):
     """A coordinate in a sum whose weights add up to zero; where it is a double, what it exceeds ``base`` by."""
     return a
@@ -116,26 +106,6 @@ def beside(a: float, base: float):
 @wp.func
 def beside(a: lane, base: lane):
     return a
-
-
-@wp.func
-def times(a: float, b: float):
-    """The elementwise product."""
-    return a * b
-
-
-@wp.func_native(_simd("A * B", "a", "b"))
-def times(a: lane, b: lane) -> lane: ...
-
-
-@wp.func
-def over(a: float, b: float):
-    """The elementwise quotient."""
-    return a / b
-
-
-@wp.func_native(_simd("A / B", "a", "b"))
-def over(a: lane, b: lane) -> lane: ...
 
 
 @wp.func_native("""

@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from nuno.scene.soft import OWN_SHARE
-from nuno.solver.lanes import add, choose, fill, fused, lessened, mul, sub, times  # noqa: F401
+from nuno.solver.lanes import add, choose, fused, lessened, mul, sub  # noqa: F401
 from nuno.solver.tetrahedron import element_reply
 from nuno.solver.vector import at, put
 
@@ -98,13 +98,13 @@ def solve_mean(
         (wc * NEAR) * NEAR + (wg * FAR) * FAR, (wd * NEAR) * NEAR + (wh * FAR) * FAR,
         m11, m22, m33, m12, m13, m23, inverse, mu, bulk,
     )  # fmt: skip
-    sigma = choose(bad, fill(sigma, 0.0), sigma)
+    sigma = choose(bad, 0.0, sigma)
     near = sigma * NEAR
     far = sigma * FAR
-    ka = times(far, we)
-    kb = times(far, wf)
-    kc = times(far, wg)
-    kd = times(far, wh)
+    ka = far * we
+    kb = far * wf
+    kc = far * wg
+    kd = far * wh
     put(t.x, e, lessened(ka, rax, ex))
     put(t.y, e, lessened(ka, ray, ey))
     put(t.z, e, lessened(ka, raz, ez))
@@ -117,10 +117,10 @@ def solve_mean(
     put(t.x, h, fused(kd, rdx, hx))
     put(t.y, h, fused(kd, rdy, hy))
     put(t.z, h, fused(kd, rdz, hz))
-    ka = times(near, wa)
-    kb = times(near, wb)
-    kc = times(near, wc)
-    kd = times(near, wd)
+    ka = near * wa
+    kb = near * wb
+    kc = near * wc
+    kd = near * wd
     ax = fused(ka, rax, ax)
     ay = fused(ka, ray, ay)
     az = fused(ka, raz, az)

@@ -14,7 +14,7 @@ from nuno.solver.frame import meet_sharp, near_shapes, near_sharp
 from nuno.solver.grips import forget_loads, hold_vertices, pull_points, read_loads
 from nuno.solver.idle import forget_idle
 from nuno.solver.integrate import predict, read_velocities, reset_speed, round_places, tick
-from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, over, sub, times  # noqa: F401
+from nuno.solver.lanes import LANES, add, barrier, fill, largest, mul, sub  # noqa: F401
 from nuno.solver.soft_ahead import elastic_ahead, viscous_ahead
 from nuno.solver.soft_stars import damp_star, shape_of, solve_star, stiffness
 from nuno.solver.soft_state import (
@@ -67,7 +67,7 @@ def solve_stars(t: Any, table: Any, run: Settings, first: int, last: int, thread
 def damp_stars(t: Any, table: Any, run: Settings, first: int, last: int, thread: int, threads: int):
     """The viscosity of the tetrahedra of one colour's stars, over ``run.damped`` substeps."""
     time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
-    eta = times(t.mu[0], time)
+    eta = t.mu[0] * time
     for k in range(first + thread, last, threads):
         a = corner(table.inner, k, 0, 4)
         b = corner(table.inner, k, 1, 4)

@@ -9,11 +9,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, anywhere, choose, fill, lane, mul, size_of, sub, times  # noqa: F401
+from nuno.solver.lanes import add, anywhere, choose, fill, lane, mul, size_of, sub  # noqa: F401
 from nuno.solver.mean_strain import MEAN, OWN, solve_mean
 from nuno.solver.soft_state import STAR, Tetrahedra, WideTetrahedra
 from nuno.solver.tetrahedron import COLUMNS, loose_bulk, solve_tetrahedron
-from nuno.solver.vector import at, put, scaled
+from nuno.solver.vector import at, put
 from nuno.solver.viscosity import damp_tetrahedron
 
 
@@ -92,7 +92,7 @@ def own_viscosity(t: Any, table: Tetrahedra, k: int, slot: int, time: Any, eta: 
     """The modulus mu of one element times ``time``: that of all, or its own."""
     if table.differ == 0:
         return eta
-    return times(at(t.mu, table.soft[k * STAR + slot]), time)
+    return at(t.mu, table.soft[k * STAR + slot]) * time
 
 
 @wp.func
@@ -107,7 +107,7 @@ def elastic_numbers(t: Any, table: Any, k: int, row: int, slot: int, square: flo
     """What `solve_tetrahedron` asks of an element."""
     own, firm = own_stiffness(t, table, k, slot, square, mu, bulk)
     m11, m22, m33, m12, m13, m23, inverse, filled = numbers_of(table.number, row + slot)
-    return m11, m22, m33, m12, m13, m23, inverse, scaled(own, filled), scaled(firm, filled)
+    return m11, m22, m33, m12, m13, m23, inverse, own * filled, firm * filled
 
 
 @wp.func
@@ -115,7 +115,7 @@ def viscous_numbers(t: Any, table: Any, k: int, row: int, slot: int, time: Any, 
     """What `damp_tetrahedron` asks of an element."""
     own = own_viscosity(t, table, k, slot, time, eta)
     m11, m22, m33, m12, m13, m23, inverse, filled = numbers_of(table.number, row + slot)
-    return m11, m22, m33, m12, m13, m23, inverse, scaled(own, size_of(filled))
+    return m11, m22, m33, m12, m13, m23, inverse, own * size_of(filled)
 
 
 @wp.func
@@ -198,20 +198,20 @@ def solve_star(
     dx, dy, dz, wd = place_of(t, d)
     m11, m22, m33, m12, m13, m23, inverse, mu, bulk = elastic_numbers(t, table, k, row, 0, square, stiff, bulky)
     own = fill(mu, 1.0)
-    if anywhere(fill(mu, 0.0) - mu):  # a negative filled fraction: the voxel's mean has the rest of the stiffness
-        part = choose(mu, fill(mu, 0.0), fill(mu, MEAN))
-        own = choose(mu, own, fill(mu, OWN))
+    if anywhere(0.0 - mu):  # a negative filled fraction: the voxel's mean has the rest of the stiffness
+        part = choose(mu, 0.0, MEAN)
+        own = choose(mu, own, OWN)
         mu = size_of(mu)
         bulk = size_of(bulk)
         ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz = solve_mean(
             t, e, f, g, h, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, wa, wb, wc, wd,
-            m11, m22, m33, m12, m13, m23, inverse, times(part, mu), times(part, bulk),
+            m11, m22, m33, m12, m13, m23, inverse, part * mu, part * bulk,
         )  # fmt: skip
     n11, n22, n33, n12, n13, n23, there, nu, firm = elastic_numbers(t, table, k, row, 1, square, stiff, bulky)
     ex, ey, ez, we = place_of(t, e)
     ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz = solve_tetrahedron(
         t, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, wa, wb, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, times(own, mu), times(own, bulk), limit,
+        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
     )  # fmt: skip
     if count < 1:
         put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
@@ -220,7 +220,7 @@ def solve_star(
     fx, fy, fz, wf = place_of(t, f)
     ex, ey, ez, bx, by, bz, dx, dy, dz, cx, cy, cz = solve_tetrahedron(
         t, e, b, d, c, ex, ey, ez, bx, by, bz, dx, dy, dz, cx, cy, cz, we, wb, wd, wc,
-        n11, n22, n33, n12, n13, n23, there, times(own, nu), times(own, firm), limit,
+        n11, n22, n33, n12, n13, n23, there, own * nu, own * firm, limit,
     )  # fmt: skip
     put_place(t, e, ex, ey, ez)
     if count < 2:
@@ -230,7 +230,7 @@ def solve_star(
     gx, gy, gz, wg = place_of(t, g)
     fx, fy, fz, ax, ay, az, cx, cy, cz, dx, dy, dz = solve_tetrahedron(
         t, f, a, c, d, fx, fy, fz, ax, ay, az, cx, cy, cz, dx, dy, dz, wf, wa, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, times(own, mu), times(own, bulk), limit,
+        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
     )  # fmt: skip
     put_place(t, f, fx, fy, fz)
     if count < 3:
@@ -240,7 +240,7 @@ def solve_star(
     hx, hy, hz, wh = place_of(t, h)
     gx, gy, gz, dx, dy, dz, bx, by, bz, ax, ay, az = solve_tetrahedron(
         t, g, d, b, a, gx, gy, gz, dx, dy, dz, bx, by, bz, ax, ay, az, wg, wd, wb, wa,
-        n11, n22, n33, n12, n13, n23, there, times(own, nu), times(own, firm), limit,
+        n11, n22, n33, n12, n13, n23, there, own * nu, own * firm, limit,
     )  # fmt: skip
     put_place(t, g, gx, gy, gz)
     if count < 4:
@@ -248,7 +248,7 @@ def solve_star(
         return
     hx, hy, hz, cx, cy, cz, ax, ay, az, bx, by, bz = solve_tetrahedron(
         t, h, c, a, b, hx, hy, hz, cx, cy, cz, ax, ay, az, bx, by, bz, wh, wc, wa, wb,
-        m11, m22, m33, m12, m13, m23, inverse, times(own, mu), times(own, bulk), limit,
+        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
     )  # fmt: skip
     put_place(t, h, hx, hy, hz)
     put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)

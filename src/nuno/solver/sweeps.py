@@ -10,10 +10,10 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, fill, mul, over, root, sub, times  # noqa: F401
+from nuno.solver.lanes import add, div, fill, mul, root, sub  # noqa: F401
 from nuno.solver.membrane import shear_cell, shear_triangle, stretch_triangle
 from nuno.solver.state import Settings
-from nuno.solver.vector import at, corner, put, scaled
+from nuno.solver.vector import at, corner, put
 
 
 @wp.func
@@ -33,7 +33,7 @@ def shear_cells_again(
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         scale = table.cell_scale[k]
-        alpha = scaled(at(t.shear_soft, table.cell_soft[k]), scale * 4.0 * rate)
+        alpha = at(t.shear_soft, table.cell_soft[k]) * (scale * 4.0 * rate)
         a = corner(table.cell, k, 0, 4)
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)
@@ -50,20 +50,20 @@ def strain_triangles_again(
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + thread, last, threads):
         area = table.triangle_area[k]
-        scale = over(fill(area, rate), area)
+        scale = rate / area
         a = corner(table.triangle, k, 0, 3)
         b = corner(table.triangle, k, 1, 3)
         c = corner(table.triangle, k, 2, 3)
-        alpha = scaled(at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)), scale)
+        alpha = at(t.shear_soft, corner(table.triangle_soft, k, 2, 3)) * scale
         past = past_of(sums, 3 * k, sweep, alpha)
         put(sums, 3 * k, past + shear_triangle(t, table, k, a, b, c, alpha, past, run.rise, run.onset))
-        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)), scale)
+        alpha = at(t.stretch_soft, corner(table.triangle_soft, k, 1, 3)) * scale
         ka = corner(table.triangle_v, k, 0, 3)
         kb = corner(table.triangle_v, k, 1, 3)
         kc = corner(table.triangle_v, k, 2, 3)
         past = past_of(sums, 3 * k + 1, sweep, alpha)
         put(sums, 3 * k + 1, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset))
-        alpha = scaled(at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)), scale)
+        alpha = at(t.stretch_soft, corner(table.triangle_soft, k, 0, 3)) * scale
         ka = corner(table.triangle_u, k, 0, 3)
         kb = corner(table.triangle_u, k, 1, 3)
         kc = corner(table.triangle_u, k, 2, 3)
@@ -80,4 +80,4 @@ def note_lengths(t: Any, table: Any, goals: Any, first: int, last: int, thread: 
         dx = at(t.x, i) - at(t.x, j)
         dy = at(t.y, i) - at(t.y, j)
         dz = at(t.z, i) - at(t.z, j)
-        put(goals, k, root(times(dx, dx) + times(dy, dy) + times(dz, dz) + fill(dx, 1.0e-20)))
+        put(goals, k, root(dx * dx + dy * dy + dz * dz + 1.0e-20))

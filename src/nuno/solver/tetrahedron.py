@@ -9,6 +9,7 @@ from nuno.solver.lanes import (  # noqa: F401
     add,
     anywhere,
     choose,
+    div,
     fill,
     fused,
     lane,
@@ -17,13 +18,11 @@ from nuno.solver.lanes import (  # noqa: F401
     lessened,
     most,
     mul,
-    over,
     root,
     sub,
-    times,
 )
 from nuno.solver.soft_state import CRUMPLED, SEEN
-from nuno.solver.vector import scaled, spread
+from nuno.solver.vector import spread
 
 COLUMNS = 8
 """Numbers of an element: with B the inverse rest matrix and v the rest volume, v B B^T as 11, 22, 33, 12, 13, 23; then
@@ -52,15 +51,15 @@ rest, 12 at twice its size."""
 @wp.func
 def dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
     """The scalar product."""
-    return fused(az, bz, fused(ay, by, times(ax, bx)))
+    return fused(az, bz, fused(ay, by, ax * bx))
 
 
 @wp.func
 def cross(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
     """The vector product."""
-    x = lessened(az, by, times(ay, bz))
-    y = lessened(ax, bz, times(az, bx))
-    z = lessened(ay, bx, times(ax, by))
+    x = lessened(az, by, ay * bz)
+    y = lessened(ax, bz, az * bx)
+    z = lessened(ay, bx, ax * by)
     return x, y, z
 
 
@@ -106,31 +105,31 @@ def element_reply(
     ncx, ncy, ncz = cross(gx, gy, gz, ex, ey, ez)
     ndx, ndy, ndz = cross(ex, ey, ez, fx, fy, fz)
     one = fill(ex, 1.0)
-    j = scaled(dot(ex, ey, ez, nbx, nby, nbz), inverse)
+    j = dot(ex, ey, ez, nbx, nby, nbz) * inverse
     maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
-    reply = fused(wd, spread(wd, m33), fused(wc, spread(wc, m22), fused(wb, spread(wb, m11), scaled(wa, maa))))
-    most_stiff = over(fill(one, CARRIED), reply + fill(one, 1.0e-30))
+    reply = fused(wd, spread(wd, m33), fused(wc, spread(wc, m22), fused(wb, spread(wb, m11), wa * maa)))
+    most_stiff = CARRIED / (reply + 1.0e-30)
     mu = least(mu, most_stiff)
     bulk = least(bulk, most_stiff)
-    pressure = (times(bulk, j - one) - mu) * (1.0 / 6.0)
-    k11 = scaled(mu, m11)
-    k22 = scaled(mu, m22)
-    k33 = scaled(mu, m33)
-    k12 = scaled(mu, m12)
-    k13 = scaled(mu, m13)
-    k23 = scaled(mu, m23)
+    pressure = (bulk * (j - one) - mu) * (1.0 / 6.0)
+    k11 = mu * m11
+    k22 = mu * m22
+    k33 = mu * m33
+    k12 = mu * m12
+    k13 = mu * m13
+    k23 = mu * m23
     kbx, kby, kbz = combine(k11, k12, k13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     kcx, kcy, kcz = combine(k12, k22, k23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     kdx, kdy, kdz = combine(k13, k23, k33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     # |F|^2 mu v = e k: k is the gradient of half of it
     squares = add_dot(ex, ey, ez, kbx, kby, kbz, add_dot(fx, fy, fz, kcx, kcy, kcz, dot(gx, gy, gz, kdx, kdy, kdz)))
     # |F|^2 mu
-    stretched = scaled(squares, inverse) * 6.0
+    stretched = squares * inverse * 6.0
     kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz = weakened(mu, stretched, kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz)
     # W n: how the edges go where the corners follow the volume's gradient
-    ux = times(wa, nbx + ncx + ndx)
-    uy = times(wa, nby + ncy + ndy)
-    uz = times(wa, nbz + ncz + ndz)
+    ux = wa * (nbx + ncx + ndx)
+    uy = wa * (nby + ncy + ndy)
+    uz = wa * (nbz + ncz + ndz)
     ubx = fused(wb, nbx, ux)
     uby = fused(wb, nby, uy)
     ubz = fused(wb, nbz, uz)
@@ -142,12 +141,12 @@ def element_reply(
     udz = fused(wd, ndz, uz)
     uk = add_dot(ubx, uby, ubz, kbx, kby, kbz, add_dot(ucx, ucy, ucz, kcx, kcy, kcz, dot(udx, udy, udz, kdx, kdy, kdz)))
     un = add_dot(ubx, uby, ubz, nbx, nby, nbz, add_dot(ucx, ucy, ucz, ncx, ncy, ncz, dot(udx, udy, udz, ndx, ndy, ndz)))
-    shear = times(mu, reply)
-    sigma = over(one, fused(shear, fused(shear, fill(one, SHARE_STIFF), fill(one, SHARE)), one))
-    h = scaled(bulk, inverse) * (1.0 / 6.0)
-    volume = times(times(sigma, h), un)
+    shear = mu * reply
+    sigma = one / fused(shear, fused(shear, fill(one, SHARE_STIFF), fill(one, SHARE)), one)
+    h = bulk * inverse * (1.0 / 6.0)
+    volume = sigma * h * un
     replied = fused(volume, fused(volume, fill(one, VOLUME_STIFF), fill(one, VOLUME_SHARE)), one)
-    p = lessened(h, over(times(sigma, fused(pressure, un, uk)), replied), pressure)
+    p = lessened(h, sigma * fused(pressure, un, uk) / replied, pressure)
     rbx = fused(p, nbx, kbx)
     rby = fused(p, nby, kby)
     rbz = fused(p, nbz, kbz)
@@ -160,7 +159,7 @@ def element_reply(
     rax = rbx + rcx + rdx
     ray = rby + rcy + rdy
     raz = rbz + rcz + rdz
-    bad = most(fill(one, 0.0) - j, stretched - mu * STRETCHED)
+    bad = most(0.0 - j, stretched - mu * STRETCHED)
     return rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad
 
 
@@ -269,29 +268,29 @@ def solve_tetrahedron(
         ex, ey, ez, fx, fy, fz, gx, gy, gz, wa, wb, wc, wd, m11, m22, m33, m12, m13, m23, inverse, mu, bulk
     )
     one = fill(sigma, 1.0)
-    ha = times(sigma, wa)
-    hb = times(sigma, wb)
-    hc = times(sigma, wc)
-    hd = times(sigma, wd)
+    ha = sigma * wa
+    hb = sigma * wb
+    hc = sigma * wc
+    hd = sigma * wd
     if anywhere(bad):
         zero = fill(one, 0.0)
         note_crumpled(t.notes, choose(zero - j, one, zero))
         far = most(
             most(
-                times(times(ha, ha), dot(rax, ray, raz, rax, ray, raz)),
-                times(times(hb, hb), dot(rbx, rby, rbz, rbx, rby, rbz)),
+                ha * ha * dot(rax, ray, raz, rax, ray, raz),
+                hb * hb * dot(rbx, rby, rbz, rbx, rby, rbz),
             ),
             most(
-                times(times(hc, hc), dot(rcx, rcy, rcz, rcx, rcy, rcz)),
-                times(times(hd, hd), dot(rdx, rdy, rdz, rdx, rdy, rdz)),
+                hc * hc * dot(rcx, rcy, rcz, rcx, rcy, rcz),
+                hd * hd * dot(rdx, rdy, rdz, rdx, rdy, rdz),
             ),
         )
         farthest = fill(one, limit)
-        keep = choose(bad, over(farthest, most(root(far), farthest)), one)
-        ha = times(ha, keep)
-        hb = times(hb, keep)
-        hc = times(hc, keep)
-        hd = times(hd, keep)
+        keep = choose(bad, farthest / most(root(far), farthest), one)
+        ha = ha * keep
+        hb = hb * keep
+        hc = hc * keep
+        hd = hd * keep
         # where the forces work on the corners' motion so far, they give it no speed
         uax, uay, uaz = motion_of(t, a, ax, ay, az)
         ubx, uby, ubz = motion_of(t, b, bx, by, bz)
@@ -304,10 +303,10 @@ def solve_tetrahedron(
             - dot(rdx, rdy, rdz, udx, udy, udz)
         )
         idle = choose(bad, choose(work, one, zero), zero)
-        move_idly(t, a, rax, ray, raz, times(ha, idle))
-        move_idly(t, b, rbx, rby, rbz, zero - times(hb, idle))
-        move_idly(t, c, rcx, rcy, rcz, zero - times(hc, idle))
-        move_idly(t, d, rdx, rdy, rdz, zero - times(hd, idle))
+        move_idly(t, a, rax, ray, raz, ha * idle)
+        move_idly(t, b, rbx, rby, rbz, zero - hb * idle)
+        move_idly(t, c, rcx, rcy, rcz, zero - hc * idle)
+        move_idly(t, d, rdx, rdy, rdz, zero - hd * idle)
     ax = fused(ha, rax, ax)
     ay = fused(ha, ray, ay)
     az = fused(ha, raz, az)
@@ -334,25 +333,25 @@ def weakened(mu: Any, stretched: Any, ax: Any, ay: Any, az: Any, bx: Any, by: An
     """The shear's forces a, b and c times |F|^2 where that is below 1; ``stretched`` is |F|^2 mu."""
     if not anywhere(mu - stretched):
         return ax, ay, az, bx, by, bz, cx, cy, cz
-    small = least(over(stretched, mu), fill(mu, 1.0))
-    ax = times(ax, small)
-    ay = times(ay, small)
-    az = times(az, small)
-    bx = times(bx, small)
-    by = times(by, small)
-    bz = times(bz, small)
-    cx = times(cx, small)
-    cy = times(cy, small)
-    cz = times(cz, small)
+    small = least(stretched / mu, 1.0)
+    ax = ax * small
+    ay = ay * small
+    az = az * small
+    bx = bx * small
+    by = by * small
+    bz = bz * small
+    cx = cx * small
+    cy = cy * small
+    cz = cz * small
     return ax, ay, az, bx, by, bz, cx, cy, cz
 
 
 @wp.func
 def combine(a: Any, b: Any, c: Any, ex: Any, ey: Any, ez: Any, fx: Any, fy: Any, fz: Any, gx: Any, gy: Any, gz: Any):
     """The three edges' sum with the weights a, b and c."""
-    x = fused(c, gx, fused(b, fx, times(a, ex)))
-    y = fused(c, gy, fused(b, fy, times(a, ey)))
-    z = fused(c, gz, fused(b, fz, times(a, ez)))
+    x = fused(c, gx, fused(b, fx, a * ex))
+    y = fused(c, gy, fused(b, fy, a * ey))
+    z = fused(c, gz, fused(b, fz, a * ez))
     return x, y, z
 
 

@@ -109,27 +109,6 @@ def corner(table: wp.array(dtype=lane), k: int, which: int, count: int):
 
 
 @wp.func
-def scaled(a: float, b: float):
-    """The product of a quantity and a factor that is its element's own, or all lanes'."""
-    return a * b
-
-
-@wp.func
-def scaled(a: lane, b: float):
-    return a * b
-
-
-@wp.func_native(f"""
-#if defined(__CUDACC__)
-return {{}};
-#else
-{_TYPES} wp::vec_t<16,wp::float32> r; *(V*)&r = *(const V*)&a * *(const V*)&b; return r;
-#endif
-""")
-def scaled(a: lane, b: lane) -> lane: ...
-
-
-@wp.func
 def spread(like: float, value: float):
     """A factor in the type of ``like``."""
     return value

@@ -4,9 +4,8 @@ from typing import Any
 
 import warp as wp
 
-from nuno.solver.lanes import add, fill, fused, lessened, most, mul, over, sub, times  # noqa: F401
+from nuno.solver.lanes import add, div, fill, fused, lessened, most, mul, sub  # noqa: F401
 from nuno.solver.tetrahedron import add_dot, combine, dot
-from nuno.solver.vector import scaled
 
 SHARE, MOST = wp.constant(0.2), wp.constant(0.9)
 """An element's reply T to its own viscosity counts as 1 + 0.2 T: what the rest of the pass does not undo is half of
@@ -124,39 +123,35 @@ def damp_tetrahedron(
     g12 = add_dot(ex, ey, ez, ix, iy, iz, dot(fx, fy, fz, hx, hy, hz)) * 0.5
     g13 = add_dot(ex, ey, ez, jx, jy, jz, dot(gx, gy, gz, hx, hy, hz)) * 0.5
     g23 = add_dot(fx, fy, fz, jx, jy, jz, dot(gx, gy, gz, ix, iy, iz)) * 0.5
-    q11 = fused(g13, m13, fused(g12, m12, scaled(g11, m11)))
-    q12 = fused(g23, m13, fused(g22, m12, scaled(g12, m11)))
-    q13 = fused(g33, m13, fused(g23, m12, scaled(g13, m11)))
-    q21 = fused(g13, m23, fused(g12, m22, scaled(g11, m12)))
-    q22 = fused(g23, m23, fused(g22, m22, scaled(g12, m12)))
-    q23 = fused(g33, m23, fused(g23, m22, scaled(g13, m12)))
-    q31 = fused(g13, m33, fused(g12, m23, scaled(g11, m13)))
-    q32 = fused(g23, m33, fused(g22, m23, scaled(g12, m13)))
-    q33 = fused(g33, m33, fused(g23, m23, scaled(g13, m13)))
+    q11 = fused(g13, m13, fused(g12, m12, g11 * m11))
+    q12 = fused(g23, m13, fused(g22, m12, g12 * m11))
+    q13 = fused(g33, m13, fused(g23, m12, g13 * m11))
+    q21 = fused(g13, m23, fused(g12, m22, g11 * m12))
+    q22 = fused(g23, m23, fused(g22, m22, g12 * m12))
+    q23 = fused(g33, m23, fused(g23, m22, g13 * m12))
+    q31 = fused(g13, m33, fused(g12, m23, g11 * m13))
+    q32 = fused(g23, m33, fused(g22, m23, g12 * m13))
+    q33 = fused(g33, m33, fused(g23, m23, g13 * m13))
     one = fill(ax, 1.0)
     # the trace of B^T S B, S the edges' scalar products, is |F|^2: a stretched element replies more
     stretched = (
-        scaled(dot(ex, ey, ez, ex, ey, ez), m11)
-        + scaled(dot(fx, fy, fz, fx, fy, fz), m22)
-        + scaled(dot(gx, gy, gz, gx, gy, gz), m33)
-        + (
-            scaled(dot(ex, ey, ez, fx, fy, fz), m12)
-            + scaled(dot(ex, ey, ez, gx, gy, gz), m13)
-            + scaled(dot(fx, fy, fz, gx, gy, gz), m23)
-        )
+        dot(ex, ey, ez, ex, ey, ez) * m11
+        + dot(fx, fy, fz, fx, fy, fz) * m22
+        + dot(gx, gy, gz, gx, gy, gz) * m33
+        + (dot(ex, ey, ez, fx, fy, fz) * m12 + dot(ex, ey, ez, gx, gy, gz) * m13 + dot(fx, fy, fz, gx, gy, gz) * m23)
         * 2.0
     )
     per_volume = inverse * 6.0
     maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
-    reply = fused(wc, m22, fused(wb, m11, scaled(wa, maa))) + scaled(wd, m33)
-    reply = times(times(eta, reply), most(one, scaled(stretched, per_volume) - fill(one, 2.0)))
-    s = scaled(over(eta, most(one + reply * SHARE, reply * MOST)), per_volume)
-    n11 = times(s, fused(q13, m13, fused(q12, m12, scaled(q11, m11))))
-    n22 = times(s, fused(q23, m23, fused(q22, m22, scaled(q21, m12))))
-    n33 = times(s, fused(q33, m33, fused(q32, m23, scaled(q31, m13))))
-    n12 = times(s, fused(q13, m23, fused(q12, m22, scaled(q11, m12))))
-    n13 = times(s, fused(q13, m33, fused(q12, m23, scaled(q11, m13))))
-    n23 = times(s, fused(q23, m33, fused(q22, m23, scaled(q21, m13))))
+    reply = fused(wc, m22, fused(wb, m11, wa * maa)) + wd * m33
+    reply = eta * reply * most(one, stretched * per_volume - 2.0)
+    s = eta / most(one + reply * SHARE, reply * MOST) * per_volume
+    n11 = s * fused(q13, m13, fused(q12, m12, q11 * m11))
+    n22 = s * fused(q23, m23, fused(q22, m22, q21 * m12))
+    n33 = s * fused(q33, m33, fused(q32, m23, q31 * m13))
+    n12 = s * fused(q13, m23, fused(q12, m22, q11 * m12))
+    n13 = s * fused(q13, m33, fused(q12, m23, q11 * m13))
+    n23 = s * fused(q23, m33, fused(q22, m23, q21 * m13))
     rbx, rby, rbz = combine(n11, n12, n13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     rcx, rcy, rcz = combine(n12, n22, n23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
     rdx, rdy, rdz = combine(n13, n23, n33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
