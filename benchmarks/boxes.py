@@ -28,10 +28,10 @@ def bin_of(boxes: int) -> tuple[float, float]:
 
 def make(boxes: int, worlds: int, device: str, substeps: int | None):
     """The solver, and the slots of the boxes."""
-    from nuno.mass_properties import mass_properties
-    from nuno.scene.rigid_shape import rigid_shape
-    from nuno.shape import Box
-    from nuno.solver.rigid_solver import RigidSolver
+    from nuno.rigid.convex_parts import rigid_shape
+    from nuno.shapes.mass_properties import mass_properties
+    from nuno.shapes.shape import Box
+    from nuno.solvers.rigid_solver import RigidSolver
 
     solver = RigidSolver(worlds, device=device, substeps=substeps)
     side, height = bin_of(boxes)
@@ -108,7 +108,7 @@ def main() -> None:
     parser.add_argument("--substeps", type=int, default=None)
     parser.add_argument("--json", help="write the figures there")
     given = parser.parse_args()
-    from nuno.device import found_device
+    from nuno.world.device import found_device
 
     device = found_device(given.device)
     boxes = given.boxes or ([100] if device == "cpu" else [100, 1000])

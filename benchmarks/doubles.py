@@ -16,11 +16,11 @@ import numpy as np
 from lift import lifted
 
 import nuno
-from nuno.solver import fine_places
+from nuno.state import double_positions
 
 TURNS, SECONDS, LEAD = 3, 0.5, 4.0 / 60.0
 """How often each is timed, for how long, and what runs before [s]."""
-DOUBLES, FLOATS = fine_places.FINE_RATE, float("inf")
+DOUBLES, FLOATS = double_positions.DOUBLE_RATE, float("inf")
 """From how many substeps a second on coordinates are doubles."""
 
 
@@ -88,11 +88,11 @@ def main() -> None:
             continue
         spent: dict[float, list[float]] = {FLOATS: [], DOUBLES: []}
         for rate in spent:  # kernels are compiled, and memory is taken
-            fine_places.FINE_RATE = rate
+            double_positions.DOUBLE_RATE = rate
             make().run(LEAD, progress=False)
         for _ in range(TURNS):
             for rate, times in spent.items():
-                fine_places.FINE_RATE = rate
+                double_positions.DOUBLE_RATE = rate
                 times.append(frame(make(), options.device))
         floats, doubles = (float(np.median(times)) for times in spent.values())
         print(f"| {name} | {floats:.3f} | {doubles:.3f} | {doubles / floats:.2f} |", flush=True)

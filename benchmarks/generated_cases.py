@@ -15,7 +15,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.futures import is_turned, table_world
 from nuno.materials import Cloth
-from nuno.path import Path
+from nuno.shapes.path import Path
 
 EDGE_NOISE = 2.0  # [px] standard deviation of the edge's displacement
 NOISE_LENGTH = 4.0  # [px] over which it is smooth

@@ -48,8 +48,8 @@ def nuno_run(cells: int, substeps: int | None, repeats: int, self_contact: bool)
     import warp as wp
 
     from nuno import Cloth
-    from nuno.scene.cloth import ClothTopology
-    from nuno.solver.cloth_solver import ClothSolver
+    from nuno.solvers.cloth_solver import ClothSolver
+    from nuno.topology.cloth_topology import ClothTopology
 
     wp.config.log_level = wp.LOG_WARNING
     sheet = ClothTopology.sheet((cells, cells), (1.0, 1.0))

@@ -30,14 +30,14 @@ from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_cou
 from nuno.estimate.learned import WIDTH, described
 from nuno.estimate.outline_net import SIZE
 from nuno.estimate.ranking import CONTOUR_WEIGHT, OVERLAP_WEIGHT
-from nuno.estimate.turns import TURNS, log_prior
+from nuno.estimate.rotations import TURNS, log_prior
 from nuno.materials import Cloth
-from nuno.path import Path as HandPath
+from nuno.shapes.path import Path as HandPath
 
 FIRST = (FIRM[1], FIRM[8], LOOSE[3], LOOSE[6])
 """What an estimate begins with."""
 OTHERS = tuple(h for h in FIRM + LOOSE + SHEARING if h not in FIRST)
-FINE = spread(3000.0, 1200.0)
+DOUBLES = spread(3000.0, 1200.0)
 GRID = np.array([divmod(k, 6) for k in range(36)]) / 5
 BEST, NEAR, FAR = 8, 11, 5
 """Candidates of which pictures are kept; real picks of those nearest to the hand, and of others drawn at random: with
@@ -81,7 +81,7 @@ def lift(
 def guesses(rng: np.random.Generator) -> list[tuple[int, int, tuple[Hypothesis, ...]]]:
     """Meshes, substeps and guesses of a scene: eight in all, some of them on the finer mesh now and then."""
     if rng.uniform() < 0.35:
-        return [(20, 14, FIRST), (25, 20, tuple(FINE[k] for k in rng.permutation(len(FINE))[:4]))]
+        return [(20, 14, FIRST), (25, 20, tuple(DOUBLES[k] for k in rng.permutation(len(DOUBLES))[:4]))]
     return [(20, 14, FIRST + tuple(OTHERS[k] for k in rng.permutation(len(OTHERS))[:4]))]
 
 

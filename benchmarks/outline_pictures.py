@@ -14,11 +14,11 @@ import warp as wp
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
-from nuno.camera.view import Region, view
+from nuno.camera.image_region import Region, view
 from nuno.estimate.futures import DRAWN_THICKNESS
 from nuno.estimate.learned import BORDER
 from nuno.estimate.outline_net import LEVELS, SIZE
-from nuno.estimate.turns import view_of_turned
+from nuno.estimate.rotations import view_of_turned
 
 EDGE_NOISE, NOISE_LENGTH = 2.0, 4.0  # [px] of 640
 

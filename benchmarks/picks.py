@@ -31,7 +31,7 @@ from nuno.estimate.hypotheses import Discretisation, Hypothesis
 from nuno.estimate.pick_sight import score_futures
 from nuno.estimate.similarity import Silhouette
 from nuno.materials import Cloth
-from nuno.path import Path as HandPath
+from nuno.shapes.path import Path as HandPath
 
 # The seeds of the cases that settings were chosen on start at 100 and 500; reported results use others.
 REPORTED_SEED = 7000

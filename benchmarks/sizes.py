@@ -54,7 +54,8 @@ def frame_seconds(world: nuno.World) -> float:
     for _ in range(FRAMES):
         start = time.perf_counter()
         world.step()
-        next(b for b in world.bodies if b.is_dynamic)._dynamics.finite()  # type: ignore[union-attr]  # wait for the device
+        # wait for the device
+        next(b for b in world.bodies if b.is_dynamic)._dynamics.finite()  # type: ignore[union-attr]
         spans.append(time.perf_counter() - start)
     return float(np.median(spans))
 

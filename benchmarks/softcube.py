@@ -58,9 +58,9 @@ def run_nuno(given: argparse.Namespace, worlds: int, substeps: int | None, frict
     import warp as wp
 
     import nuno
-    from nuno.scene.colliders import Colliders
-    from nuno.scene.soft import SoftTopology
-    from nuno.solver.soft_solver import SoftSolver
+    from nuno.solvers.soft_solver import SoftSolver
+    from nuno.tables.colliders import Colliders
+    from nuno.topology.soft_topology import SoftTopology
 
     wp.config.log_level = wp.LOG_WARNING
     vertices, tets = cube(given.cells)

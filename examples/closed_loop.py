@@ -11,7 +11,7 @@ import numpy as np
 
 import nuno
 from nuno.estimate.hypotheses import SPREAD, Discretisation
-from nuno.tasks.onlooker import onlooker
+from nuno.tasks.look_at_camera import look_at_camera
 from nuno.tasks.pick_towel import TowelPicker
 from nuno.tasks.towel_room import TABLE, make_room
 
@@ -43,7 +43,7 @@ assert miss < 0.01 and apart.mean() < 0.03, "half of a step of the grid"
 if len(sys.argv) > 3:
     import matplotlib.pyplot as plt
 
-    camera = onlooker((1.75, 1.0, 1.5), (0.45, 0.0, 0.95), 640, 480, 640.0)
+    camera = look_at_camera((1.75, 1.0, 1.5), (0.45, 0.0, 0.95), 640, 480, 640.0)
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), layout="constrained")
     imagined = talos.world.masks(talos.cameras.camera("head_left"), towel).numpy()
     for ax, title, image in (

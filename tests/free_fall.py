@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import nuno.dynamics
+import nuno.bodies.dynamics
 
 
 class Topology:
@@ -146,8 +146,10 @@ class FreeFall:
 @pytest.fixture
 def free_fall(monkeypatch):
     """Let worlds use the stand-in."""
-    monkeypatch.setattr(nuno.dynamics, "backend", lambda: (FreeFall, Topology, Colliders))
+    monkeypatch.setattr(nuno.bodies.dynamics, "backend", lambda: (FreeFall, Topology, Colliders))
     monkeypatch.setattr(FreeFall, "diverging", False)
     # it never touches itself
-    monkeypatch.setattr("nuno.contact.crossed.crossed_worlds", lambda solver: np.zeros(len(solver.x), dtype=bool))
+    monkeypatch.setattr(
+        "nuno.contact.self.crossed_faces.crossed_worlds", lambda solver: np.zeros(len(solver.x), dtype=bool)
+    )
     return FreeFall

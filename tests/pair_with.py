@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import nuno
-from nuno import quaternion as quat
+from nuno.shapes import quaternion as quat
 
 GRAVITY = 9.81  # [m/s2], the default of World
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from nuno.mass_properties import mass_properties
-from nuno.quaternion import from_axis_angle
-from nuno.scene.rigid_shape import rigid_shape
-from nuno.shape import Plane
-from nuno.solver.rigid_solver import RigidSolver
+from nuno.rigid.convex_parts import rigid_shape
+from nuno.shapes.mass_properties import mass_properties
+from nuno.shapes.quaternion import from_axis_angle
+from nuno.shapes.shape import Plane
+from nuno.solvers.rigid_solver import RigidSolver
 
 GRAVITY = 9.81
 

@@ -10,7 +10,7 @@ SHORT, LONG = (5, 6, 8, 10, 18, 19, 25, 29, 36, 41, 55, 58, 104, 106, 127), rang
 """Seeds; the short ones are some in which a world differed: where lists of contacts and the ends of pushes were the
 batch's, then where a step's length was rounded, where a body was led in one world and stood in others, and where one
 was put elsewhere in some."""
-WORLDS, ROUNDS = 3, 4
+WORLDS, COLOURS = 3, 4
 
 
 def check_worlds(seed, device):
@@ -34,7 +34,7 @@ def check_worlds(seed, device):
                 found.extend(f"{what}, world {k}: {each}" for each in told)
 
     try:
-        for number in range(ROUNDS):
+        for number in range(COLOURS):
             variation.happen(3)
             compare(f"changed {number} times")
             variation.do(run)

@@ -47,7 +47,7 @@ def scene(device, worlds=1):
 def test_the_same_physics_all_at_once(device, monkeypatch):
     """Contacts are solved one by one on the CPU and all at once on CUDA, which one thread can do on the CPU, too."""
     expected = scene("cpu")
-    monkeypatch.setattr("nuno.solver.coupling.solves_at_once", lambda device: True)
+    monkeypatch.setattr("nuno.solvers.coupling.solves_at_once", lambda device: True)
     for within, here, there in zip(WITHIN, expected, scene(device), strict=True):
         for one, other in zip(here, there, strict=True):
             np.testing.assert_allclose(other.mean(axis=1), one.mean(axis=1), atol=within)

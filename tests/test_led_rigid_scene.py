@@ -4,7 +4,7 @@ import numpy as np
 import warp as wp
 
 import nuno
-from nuno.solver.rigid_body import RigidState, apply_rigid_correction
+from nuno.rigid.rigid_body import RigidState, apply_rigid_correction
 
 
 def scene():

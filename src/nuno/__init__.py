@@ -5,7 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from nuno.bodies import (
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import (
     box,
     capsule,
     cloth_mesh,
@@ -22,11 +23,7 @@ from nuno.bodies import (
     soft_tetrahedra,
     sphere,
 )
-from nuno.body import Body
 from nuno.camera.camera import Camera
-from nuno.compound import Compound
-from nuno.coordinates import Coordinates
-from nuno.drawing import Drawing, draw
 from nuno.errors import (
     BodyStateError,
     ClothNotFoundError,
@@ -52,26 +49,28 @@ from nuno.errors import (
     WalkError,
     WorkerLostError,
 )
-from nuno.export import export_body
-from nuno.grip import Grip
-from nuno.joint import Joint
-from nuno.joint_drives import Motor, Spring
-from nuno.joints import ball_joint, fixed_joint, hinge, slider
+from nuno.files.export import export_body
+from nuno.files.recording import Recording
+from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint
+from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Cloth, Material, Rigid, Soft
-from nuno.path import Path
-from nuno.recording import Recording
-from nuno.resolution import Resolution
-from nuno.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
-from nuno.snapshot import Snapshot
-from nuno.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra
-from nuno.surface import SurfacePoints
-from nuno.world import World
+from nuno.shapes.compound import Compound
+from nuno.shapes.coordinates import Coordinates
+from nuno.shapes.path import Path
+from nuno.shapes.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
+from nuno.shapes.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra
+from nuno.shapes.surface import SurfacePoints
+from nuno.solvers.resolution import Resolution
+from nuno.world.drawing import Drawing, draw
+from nuno.world.make_joints import ball_joint, fixed_joint, hinge, slider
+from nuno.world.snapshot import Snapshot
+from nuno.world.world import World
 
 if TYPE_CHECKING:
+    from nuno.bodies.element_state import ElementState, elements
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
     from nuno.camera.table import Table
-    from nuno.contact_points import ContactPoints
-    from nuno.element_state import ElementState, elements
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -108,7 +107,7 @@ if TYPE_CHECKING:
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
-    from nuno.shape import Hull
+    from nuno.shapes.shape import Hull
     from nuno.tasks.arm_tracks import ArmTracks
     from nuno.tasks.carry_mat import carry_mat
     from nuno.tasks.carry_result import CarryResult, CarryTrial
@@ -119,6 +118,7 @@ if TYPE_CHECKING:
     from nuno.tasks.taught_fold import TaughtFold
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
+    from nuno.world.contact_points import ContactPoints
 
 __version__ = "0.1.0"
 
@@ -291,9 +291,9 @@ _LAZY = {
     "find_layers": "nuno.estimate.layers",
     "read_fold_case": "nuno.estimate.fold_case",
     "replay_fold": "nuno.estimate.fold",
-    "ElementState": "nuno.element_state",
-    "ContactPoints": "nuno.contact_points",
-    "elements": "nuno.element_state",
+    "ElementState": "nuno.bodies.element_state",
+    "ContactPoints": "nuno.world.contact_points",
+    "elements": "nuno.bodies.element_state",
     "PickCase": "nuno.estimate.case",
     "PickResult": "nuno.estimate.pick_result",
     "Table": "nuno.camera.table",
@@ -358,7 +358,7 @@ _LAZY = {
     "ImprovedFold": "nuno.tasks.improve_fold",
     "PlayedFold": "nuno.tasks.play_fold",
     "TowelPicker": "nuno.tasks.pick_towel",
-    "Hull": "nuno.shape",
+    "Hull": "nuno.shapes.shape",
     "ArmTracks": "nuno.tasks.arm_tracks",
 }
 

@@ -126,7 +126,7 @@ def _serve(options: argparse.Namespace) -> int:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.simulated_robot import SimulatedRobot
     from nuno.robot.wire.server import RobotServer
-    from nuno.world import World
+    from nuno.world.world import World
 
     _start_warp()
     robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))

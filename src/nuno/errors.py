@@ -134,7 +134,7 @@ class RobotTimeoutError(NunoError, TimeoutError, RuntimeError):
 
 
 class RefusedError(NunoError, RuntimeError):
-    """What a robot was asked for on the wire, and does not do."""
+    """A robot does not do what it was asked for on the wire."""
 
 
 class MessageError(InvalidInputError):

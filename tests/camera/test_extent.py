@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.camera.camera import Camera
 from nuno.camera.extent import regions_of
-from nuno.camera.view import Region
+from nuno.camera.image_region import Region
 
 CAMERA = Camera(120, 90, 100.0, 100.0, 59.5, 44.5, np.eye(4))
 

@@ -6,8 +6,8 @@ import pytest
 import nuno
 from nuno.camera.camera import Camera
 from nuno.camera.picture import Chequer, Lamp, take_picture
-from nuno.color import linear, rgb
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.shapes.color import linear, rgb
 
 DOWN = np.diag([1.0, -1.0, -1.0, 1.0])  # a camera that looks straight down
 

@@ -9,7 +9,7 @@ import warp as wp
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
-from nuno.camera.view import Region, view
+from nuno.camera.image_region import Region, view
 from nuno.errors import InvalidInputError
 
 # looks along +z of the world; 256 px a metre at one metre: multiples of 1/256 m are whole pixels, exactly

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nuno import shape
 from nuno.camera import render
 from nuno.camera.camera import Camera
+from nuno.camera.image_region import Region
 from nuno.camera.render import render_depth, render_ids, render_masks
-from nuno.camera.view import Region
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.shapes import shape
 
 # two metres above the origin, looking straight down; the image's x is the world's x
 DOWN = Camera(

@@ -7,7 +7,7 @@ import pytest
 
 import nuno
 from nuno import ClothNotFoundError, HandPath, ImageError, InvalidInputError
-from nuno.surface import closest_points
+from nuno.shapes.surface import closest_points
 
 TOP = 0.72  # [m] height of the table top
 REST_HEIGHT = 0.0025  # [m]

@@ -20,7 +20,7 @@ from nuno.estimate.learned import (
 )  # fmt: skip
 from nuno.estimate.outline_net import SCALARS, SIZE
 from nuno.estimate.ranking import Comparison, rank
-from nuno.estimate.turns import log_prior
+from nuno.estimate.rotations import log_prior
 
 POSE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5, POSE)

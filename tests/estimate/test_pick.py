@@ -14,7 +14,7 @@ from nuno.estimate.hypotheses import SPREAD, Discretisation
 from nuno.estimate.lift_prior import log_prior_of_lift
 from nuno.estimate.pick_sight import draw_futures, masks_of_turned
 from nuno.estimate.ranking import SHARE
-from nuno.estimate.turns import turn
+from nuno.estimate.rotations import turn
 
 TOP = 0.72  # [m] height of the table top
 REST_HEIGHT = 0.0025  # [m]
@@ -23,7 +23,7 @@ CENTRE, YAW = np.array((0.05, 0.02, TOP + REST_HEIGHT)), 0.35  # [m], [rad]
 UV = (0.8, 0.2)  # the picked point on the sheet: a grid point of 6 x 6
 HALF = (0.45, 0.6)  # [m] of the table top
 TURN = float(np.radians(20))  # [rad] of the cloth about the hand's vertical, in `turned`
-FINE = Discretisation(15, 12, SPREAD[::2])  # tells neighbouring points of a 6 x 6 grid apart
+DOUBLES = Discretisation(15, 12, SPREAD[::2])  # tells neighbouring points of a 6 x 6 grid apart
 QUICK = Discretisation(10, 10, SPREAD[::3])  # and this one does not
 
 
@@ -76,12 +76,12 @@ def options(seen, **changes):
 @pytest.fixture(scope="module")
 def result(seen):
     """The estimate with the 6 x 6 grid."""
-    return nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE]))
+    return nuno.estimate_pick(None, None, **options(seen, discretisations=[DOUBLES]))
 
 
 def test_what_was_learned_is_asked_unless_left_out(result, seen):
     """The truth is found without it too, by other evidence: that of the hand-made likelihood alone."""
-    without = nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE], learned=False))
+    without = nuno.estimate_pick(None, None, **options(seen, discretisations=[DOUBLES], learned=False))
     assert without.best == seen[1]
     assert np.abs(without.scores - result.scores).max() > 0.1
     np.testing.assert_allclose(without.eq1, result.eq1, atol=1e-12)  # same futures, of which it changes nothing
@@ -111,7 +111,7 @@ def test_a_lift_far_sideways_is_still_found():
     The prior holds the point that is under the hand now for tens of times as likely.
     """
     seen = lifted((0.0, 0.0), (0.4 * np.cos(YAW), 0.4 * np.sin(YAW), 0.35))
-    result = nuno.estimate_pick(None, None, **options(seen, discretisations=[FINE]))
+    result = nuno.estimate_pick(None, None, **options(seen, discretisations=[DOUBLES]))
     prior = log_prior_of_lift(result.rectangle, result.labels / 5, seen[0]["hand"], 0.5)
     true = result.labels.tolist().index(list(seen[1]))
     assert prior[true] < prior.max() - np.log(20.0)
@@ -140,7 +140,7 @@ def test_stages_are_timed_and_futures_kept(result):
     assert set(stages) == {"read", "see", "compile", "imagine", "compare", "total"}
     assert min(stages.values()) >= 0.0
     assert sum(stages.values()) - stages["total"] == pytest.approx(stages["total"], rel=1e-9)
-    assert result.futures.world.world_count == 36 * len(FINE.spread)
+    assert result.futures.world.world_count == 36 * len(DOUBLES.spread)
     assert result.masks.shape == (36, 120, 160) and result.real.mask.shape == (120, 160)
 
 
@@ -180,7 +180,7 @@ def test_adopt_gives_the_best_future(small, seen):
 
 def test_a_cloth_that_turned_is_recognised(result, seen):
     """A cloth that turned by 20 degrees in the hand: the point and the turn are found, and adopted."""
-    given = options(seen, after_mask=seen[4], discretisations=[FINE], rectangle=result.rectangle)
+    given = options(seen, after_mask=seen[4], discretisations=[DOUBLES], rectangle=result.rectangle)
     found = nuno.estimate_pick(None, None, **given)
     assert found.best == seen[1] and found.turn == pytest.approx(TURN)
     assert abs(result.turn) < TURN / 2 + 1e-9  # the one that did not turn is not taken for turned

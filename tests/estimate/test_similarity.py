@@ -8,8 +8,8 @@ import warp as wp
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
+from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
-from nuno.camera.view import Region
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.estimate import similarity as module
 from nuno.estimate.similarity import Silhouette, contour, score_masks, similarity

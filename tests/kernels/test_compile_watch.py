@@ -41,12 +41,12 @@ def heard():
 
 def loaded(seconds, how="compiled"):
     """What Warp says of a module that it has loaded."""
-    return f"Module nuno.solver.pack 1d8a9a2 load on device 'cpu' took {1000.0 * seconds:.2f} ms  ({how})"
+    return f"Module nuno.state.pack 1d8a9a2 load on device 'cpu' took {1000.0 * seconds:.2f} ms  ({how})"
 
 
 def test_warp_says_what_is_listened_for(heard):
     """A module that is loaded is a message of the form that is looked for, and takes time."""
-    from nuno.solver import pack
+    from nuno.state import pack
 
     module = wp.get_module(pack.__name__)
     module.unload()
@@ -80,7 +80,7 @@ def test_a_wait_is_told_by_name(heard, caplog, how):
         wp.get_logger().info(loaded(0.9 * TOLD_AFTER, how))
         assert caplog.messages == []
         wp.get_logger().info(loaded(17.34, how))
-    assert len(caplog.messages) == 1 and "17.3 s" in caplog.text and "nuno.solver.pack" in caplog.text
+    assert len(caplog.messages) == 1 and "17.3 s" in caplog.text and "nuno.state.pack" in caplog.text
     assert heard.messages == []  # the level asks for errors only
 
 

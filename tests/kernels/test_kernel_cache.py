@@ -66,17 +66,17 @@ from nuno.kernels.kernel_modules import kernel_modules
 print([each.module.get_module_identifier(block_dim=1) for each in kernel_modules()])
 """
     first = run(tmp_path, "-c", told, PYTHONHASHSEED="1")
-    late = "import nuno.tasks.mat_sight, nuno.solver.wide, nuno.solver.shared, nuno.camera.picture\n"
+    late = "import nuno.tasks.mat_sight, nuno.plans.simd_plan, nuno.plans.block_plan, nuno.camera.picture\n"
     assert run(tmp_path, "-c", late + told, PYTHONHASHSEED="2") == first
 
 
 def test_cuda_is_compiled_for_without_a_device_and_once(tmp_path):
     """Machine code where Warp looks for it; a second time nothing in the folder changes."""
-    command = ("-m", "nuno", "compile", "--arch", "sm_90", "--only", "nuno.solver.finite", "nuno.camera.extent")
+    command = ("-m", "nuno", "compile", "--arch", "sm_90", "--only", "nuno.state.finite", "nuno.camera.extent")
     told = run(tmp_path, *command)
     files = contents(tmp_path)
     made = sorted(Path(name).name for name in files if name.endswith(".cubin"))
-    assert [name.rpartition("_")[0] for name in made] == ["wp_nuno.camera.extent", "wp_nuno.solver.finite"]
+    assert [name.rpartition("_")[0] for name in made] == ["wp_nuno.camera.extent", "wp_nuno.state.finite"]
     assert all(name.endswith(".sm90.cubin") for name in made)
     assert all(Path(name).parent.name == Path(name).name.partition(".sm90")[0] for name in files if "cubin" in name)
     assert told.startswith("2 modules of kernels for sm_90 in ") and str(tmp_path) in told
@@ -113,14 +113,14 @@ world.masks(camera, box), world.depth(camera), world.ids(camera), nuno.take_pict
 @pytest.mark.cuda
 def test_a_device_takes_what_was_compiled_ahead(tmp_path):
     """Loading leaves the folder as it is."""
-    run(tmp_path, "-m", "nuno", "compile", "--device", "cuda", "--only", "nuno.solver.finite", "nuno.camera.raster")
+    run(tmp_path, "-m", "nuno", "compile", "--device", "cuda", "--only", "nuno.state.finite", "nuno.camera.raster")
     files = contents(tmp_path)
     code = """
 import warp
-from nuno.device import found_device
-import nuno.camera.raster, nuno.solver.pack
+from nuno.world.device import found_device
+import nuno.camera.raster, nuno.state.pack
 device = found_device("cuda")
-for name in ("nuno.solver.finite", "nuno.camera.raster"):
+for name in ("nuno.state.finite", "nuno.camera.raster"):
     warp.load_module(name, device=device)
 """
     run(tmp_path, "-c", code)
@@ -134,7 +134,7 @@ for name in ("nuno.solver.finite", "nuno.camera.raster"):
         (dict(device="cpu", arch="sm_90"), "sm_90"),
         (dict(device="cuda", arch="sm_1"), "sm_75, "),
         (dict(device="cuda", arch="hopper"), "hopper"),
-        (dict(device="cpu", only=["nuno.solver.run_blocks"]), "run_blocks"),
+        (dict(device="cpu", only=["nuno.plans.run_blocks"]), "run_blocks"),
     ],
 )
 def test_what_cannot_be_compiled_is_refused(arguments, told):

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 import nuno
-from nuno.grip import GripSpec
+from nuno.joints.grip import GripSpec
 from nuno.mesh.tetrahedra import box_tetrahedra
-from nuno.scene.colliders import Colliders
-from nuno.scene.soft import SoftTopology
-from nuno.solver.soft_solver import SoftSolver
+from nuno.solvers.soft_solver import SoftSolver
+from nuno.tables.colliders import Colliders
+from nuno.topology.soft_topology import SoftTopology
 
 GRAVITY = 9.81  # [m/s2], the default of the solver
 FOAM = nuno.Soft(density=1000.0, youngs_modulus=5e4, poisson_ratio=0.3, damping=0.02)

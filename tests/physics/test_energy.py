@@ -5,9 +5,9 @@ import pytest
 from world_with import GRAVITY, masses
 
 import nuno
-from nuno.scene.cloth import ClothTopology
-from nuno.scene.colliders import Colliders
-from nuno.solver.cloth_solver import ClothSolver
+from nuno.solvers.cloth_solver import ClothSolver
+from nuno.tables.colliders import Colliders
+from nuno.topology.cloth_topology import ClothTopology
 
 SIZE, CELLS, DENSITY, STRETCH, SHEAR, BENDING = (0.3, 0.2), (12, 8), 0.2, 40.0, 20.0, 1e-4
 
@@ -59,7 +59,7 @@ def test_energy_never_grows(substeps, where):
         solver.set_colliders(Colliders.from_bodies([nuno.plane()], worlds, "cpu"))
     if "held" in where:
         corner = np.zeros((worlds, 1), int)
-        hold = nuno.grip.GripSpec(corner, None, None, np.array([0.0]), x[:, :1, None], "linear", 0.0)
+        hold = nuno.joints.grip.GripSpec(corner, None, None, np.array([0.0]), x[:, :1, None], "linear", 0.0)
         solver.set_grips([hold])
         v[:, 0] = 0.0
     start = energies(solver, gravity)

@@ -6,7 +6,7 @@ from triangles import rectangle
 from world_with import GRAVITY, attached
 
 import nuno
-from nuno import quaternion as quat
+from nuno.shapes import quaternion as quat
 
 
 def swung(shift=(0.0, 0.0, 0.0), turn=(1.0, 0.0, 0.0, 0.0), kind="sheet", seconds=1.0):

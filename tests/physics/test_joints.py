@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ellipk
 
 import nuno
-from nuno.coordinates import apply
+from nuno.shapes.coordinates import apply
 from pair_with import moment, moments
 
 G = 9.81

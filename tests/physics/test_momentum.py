@@ -5,8 +5,8 @@ import pytest
 from world_with import masses
 
 import nuno
-from nuno.scene.cloth import ClothTopology
-from nuno.solver.cloth_solver import ClothSolver
+from nuno.solvers.cloth_solver import ClothSolver
+from nuno.topology.cloth_topology import ClothTopology
 
 SIZE, CELLS, DENSITY = (0.3, 0.3), (15, 15), 0.2
 

@@ -88,7 +88,7 @@ def test_the_cloth_bears_the_force_of_the_fingers(device, at_once, monkeypatch):
     Where all contacts are solved at once, as on CUDA, moves are rounded, and a finger's is 600 times as small as a
     vertex's for the same push.
     """
-    monkeypatch.setattr("nuno.solver.coupling.solves_at_once", lambda device: at_once)
+    monkeypatch.setattr("nuno.solvers.coupling.solves_at_once", lambda device: at_once)
     world, cloth, _, _ = pinched(
         0.6, 0.1, lift=0.0, duration=1.0, damping=0.05, air_drag=20.0, device=device, **SIZES["fine"]
     )

@@ -8,8 +8,8 @@ from triangles import rectangle
 from world_with import attached, rows
 
 import nuno
-from nuno.solver.relaxation import stiffness_share, sweeps_for
-from nuno.solver.substeps import default_substeps, wanted_substeps
+from nuno.constraints.relaxation import stiffness_share, sweeps_for
+from nuno.solvers.cloth_substeps import default_substeps, wanted_substeps
 
 
 def shear_under_traction(cells, h, stiffness, substeps=None, frame_rate=60.0):
@@ -109,7 +109,7 @@ def test_a_mesh_in_plain_passes_stretches_as_much_too_far_as_the_resolution_says
 
 @pytest.mark.parametrize(("share", "bears"), [(0.7, True), (1.3, False)])
 def test_a_sheet_bears_the_tension_that_the_resolution_says(share, bears):
-    """Derived: a yarn pulled along predicted directions is stable up to a tension of rho h^2 / (3 dt^2)."""
+    """Derived: a grid line pulled along predicted directions is stable up to a tension of rho h^2 / (3 dt^2)."""
     length, cells, stiffness = 0.3, 30, 5000.0
     sheet = nuno.sheet((length, 0.03), cells=(cells, 3), position=(0, 0, 1))
     material = nuno.Cloth(stretch_stiffness=stiffness, bending_rigidity=5e-6)
@@ -281,8 +281,8 @@ def test_a_copy_of_a_swept_cloth_goes_on_with_the_same_bits():
 
 
 def test_the_rule_sees_shear_and_tension():
-    """The rule: without gravity dt goes with h, as q and a yarn's tension have it, and not to the fewest substeps."""
-    from nuno.scene.cloth import ClothTopology
+    """Without gravity dt goes with h, as q and a grid line's tension have it, and not to the fewest substeps."""
+    from nuno.topology.cloth_topology import ClothTopology
 
     coarse, fine = (ClothTopology.sheet((n, n), (0.4, 0.4)) for n in (20, 40))
     frame = 1.0 / 60.0

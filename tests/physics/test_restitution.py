@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.shape import Box, Sphere
-from nuno.solver.rigid_solver import RigidSolver
+from nuno.shapes.shape import Box, Sphere
+from nuno.solvers.rigid_solver import RigidSolver
 from rigid_with import GRAVITY, about, drop, on_floor, put
 
 FRAME = 1.0 / 60.0

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from nuno.compound import Compound
-from nuno.mass_properties import mass_properties
-from nuno.scene.rigid_shape import rigid_shape
-from nuno.shape import Box, Capsule, Cylinder, Sheet, Sphere, TriangleMesh
-from nuno.solver.rigid_solver import RigidSolver
+from nuno.rigid.convex_parts import rigid_shape
+from nuno.shapes.compound import Compound
+from nuno.shapes.mass_properties import mass_properties
+from nuno.shapes.shape import Box, Capsule, Cylinder, Sheet, Sphere, TriangleMesh
+from nuno.solvers.rigid_solver import RigidSolver
 from rigid_with import GRAVITY, about, drop, on_floor, places, put
 
 CUBE = Box((0.1, 0.1, 0.1))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from nuno import quaternion
-from nuno.shape import Box, Cylinder, Sphere
-from nuno.solver.rigid_solver import RigidSolver
+from nuno.shapes import quaternion
+from nuno.shapes.shape import Box, Cylinder, Sphere
+from nuno.solvers.rigid_solver import RigidSolver
 from rigid_with import GRAVITY, about, drop, on_floor
 
 RUN_AT = 1.0 / 600.0  # [s], a substep

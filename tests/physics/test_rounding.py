@@ -6,9 +6,9 @@ from soft_with import block, solver
 from world_with import GRAVITY, attached
 
 import nuno
-from nuno.grip import GripSpec
-from nuno.scene.cloth import ClothTopology
-from nuno.solver.cloth_solver import ClothSolver
+from nuno.joints.grip import GripSpec
+from nuno.solvers.cloth_solver import ClothSolver
+from nuno.topology.cloth_topology import ClothTopology
 
 FLOATS, DOUBLES = 24, 25  # substeps a frame on either side of the rule
 

@@ -7,9 +7,9 @@ from scipy.optimize import fsolve
 from soft_with import GRAVITY, block, hold, solver, traction
 
 import nuno
-from nuno.dynamics import topology_of
-from nuno.scene.soft import OWN_SHARE
-from nuno.soft_measures import deformation_gradients, elastic_energy, element_volumes, strains, stresses
+from nuno.bodies.dynamics import topology_of
+from nuno.bodies.soft_measures import deformation_gradients, elastic_energy, element_volumes, strains, stresses
+from nuno.topology.soft_topology import OWN_SHARE
 
 YOUNG, NU = 5e4, 0.3
 MU, BULK = YOUNG / (2 * (1 + NU)), YOUNG / (3 * (1 - 2 * NU))

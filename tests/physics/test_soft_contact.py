@@ -6,7 +6,7 @@ from linear_solid import displacements
 from soft_with import GRAVITY, block, solver
 
 import nuno
-from nuno.soft_measures import element_volumes
+from nuno.bodies.soft_measures import element_volumes
 
 
 def settled(friction, substeps=None, cells=10):

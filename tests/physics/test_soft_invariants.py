@@ -5,7 +5,7 @@ import pytest
 from soft_with import GRAVITY, block, rigid_fit_error, solver
 
 import nuno
-from nuno.soft_measures import elastic_energy
+from nuno.bodies.soft_measures import elastic_energy
 
 UNDAMPED = nuno.Soft(density=1000.0, youngs_modulus=5e4, poisson_ratio=0.3, damping=0.0, friction=0.0)
 BODY = block((0.15, 0.1, 0.1), (6, 4, 4), irregular=0.15)

@@ -8,8 +8,8 @@ from test_soft_bars import bend, stretches, twist
 
 import nuno
 from nuno import InvalidInputError
-from nuno.dynamics import topology_of
-from nuno.soft_measures import deformation_gradients, elastic_energy, element_volumes, stresses
+from nuno.bodies.dynamics import topology_of
+from nuno.bodies.soft_measures import deformation_gradients, elastic_energy, element_volumes, stresses
 
 YOUNG = 5e4
 CALM = nuno.Soft(density=1000.0, youngs_modulus=YOUNG, poisson_ratio=0.3, damping=0.01, air_drag=20.0, friction=0.0)

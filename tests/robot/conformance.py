@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.goal import GoalStatus, ResultCode, Tolerances
 from nuno.robot.interface import RobotInterface
 from nuno.robot.trajectory import JointTrajectory
+from nuno.shapes.coordinates import Coordinates
 
 REACHED = 1.01e-3
 """[rad] What a goal counts as reached within, and rounding."""

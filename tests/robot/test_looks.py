@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.coordinates import compose
 from nuno.robot.looks import looks_of
+from nuno.shapes.coordinates import compose
 
 
 @pytest.mark.parametrize("name", ["talos", "g1"])

@@ -6,9 +6,9 @@ import pytest
 
 import nuno
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import Channel, SensorModel
 from nuno.robot.sensors import Sensors
-from nuno.robot.state import RobotState
 
 G = 9.81
 

@@ -6,9 +6,9 @@ import pytest
 
 import nuno
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.robot.robot_state import RobotState
 from nuno.robot.servo import Servo, ServoCommand
 from nuno.robot.simulated_robot import SimulatedRobot
-from nuno.robot.state import RobotState
 
 WRIST = "arm_left_7_joint"
 ELBOW = "arm_left_4_joint"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.path import minimum_jerk
+from nuno.shapes.path import minimum_jerk
 from nuno.tasks.arms import hands_level
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import nuno
-from nuno.path import minimum_jerk
+from nuno.shapes.path import minimum_jerk
 from nuno.tasks.taught_fold import TaughtFold
 
 SIZE = (0.40, 0.30)  # [m] of the cloth that was folded

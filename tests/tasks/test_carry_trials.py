@@ -93,7 +93,7 @@ def test_the_arms_bear_the_weight(plan):
 
 def test_boxes_contain_the_links(talos):
     """A link's box is around its hull, and a hand is one shape."""
-    from nuno import quaternion as quat
+    from nuno.shapes import quaternion as quat
     from nuno.tasks.arms import ERROR, arm_shapes
 
     boxes, hulls = arm_shapes(talos, "boxes"), arm_shapes(talos, "hulls")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nuno.shape import Hull
+from nuno.shapes.shape import Hull
 from nuno.tasks.simple_hull import simple_hull
 
 

@@ -151,9 +151,9 @@ def test_hands_that_never_touch():
 
 def test_hands_that_hold_nothing():
     """Held is never true."""
-    idle = [HandPath(hand.times, hand.positions, np.zeros(len(hand.times), bool)) for hand in hand_paths()]
+    shifted = [HandPath(hand.times, hand.positions, np.zeros(len(hand.times), bool)) for hand in hand_paths()]
     with pytest.raises(InvalidInputError, match="no hand holds anything"):
-        lesson(idle)
+        lesson(shifted)
     with pytest.raises(InvalidInputError, match="one or more HandPath"):
         lesson([])
 

@@ -17,7 +17,7 @@ from feed import Feed
 import nuno
 from nuno.viewer import Film, Viewer
 from nuno.viewer import viewer as viewer_module
-from nuno.viewer.stage import Stage
+from nuno.viewer.scene import Scene
 
 
 def make_world(**options):
@@ -128,7 +128,7 @@ def test_a_body_is_removed_again_and_again_while_it_looks(caplog, monkeypatch):
 def test_viewing_changes_no_bit(monkeypatch):
     """A world that is looked at, with contacts, and filmed, moves as one that is not."""
     monkeypatch.setattr(viewer_module, "SHARE", 1.0)  # looks as often as it can
-    monkeypatch.setattr(viewer_module, "IDLE", 0.0)  # though there is no page
+    monkeypatch.setattr(viewer_module, "SHIFTS", 0.0)  # though there is no page
     runs = []
     for looked_at in (False, True):
         world = make_world()
@@ -172,10 +172,10 @@ def test_a_stepped_world_is_followed():
 
 def test_it_looks_rarely_while_nobody_does(monkeypatch):
     """Without a page a world is looked at only now and then; a page that comes is shown all of it, and follows."""
-    monkeypatch.setattr(viewer_module, "IDLE", 1e6)
+    monkeypatch.setattr(viewer_module, "SHIFTS", 1e6)
     looks = []
-    look = Stage.look
-    monkeypatch.setattr(Stage, "look", lambda own, sparing=False: (looks.append(sparing), look(own, sparing))[1])
+    look = Scene.look
+    monkeypatch.setattr(Scene, "look", lambda own, sparing=False: (looks.append(sparing), look(own, sparing))[1])
     world = nuno.World(device="cpu")
     ball = world.add(nuno.sphere(0.1, name="ball"))
     with Viewer(world, frame_rate=500.0) as viewer:
@@ -201,7 +201,7 @@ def test_it_takes_a_share_of_the_time_only(monkeypatch):
     monkeypatch.setattr(viewer_module, "SHARE", 0.1)
     with Viewer(nuno.World(device="cpu"), frame_rate=1000.0) as viewer:
         Feed(viewer)
-        monkeypatch.setattr(Stage, "look", look)
+        monkeypatch.setattr(Scene, "look", look)
         time.sleep(3.0)
     assert len(looks) > 3
     # what is measured is an average of the last five or so, which have to be taken in first: 5 of them in a hurry,
@@ -234,17 +234,17 @@ def test_a_look_that_fails_lets_go_of_the_world(monkeypatch, caplog):
     """The viewer's thread logs what went wrong and goes on looking; nobody waits for a lock that it keeps."""
     world = make_world()
     failed = threading.Event()
-    look = Stage.look
+    look = Scene.look
 
-    def fails_once(stage, sparing=False):
+    def fails_once(scene, sparing=False):
         if sparing and not failed.is_set():
             failed.set()
             raise RuntimeError("a body that cannot be drawn")
-        look(stage, sparing)
+        look(scene, sparing)
 
     with caplog.at_level(logging.ERROR), Viewer(world, frame_rate=200.0) as viewer:
         feed = Feed(viewer)
-        monkeypatch.setattr(Stage, "look", fails_once)
+        monkeypatch.setattr(Scene, "look", fails_once)
         assert failed.wait(5.0)
         assert world.lock.acquire(timeout=5.0), "the viewer's thread has let go of it"
         world.lock.release()

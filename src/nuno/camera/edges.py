@@ -1,4 +1,4 @@
-"""Where the edge of a region is, to a fraction of a pixel, along a straight side."""
+"""Subpixel edges: the border of a region along a straight side, to a fraction of a pixel."""
 
 from __future__ import annotations
 

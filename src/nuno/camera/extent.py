@@ -1,4 +1,4 @@
-"""Which part of an image bodies take up, found on the device where their vertices are."""
+"""The part of an image that bodies take up, found on the device where their vertices are."""
 # Warp's kernels are Python to a type checker, but not with Python's types
 # mypy: disable-error-code="misc, index, attr-defined, operator, arg-type, valid-type, call-overload"
 
@@ -8,8 +8,8 @@ import numpy as np
 import warp as wp
 
 from nuno.camera.camera import Camera
+from nuno.camera.image_region import Region, View, view
 from nuno.camera.raster import SUBPIXELS, project
-from nuno.camera.view import Region, View, view
 
 wp.set_module_options({"enable_backward": False})
 

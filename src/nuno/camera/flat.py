@@ -7,9 +7,9 @@ from contextlib import suppress
 import cv2
 import numpy as np
 
-from nuno.camera.appearance import Illumination, colour_density, discriminant, guided_filter
 from nuno.camera.camera import Camera
 from nuno.camera.regions import fill_holes, grow, shrink
+from nuno.camera.surface_colours import Illumination, colour_density, discriminant, guided_filter
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError
 
@@ -134,7 +134,7 @@ def _faint(
 
 
 def _difference(flat: np.ndarray, rim: np.ndarray, surface: np.ndarray) -> np.ndarray:
-    """How many standard deviations of the table's own colour each pixel of an image (h, w, channels) differs from it.
+    """Return each pixel's difference from the table's colour in an image (h, w, channels), in standard deviations.
 
     The table's colours are those of its rim (h, w) bool and of all that is like them on its surface (h, w)
     bool. Of the rim only the half nearest to its median counts at first: a cloth may cover much of it.
@@ -235,7 +235,7 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
 
 
 def _likeness(blob: np.ndarray, xy: np.ndarray) -> float:
-    """How full a region (h, w) bool makes the smallest rectangle around it on the plane; 0 if it leaves the plane."""
+    """Return the share of its smallest rectangle on the plane that a region (h, w) bool fills; 0 outside the plane."""
     contours, _ = cv2.findContours(blob.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return _size_on_plane(max(contours, key=len)[:, 0], xy)[1]
 

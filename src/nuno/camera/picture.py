@@ -12,11 +12,11 @@ import warp as wp
 
 from nuno.camera import raster, shading
 from nuno.camera.camera import Camera
+from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _index, _split
-from nuno.camera.view import Region, view
-from nuno.color import linear, rgb
 from nuno.errors import InvalidInputError
-from nuno.shape import Shape
+from nuno.shapes.color import linear, rgb
+from nuno.shapes.shape import Shape
 from nuno.validation import count, finite_array, number
 
 SHADOW_PIXELS = 1024
@@ -56,7 +56,7 @@ class Chequer:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a camera saw at one time. Arrays of a single world; in a batch with a first axis of worlds.
+    """An image that a camera took at one time. Arrays of a single world; in a batch with a first axis of worlds.
 
     Attributes:
         camera: The camera, where it was.
@@ -294,7 +294,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _lens(camera: Camera) -> tuple[Any, ...]:
-    """What a camera's rays in its own frame depend on."""
+    """Return what a camera's rays in its own frame depend on."""
     bent = None if camera.distortion is None else tuple(camera.distortion.tolist())
     return camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, bent
 

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.camera.view import Region, View
+from nuno.camera.image_region import Region, View
 from nuno.errors import InvalidInputError
 
 wp.set_module_options({"enable_backward": False})
@@ -83,7 +83,7 @@ def project(p: wp.vec3, v: View) -> wp.vec2i:
 
 @wp.func
 def _cut(inside: wp.vec3, outside: wp.vec3, near: float) -> wp.vec3:
-    """Where an edge meets the near plane; from the inner end always, so that neighbours get the same bits."""
+    """Return where an edge meets the near plane; from the inner end always, so that neighbours get the same bits."""
     t = (inside[2] - near) / (inside[2] - outside[2])
     p = inside + t * (outside - inside)
     return wp.vec3(p[0], p[1], near)
@@ -349,7 +349,7 @@ def draw(
         keys: (worlds, h, w) key images; (h, w) must be the region of ``seen``.
         positions: (worlds, n) vec3 [m], on the same device.
         faces: (m,) vec3i vertex indices, on the same device.
-        seen: From :func:`nuno.camera.view.view`.
+        seen: From :func:`nuno.camera.image_region.view`.
         label: int32 keys: 0 for the wanted body, 1 for whatever may hide it (at equal depth, 0 is seen).
             int64 keys: an index from 0 to 2**20 - 1, or None, by which every face gets its own index.
         thickness: [m], of a sheet: its triangles are drawn twice, moved by half of it to either side, and as

@@ -65,7 +65,7 @@ class ClothRectangle:
         return self.corners[0] + i * along + j * across
 
     def fractions(self, points: ArrayLike) -> np.ndarray:
-        """Where points (..., 3) [m] lie as fractions (..., 2) of the sides, (0, 0) at C00 and (1, 1) opposite."""
+        """Return points (..., 3) [m] as fractions (..., 2) of the sides, (0, 0) at C00 and (1, 1) opposite."""
         sides = np.stack([self.corners[1] - self.corners[0], self.corners[3] - self.corners[0]])
         offset = np.asarray(points, dtype=float) - self.corners[0]
         return offset @ sides.T / (sides**2).sum(axis=1)

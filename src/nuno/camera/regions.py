@@ -16,7 +16,7 @@ def grow(mask: np.ndarray, radius: int) -> np.ndarray:
 
 
 def shrink(mask: np.ndarray, radius: int) -> np.ndarray:
-    """What of the mask (h, w) bool is farther than a radius [px] from its outside."""
+    """Return what of the mask (h, w) bool is farther than a radius [px] from its outside."""
     return cv2.erode(mask.astype(np.uint8), _disc(radius)).astype(bool)
 
 

@@ -14,7 +14,7 @@ import warp as wp
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
-from nuno.camera.view import Region, view
+from nuno.camera.image_region import Region, view
 from nuno.errors import InvalidInputError, UnknownNameError
 
 CHUNK_BYTES = 512 * 2**20  # key images held at a time; 8,192 worlds of 320 x 240 px would be 2.5 GB at once
@@ -28,7 +28,7 @@ def render_masks(
     world: Any, camera: Camera, body: Any, *, region: Region | None = None, without: Iterable[Any] = (),
     cloth_thickness: float = 0.0,
 ) -> wp.array:  # fmt: skip
-    """Where a body is seen, and not hidden by another.
+    """Return where a body is seen, and not hidden by another.
 
     Args:
         world: A World.
@@ -84,7 +84,7 @@ def render_ids(
     world: Any, camera: Camera, *, region: Region | None = None, without: Iterable[Any] = (),
     cloth_thickness: float = 0.0,
 ) -> wp.array:  # fmt: skip
-    """Which body is seen: its index in ``world.bodies``, -1 where nothing is.
+    """Return which body is seen: its index in ``world.bodies``, -1 where nothing is.
 
     Args:
         world: A World.

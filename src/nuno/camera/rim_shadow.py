@@ -22,7 +22,7 @@ _EVEN = 0.05  # median deviation of its share of the light along a side: a lamp'
 
 
 def cloth_beside_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float) -> np.ndarray | None:
-    """Where the cloth ends along a side that has its shadow beside it.
+    """Return where the cloth ends along a side that has its shadow beside it.
 
     Along the normal three colours follow each other: the cloth's, the table's in shadow, and the table's. Where that
     fits far better than the cloth's and the table's alone, the first edge is the cloth's. The shadow has the table's

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.camera.appearance import discriminant, guided_filter
-from nuno.camera.background import compare
 from nuno.camera.camera import Camera
 from nuno.camera.flat import first_look, refine
 from nuno.camera.image import check_image, check_mask
 from nuno.camera.regions import fill_doubtful_holes, grow, parts_at, sharpen, shrink
+from nuno.camera.scene_without_cloth import compare
+from nuno.camera.surface_colours import discriminant, guided_filter
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, InvalidInputError
 
@@ -139,7 +139,7 @@ def look_after(
 
 
 def _doubtful(found: np.ndarray, ratio: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Where in and beside what was found (h, w) bool the ratio (h, w), where the scene is seen, says little."""
+    """Return where the ratio (h, w), in and beside what was found (h, w) bool, says little."""
     outline = grow(found, 2) & ~shrink(found, 2)
     doubt = (np.abs(ratio) < _IN_DOUBT) & grow(found, _NEAR) & ~outline & seen
     return cv2.morphologyEx(doubt.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)).astype(bool)

@@ -37,7 +37,7 @@ class Light:
 
 @wp.struct
 class Looks:
-    """What is drawn, by body."""
+    """The looks of bodies as they are drawn, by body."""
 
     color: wp.array[wp.vec3]
     other: wp.array[wp.vec3]  # of a chequered body's other fields
@@ -47,7 +47,7 @@ class Looks:
 
 @wp.func
 def _lit(point: wp.vec3, normal: wp.vec3, world: int, light: Light, shadow: wp.array3d[wp.int64]) -> float:
-    """How much of the lamp reaches a point, 0 to 1."""
+    """Return how much of the lamp reaches a point, 0 to 1."""
     if light.size == 0:
         return 1.0
     # a texel and a half off the surface, which else would shade itself where the light grazes it
@@ -152,7 +152,7 @@ def _shade(
 
 @wp.func
 def _screen(x: float) -> float:
-    """What a screen takes of an amount of light (IEC 61966-2-1)."""
+    """Return what a screen takes of an amount of light (IEC 61966-2-1)."""
     x = wp.clamp(x, 0.0, 1.0)
     if x <= 0.0031308:
         return 12.92 * x
@@ -179,7 +179,7 @@ def _expose(light: wp.array3d[wp.vec3], samples: int, noise: float, seed: int, c
 def _to_bodies(
     keys: wp.array3d[wp.int64], owner: wp.array[wp.int32], index: wp.array[wp.int32], ids_out: wp.array3d[wp.int32]
 ):
-    """Which body is seen, -1 for none."""
+    """Write which body is seen, -1 for none."""
     world, row, column = wp.tid()
     key = keys[world, row, column]
     found = int(-1)

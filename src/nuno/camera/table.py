@@ -39,7 +39,7 @@ class Table:
 
 
 def plane_coordinates(camera: Camera, height: float, step: int = 1) -> np.ndarray:
-    """Where every pixel's ray meets the plane z = height.
+    """Return where every pixel's ray meets the plane z = height.
 
     Args:
         camera: The camera.
@@ -60,7 +60,7 @@ def plane_coordinates(camera: Camera, height: float, step: int = 1) -> np.ndarra
 
 
 def table_margin(table: Table, xy: np.ndarray) -> np.ndarray:
-    """How far inside the table's border points of its plane lie.
+    """Return how far inside the table's border points of its plane lie.
 
     Args:
         table: The table, with known half_extents.

@@ -1,1 +1,1 @@
-"""Contact: static shapes against particles, and cloth against itself."""
+"""Contact of particles: with shapes (`nuno.contact.particle`), and of a body with itself (`nuno.contact.self`)."""

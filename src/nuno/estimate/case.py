@@ -22,7 +22,7 @@ NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_posit
 
 @dataclass(frozen=True, eq=False)
 class PickCase:
-    """What an input.json says, with its images.
+    """A case as its input.json has it, with its images.
 
     Attributes:
         camera: The camera of both images.

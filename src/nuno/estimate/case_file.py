@@ -1,4 +1,4 @@
-"""What the folders of all cases have in common: an input.json with entries that must be there."""
+"""The folder of a case: an input.json with entries that must be there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is a cloth made of? Its bending, stretch and friction, from masks of it as it was moved in a known way."""
+"""Fitting a cloth's material: bending, stretch and friction, from masks of it as it was moved in a known way."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from nuno.estimate.hand_sight import disc
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.seeing import HAND_MARGIN
 from nuno.materials import Cloth
-from nuno.path import Path
 from nuno.search.minimise import Minimum, minimise
+from nuno.shapes.path import Path
 from nuno.validation import count, finite_array, number
-from nuno.world import World
+from nuno.world.world import World
 
 log = logging.getLogger(__name__)
 
@@ -146,7 +146,7 @@ def fit_material(
 def _footage(
     seen: Any, frames: int, pick: Sequence[float] | None, device: str | None
 ) -> tuple[Footage | FoldFootage, Cloth]:
-    """What is compared, and the material that is taken for what is not looked for."""
+    """Return what is compared, and the material that is taken for what is not looked for."""
     where = device or "auto"
     if isinstance(seen, Footage):
         return seen, Cloth()

@@ -21,7 +21,6 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_after, segment_before
 from nuno.camera.table import Table
-from nuno.device import checked_device, found_device
 from nuno.errors import ClothNotFoundError, InvalidInputError
 from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.fold_view import draw_masks, hand_spheres
@@ -32,8 +31,9 @@ from nuno.estimate.hypotheses import cell_counts
 from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.materials import Cloth
-from nuno.progress import with_bar
 from nuno.validation import count, finite_array, number
+from nuno.world.device import checked_device, found_device
+from nuno.world.progress import with_bar
 
 log = logging.getLogger(__name__)
 

@@ -27,7 +27,7 @@ LONGEST = 600.0
 
 @dataclass(frozen=True, eq=False)
 class FoldCase:
-    """What an input.json says, with its images.
+    """A case as its input.json has it, with its images.
 
     Attributes:
         camera: The camera.

@@ -18,18 +18,18 @@ from nuno.estimate.fold_view import CLOTH_COLOUR, hand_spheres
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.imagined_fold import ImaginedFold
 from nuno.estimate.layers import Layers, find_layers
+from nuno.files.recording import RecordedBody, Recording
 from nuno.materials import Cloth
-from nuno.recording import RecordedBody, Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nuno.world import World
+    from nuno.world.world import World
 
 
 @dataclass(eq=False)
 class FoldResult:
-    """How a cloth was folded.
+    """A folded cloth: its vertices at every frame, and how it lies in the end.
 
     Attributes:
         times: (k,) float [s], the video's frames.
@@ -106,7 +106,7 @@ class FoldResult:
 
     @cached_property
     def layers(self) -> Layers:
-        """Which parts lie under which at the last frame."""
+        """Return which parts lie under which at the last frame."""
         return find_layers(self.final, self.faces, self.fractions)
 
     def recording(self) -> Recording:

@@ -1,4 +1,4 @@
-"""What the camera sees of a replayed fold: the cloth behind the table's edge and the hands."""
+"""A replayed fold as the camera sees it: the cloth behind the table's edge and the hands."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import warp as wp
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
-from nuno.camera.view import Region, View, view
+from nuno.camera.image_region import Region, View, view
 from nuno.estimate.futures import DRAWN_THICKNESS
-from nuno.shape import Sphere
+from nuno.shapes.shape import Sphere
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
 
 FAR = 1.0e3
 """[m] How far below everything a hand is put that is not to be drawn."""
@@ -46,7 +46,7 @@ def draw_masks(
     vertices: np.ndarray, faces: np.ndarray, camera: Camera, *, table: Body, hands: tuple[np.ndarray, np.ndarray],
     device: str,
 ) -> np.ndarray:  # fmt: skip
-    """Where the cloth is seen, and hidden neither by the table's edge nor by the hands, frame by frame.
+    """Return where the cloth is seen, and hidden neither by the table's edge nor by the hands, frame by frame.
 
     Args:
         vertices: (frames, n, 3) float [m].

@@ -12,8 +12,8 @@ import warp as wp
 from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_mask
+from nuno.camera.image_region import Region, view
 from nuno.camera.render import render_masks
-from nuno.camera.view import Region, view
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.estimate.fold import HAND_MARGIN, REACH
 from nuno.estimate.fold_result import FoldResult
@@ -24,7 +24,7 @@ from nuno.estimate.imagined_fold import imagine_fold
 from nuno.estimate.similarity import Silhouette, score_masks
 from nuno.materials import Cloth
 from nuno.validation import finite_array, number
-from nuno.world import World
+from nuno.world.world import World
 
 Scores = dict[str, np.ndarray]
 

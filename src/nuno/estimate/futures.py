@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies import box, plane, sheet
+from nuno.bodies.dynamics import ParticleDynamics
+from nuno.bodies.make_bodies import box, plane, sheet
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.dynamics import ParticleDynamics
 from nuno.estimate.hypotheses import Discretisation, cell_counts
 from nuno.materials import Cloth
-from nuno.path import Path
-from nuno.surface import SurfacePoints
-from nuno.world import World
+from nuno.shapes.path import Path
+from nuno.shapes.surface import SurfacePoints
+from nuno.world.world import World
 
 if TYPE_CHECKING:
     import warp as wp
 
-    from nuno.body import Body
+    from nuno.bodies.body import Body
 
 LIFT_SECONDS = 1.5
 """[s] How long the hand's motion takes where it is not known."""
@@ -97,7 +97,7 @@ def table_world(
 
 
 def is_turned(rectangle: ClothRectangle) -> bool:
-    """Whether CJ lies clockwise of CI seen from above, so that j runs against the sheet's own y."""
+    """Return whether CJ lies clockwise of CI seen from above, so that j runs against the sheet's own y."""
     along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
     return bool(along[0] * across[1] - along[1] * across[0] < 0)
 
@@ -114,7 +114,7 @@ def begin_picks(
     device: str,
     lift_seconds: float = LIFT_SECONDS,
 ) -> Futures:
-    """What `imagine_picks` does before any time passes; the arguments are the same."""
+    """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=discretisation.substeps)
     k, spread = len(candidates), discretisation.spread

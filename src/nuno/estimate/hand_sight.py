@@ -1,4 +1,4 @@
-"""Whether a hand whose position is known is seen in an image, or has left."""
+"""Detecting whether a hand whose position is known is seen in an image, or has left."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def _follow(
 
 
 def _motion(step: float) -> tuple[np.ndarray, np.ndarray]:
-    """What a time step does to (place, speed), and the covariance that it adds: a random, constant acceleration."""
+    """Return a time step's effect on (place, speed), and its covariance: a random, constant acceleration."""
     effect = np.array([0.5 * step**2, step])
     return np.array([[1.0, step], [0.0, 1.0]]), UNREST**2 * np.outer(effect, effect) + 1e-9 * np.eye(2)
 

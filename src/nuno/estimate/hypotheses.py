@@ -1,4 +1,4 @@
-"""What is not known of a real cloth, spread over a few guesses: material, friction, resolution."""
+"""Hypotheses about a real cloth: a few guesses at its material, friction and resolution."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Discretisation:
 RIGIDITIES = (3e-5, 1e-4, 3e-4, 8e-4, 1.6e-3)
 """[N m] From measured fabrics (1.4e-5 to 1.25e-4) on to stiffer cloths such as canvas."""
 FRICTIONS = (0.25, 0.5)
-"""How far the part on the table slides after the hand changes the silhouette as much as the rigidity does."""
+"""The part on the table slides after the hand, which changes the silhouette as much as the rigidity does."""
 
 
 def spread(

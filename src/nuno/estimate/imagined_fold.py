@@ -12,13 +12,13 @@ import numpy as np
 from nuno.errors import InvalidInputError
 from nuno.estimate.hand_path import HandPath
 from nuno.materials import Cloth
-from nuno.path import Path
-from nuno.surface import SurfacePoints
+from nuno.shapes.path import Path
+from nuno.shapes.surface import SurfacePoints
 
 if TYPE_CHECKING:
-    from nuno.body import Body
-    from nuno.grip import Grip
-    from nuno.world import World
+    from nuno.bodies.body import Body
+    from nuno.joints.grip import Grip
+    from nuno.world.world import World
 
 SOON = 1e-4
 """[s] Events nearer than this to a frame of the world happen at that frame."""

@@ -1,4 +1,4 @@
-"""Which parts of a folded cloth lie under which: what a camera above it cannot see."""
+"""Layers of a folded cloth: which parts lie under which, unseen by a camera above."""
 
 from __future__ import annotations
 

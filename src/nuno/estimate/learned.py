@@ -1,4 +1,4 @@
-"""What was learned, from many imagined picks, of how silhouettes of one pick differ.
+"""The learned correction of scores: how silhouettes of one pick differ, from many imagined picks.
 
 Folding is a matter of chance, and a contour distance does not know which differences of two outlines are mere chance
 and which tell of another pick. A network (`nuno.estimate.outline_net`) does to some degree: it was trained on
@@ -30,7 +30,7 @@ from nuno.estimate.ranking import Comparison
 HAND_MADE_SHARE = 0.7
 LEARNED_SHARE = 1.0
 FIRST_BEST = 12
-"""Where a stage looks at more candidates, the network looks at its best ones; it was trained on the best eight."""
+"""Candidates of a stage that the network looks at, the best ones; it was trained on the best eight."""
 WIDTH = 224
 """[px] Width of the whole image in which silhouettes are cut out: 0.35 of that of the images it was trained on."""
 FULL_WIDTH = 640
@@ -107,7 +107,7 @@ def _samples(middle: float, side: float, count: int) -> np.ndarray:
 
 
 def correction(outline: Outline, futures: Futures, comparison: Comparison, table: Table, hand: ArrayLike) -> np.ndarray:
-    """What is to be added to the log likelihood of every guess, (guesses, c) float.
+    """Return what is to be added to the log likelihood of every guess, (guesses, c) float.
 
     Every future is looked at as it is turned where it fits best.
 

@@ -1,4 +1,4 @@
-"""How far sideways a hand goes that lifts a cloth, before any image of it is seen.
+"""The prior of a lift: how far sideways a hand goes that lifts a cloth, before any image of it is seen.
 
 Who picks a cloth up to hold it lifts it: up, and somewhat to a side. So a point of the cloth that is under the hand now
 is a likelier pick than one from which the hand would have gone sideways only. How far sideways hands go in proportion

@@ -1,4 +1,4 @@
-"""At which point was the cloth picked up? Two images, and imagined picks of every candidate.
+"""Estimating where a cloth was picked up, from two images and imagined picks of every candidate.
 
 The experiment is that of Ueda et al. on the state of a picked-up cloth, its eq. (1) among the scores.
 """
@@ -20,22 +20,22 @@ from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table, table_margin
-from nuno.device import checked_device, found_device
 from nuno.errors import EstimationError, InvalidInputError
+from nuno.estimate.compile_ahead import compile_ahead
 from nuno.estimate.futures import LIFT_SECONDS, imagine_picks
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
-from nuno.estimate.kernels import compile_ahead
 from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.lift_prior import SIDEWAYS, log_prior_of_lift
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import EVIDENCE, RANKINGS, SURE, Comparison, Ranked, rank
+from nuno.estimate.rotations import TURNS, checked_turns
 from nuno.estimate.seeing import IMAGE_SCALE, begin_to_see
 from nuno.estimate.together import Ahead, has_room
-from nuno.estimate.turns import TURNS, checked_turns
 from nuno.kernels.compile_watch import Stages, compiling_watched
-from nuno.progress import with_bar, with_clock
 from nuno.validation import finite_array, number
+from nuno.world.device import checked_device, found_device
+from nuno.world.progress import with_bar, with_clock
 
 if TYPE_CHECKING:
     from nuno.estimate.futures import Futures

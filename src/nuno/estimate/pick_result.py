@@ -14,15 +14,15 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.ranking import confidence, probabilities
+from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
-from nuno.estimate.turns import turn
-from nuno.shape import Plane
+from nuno.shapes.shape import Plane
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nuno.estimate.futures import Futures
-    from nuno.world import World
+    from nuno.world.world import World
 
 WORST = -1.0e9
 
@@ -32,7 +32,7 @@ LOW_CONFIDENCE = 0.8
 
 @dataclass(eq=False)
 class PickResult:
-    """At which candidate the cloth was picked up.
+    """The estimate of where a cloth was picked up: a ranking of the candidates.
 
     Attributes:
         labels: (k, 2) the candidates: (i, j) of a grid, or the (u, v) that were given.
@@ -108,14 +108,14 @@ class PickResult:
 
     @cached_property
     def warnings(self) -> list[str]:
-        """What a reader of the answer should know, in plain words."""
+        """Return what a reader of the answer should know, in plain words."""
         found = [*self.rectangle.warnings, *self.seen_warnings]
         if self.confidence < LOW_CONFIDENCE:
             found.append(self._doubt())
         return found
 
     def _doubt(self) -> str:
-        """What else the answer might be, in words."""
+        """Return what else the answer might be, in words."""
         others = [int(k) for k in self.order[1:3]]
         likely = self.probabilities
         if likely is None:
@@ -147,7 +147,7 @@ class PickResult:
         return self.world
 
     def _in_table(self, points: np.ndarray) -> bool:
-        """Whether any of (n, 3) points is inside a table that has an edge."""
+        """Return whether any of (n, 3) points is inside a table that has an edge."""
         table = self.world.find("table")
         if isinstance(table.shape, Plane):
             return False  # a turn about the vertical keeps heights

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.extent import regions_of
+from nuno.camera.image_region import Region, View, view
 from nuno.camera.table import Table
-from nuno.camera.view import Region, View, view
-from nuno.estimate import appearance, similarity
-from nuno.estimate.appearance import Pattern, begin_pattern
+from nuno.estimate import pattern, similarity
 from nuno.estimate.futures import DRAWN_THICKNESS, Futures
+from nuno.estimate.pattern import Pattern, begin_pattern
+from nuno.estimate.rotations import turn, view_of_turned
 from nuno.estimate.similarity import Silhouette, begin_scores
-from nuno.estimate.turns import turn, view_of_turned
 
 MARGIN = 4
 """[px] around a cloth's vertices: it is drawn thicker than they tell."""
@@ -89,7 +89,7 @@ def _at_each(begin: Callable[[float], Callable[[], Scores]], turns: list[float],
     cores = len(os.sched_getaffinity(0))
     if min(cores, len(turns)) == 1 or not wp.get_device(device).is_cpu:
         return [wait() for wait in [begin(angle) for angle in turns]]
-    for module in (raster, similarity, appearance):
+    for module in (raster, similarity, pattern):
         module.load(device)
     with ThreadPoolExecutor(min(cores, len(turns))) as threads:
         # 0 takes longest, so it goes first
@@ -100,7 +100,7 @@ def _at_each(begin: Callable[[float], Callable[[], Scores]], turns: list[float],
 def _pattern_comparison(
     futures: Futures, positions: wp.array, faces: wp.array, pattern: Pattern, ground: Ground, hand: ArrayLike
 ) -> Callable[[float], Callable[[], np.ndarray]]:
-    """What begins to tell, at a turn [rad], how well the pattern that every future carries along explains the image.
+    """Return what scores, at a turn [rad], how well the pattern that every future carries explains the image.
 
     It returns a function that waits for the answer, (worlds,) float.
     """

@@ -5,7 +5,7 @@ turns about the hand's vertical. Which of them is right is not known, so the def
 candidate: the likelihood of the images averaged over all guesses, and over the turns by their prior, with -log
 likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a constant. The first term is the tail of a
 heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
-independent patches of cloth with normal errors of unknown size (`nuno.estimate.appearance`); it is 0 where there are
+independent patches of cloth with normal errors of unknown size (`nuno.estimate.pattern`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
 (docs/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
 (`nuno.estimate.learned`). How far sideways the hand would have gone from a candidate is its prior
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.estimate.turns import log_prior
+from nuno.estimate.rotations import log_prior
 
 RANKINGS = ("evidence", "silhouette", "chamfer", "iou", "eq1")
 CONTOUR_WEIGHT = 5.0
@@ -36,7 +36,7 @@ SHARE = 0.97
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What one mesh's futures look like beside the real silhouette, (turns, guesses, c) each.
+    """Scores of one mesh's futures beside the real silhouette, (turns, guesses, c) each.
 
     Attributes:
         candidates: (c,) int, which candidates were looked at.
@@ -45,7 +45,7 @@ class Comparison:
         iou: Intersection over union.
         eq1: The paper's eq. (1).
         finite: Whether the future's state is a number, (guesses, c).
-        pattern: How badly the cloth's pattern fits, see `nuno.estimate.appearance`; None where only masks are known.
+        pattern: How badly the cloth's pattern fits, see `nuno.estimate.pattern`; None where only masks are known.
         correction: What is added to every guess's log likelihood, (guesses, c), see `nuno.estimate.learned`; None is
             nothing.
     """
@@ -111,7 +111,7 @@ class Ranked:
         return np.sort(order[:most])
 
     def settled(self, sure: float) -> bool:
-        """Whether one candidate is as likely as ``sure``, which is below 1, so that no more guesses are needed."""
+        """Return whether one candidate is as likely as ``sure``, below 1, so that no more guesses are needed."""
         likely = probabilities(self.name, self.scores)
         return sure < 1.0 and likely is not None and bool(likely.max() >= sure)
 
@@ -160,7 +160,7 @@ def rank(
 
 
 def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:
-    """How likely each candidate is by its log evidence, which its prior is in: (k,) float that add up to 1.
+    """Return how likely each candidate is by its log evidence, which its prior is in: (k,) float that add up to 1.
 
     Args:
         name: What the scores are, see `Ranked`: None is returned where they are no evidence.
@@ -173,7 +173,7 @@ def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:
 
 
 def confidence(name: str, scores: np.ndarray) -> float:
-    """How far the best candidate may be trusted, from 0 to 1.
+    """Return how far the best candidate may be trusted, from 0 to 1.
 
     For the evidence it is the probability of the best candidate, else 1 - the ratio of the errors of the best and the
     second: 0 where they are equal. 1 where there is no second.

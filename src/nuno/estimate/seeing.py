@@ -1,4 +1,4 @@
-"""What the image after shows of a picked cloth: its silhouette at two resolutions, and its pattern."""
+"""The picked cloth in the image after: its silhouette at two resolutions, and its pattern."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.segmentation import look_after
 from nuno.camera.table import Table
 from nuno.errors import ImageError
-from nuno.estimate.appearance import Pattern, find_pattern
+from nuno.estimate.pattern import Pattern, find_pattern
 from nuno.estimate.similarity import Silhouette
 
 IMAGE_SCALE = 0.5
@@ -30,7 +30,7 @@ HAND_MARGIN = 2
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the image after shows.
+    """The image after, as segmented: the cloth's silhouette and what hides it.
 
     Attributes:
         mask: (h, w) bool, the cloth.
@@ -101,7 +101,7 @@ def begin_to_see(
 
 
 def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
-    """What is odd about where the cloth (h, w) is seen, with the pixels (h, w) of the hand and of what hides it."""
+    """Return what is odd about where the cloth (h, w) is seen, with the pixels (h, w) of the hand and what hides it."""
     import cv2
 
     if not mask.any() or not ignored.any():

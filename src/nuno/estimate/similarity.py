@@ -1,4 +1,4 @@
-"""How alike a simulated silhouette and a real one are: the paper's eq. (1), overlap, and contour distance.
+"""Similarity of a simulated silhouette and a real one: the paper's eq. (1), overlap, and contour distance.
 
 All scores are built from integer counts and from distances in steps of 1/1024 px, summed as 64-bit integers,
 so they are exact in order: the same bits for a world alone and anywhere in a batch, on any number of threads.
@@ -15,8 +15,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
+from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
-from nuno.camera.view import Region
 from nuno.errors import InvalidInputError, UnknownNameError
 
 wp.set_module_options({"enable_backward": False})
@@ -110,7 +110,7 @@ def contour(mask: np.ndarray, ignore: np.ndarray | None = None) -> np.ndarray:
 def _is_background(
     keys: wp.array3d[wp.int32], state: wp.array2d[wp.uint8], world: int, x: int, y: int, x0: int, y0: int
 ):
-    """Whether a pixel (image coordinates) is in the image, not in the simulated mask, and not ignored."""
+    """Return whether a pixel (image coordinates) is in the image, not in the simulated mask, and not ignored."""
     if x < 0 or y < 0 or x >= state.shape[1] or y >= state.shape[0]:
         return False
     if (state[y, x] & wp.uint8(2)) != wp.uint8(0):
@@ -349,7 +349,7 @@ def similarity(
     *,
     ignore: ArrayLike | None = None,
 ) -> Any:
-    """How alike masks are to a real mask; see :func:`score_masks` for the scores.
+    """Return how alike masks are to a real mask; see :func:`score_masks` for the scores.
 
     Args:
         masks: (worlds, h, w), or one mask (h, w): a NumPy array of bool or numbers of which the non-zero are

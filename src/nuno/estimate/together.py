@@ -34,7 +34,7 @@ from nuno.estimate.hypotheses import Discretisation
 if TYPE_CHECKING:
     import warp as wp
 
-    from nuno.solver.particle_solver import Kept, ParticleSolver
+    from nuno.solvers.particle_solver import Kept, ParticleSolver
 
 LOOKS = 5
 """Moments that a device goes through without being waited for."""
@@ -64,7 +64,7 @@ class Moment:
 
 @dataclass
 class Part(Futures):
-    """What one stage looks at of a batch of several.
+    """The part of a batch that one stage looks at.
 
     Attributes:
         batch: The whole batch.
@@ -115,7 +115,7 @@ class Together:
     moments: tuple[Moment, ...]
 
     def part(self, stage: Discretisation, chosen: np.ndarray) -> Part | None:
-        """What a stage finds of the ``chosen`` candidates (m,) int; None where not all of that is in the batch."""
+        """Return a stage's findings of the ``chosen`` candidates (m,) int; None where not all are in the batch."""
         number = next((k for k, other in enumerate(self.stages) if other is stage), None)
         if number is None or not np.isin(chosen, self.candidates).all():
             return None
@@ -131,12 +131,12 @@ class Together:
 
 
 def has_room(device: str) -> bool:
-    """Whether more worlds take hardly longer; a CPU's cores are busy with any."""
+    """Return whether more worlds take hardly longer; a CPU's cores are busy with any."""
     return device != "cpu"
 
 
 class Ahead:
-    """What was imagined of an estimate's stages, some before they were asked for.
+    """Imagined stages of an estimate, some before they were asked for.
 
     Args:
         uv: (all, 2) float, where all candidates are.
@@ -148,7 +148,7 @@ class Ahead:
         self._batches: list[Together] = []
 
     def part(self, stages: Sequence[Discretisation], chosen: np.ndarray) -> Part | None:
-        """What the first of ``stages`` finds of the ``chosen`` candidates (m,) int; None where some world diverged.
+        """Return the first stage's findings of the ``chosen`` candidates (m,) int; None where some world diverged.
 
         If need be they are imagined, and with them what the stages after it may look at.
         """

@@ -1,4 +1,4 @@
-"""What compiling kernels takes, as Warp tells it: a stage of its own, and a word where a run waits for it."""
+"""The seconds that compiling kernels takes, as Warp tells them: a stage of a run, and a warning where it waits long."""
 
 from __future__ import annotations
 

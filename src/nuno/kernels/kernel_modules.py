@@ -16,20 +16,21 @@ BLOCK = 256
 """Threads of a CUDA block where a launch names no other number: Warp's default, and that of most kernels."""
 
 CPU_ONLY = frozenset(
-    f"nuno.solver.{name}"
+    f"nuno.plans.{name}"
     for name in (
-        "run_worlds", "run_lanes", "run_fine_worlds", "run_fine_lanes", "wide", "run_fine_wide",
-        "run_soft_worlds", "run_soft_lanes", "run_soft_wide",
-        "run_soft_fine_worlds", "run_soft_fine_lanes", "run_soft_fine_wide",
+        "run_worlds", "run_lanes", "run_double_worlds", "run_double_lanes", "simd_plan", "run_double_simd",
+        "run_soft_worlds", "run_soft_lanes", "run_soft_simd",
+        "run_soft_double_worlds", "run_soft_double_lanes", "run_soft_double_simd",
     )
 )  # fmt: skip
 """Worlds by a thread, and in lanes of SIMD registers."""
 
 CUDA_ONLY = tuple(
-    f"nuno.solver.{name}"
+    f"nuno.{name}"
     for name in (
-        "run_blocks", "run_fine_blocks", "run_grid", "run_fine_grid", "run_rigid_team", "finite",
-        "run_soft_blocks", "run_soft_few", "run_soft_fine_blocks", "run_soft_grid", "run_soft_fine_grid",
+        "plans.run_blocks", "plans.run_double_blocks", "plans.run_grid", "plans.run_double_grid",
+        "plans.run_soft_blocks", "plans.run_soft_few", "plans.run_soft_double_blocks", "plans.run_soft_grid",
+        "plans.run_soft_double_grid", "rigid.run_rigid_group", "state.finite",
     )
 )  # fmt: skip
 """Beginnings of names: worlds by blocks and by the whole device. The CPU runs some of them, when asked to."""
@@ -87,16 +88,16 @@ def _described(name: str, module: Any) -> KernelModule:
 
 
 def _blocks(name: str) -> tuple[int, ...]:
-    from nuno.solver import grid, shared, soft_blocks
+    from nuno.plans import block_plan, group_kernels, soft_block_plan
 
-    few, many = shared.FEW_THREADS, shared.MANY_THREADS
-    plain = name.rpartition("nuno.solver.")[2]
-    if plain in ("run_blocks", "run_blocks_partly", "run_fine_blocks", "run_fine_blocks_partly"):
+    few, many = block_plan.FEW_THREADS, block_plan.MANY_THREADS
+    plain = name.rpartition(".")[2]
+    if plain in ("run_blocks", "run_blocks_partly", "run_double_blocks", "run_double_blocks_partly"):
         return (few, many)
     if plain == "run_blocks_shared":
         return (few,)
-    if plain in ("run_grid", "run_fine_grid"):
-        return (grid.THREADS,)
+    if plain in ("run_grid", "run_double_grid"):
+        return (group_kernels.THREADS,)
     if plain.startswith("run_soft_blocks_shared"):
-        return (soft_blocks.MANY_THREADS,)
+        return (soft_block_plan.MANY_THREADS,)
     return (BLOCK,)

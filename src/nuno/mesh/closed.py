@@ -1,4 +1,4 @@
-"""Whether a mesh bounds a volume: closed, looking outwards, and not passing through itself."""
+"""Checks that a mesh bounds a volume: closed, looking outwards, and not passing through itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the triangles of a mesh pass through each other."""
+"""Crossings of a mesh with itself: triangles that pass through each other."""
 
 from __future__ import annotations
 

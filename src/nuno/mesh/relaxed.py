@@ -12,7 +12,7 @@ DEEP = 3
 """Edges from the boundary at which vertices stay where they are in the lattice: its voxels have the same numbers, which
 are stored once."""
 ROUNDS, AGAIN = 12, 5
-"""How often vertices of flat tetrahedra are let off their corner, edge or face, and the iterations after each time."""
+"""Rounds in which vertices of flat tetrahedra are let off their corner, edge or face, and the iterations after each."""
 LEAST_HEIGHT, WORST_HEIGHT = 0.3, 0.1
 """Smallest height of a tetrahedron, in the shortest edge of a voxel, that is aimed at, and that is accepted; 0.58 in
 a lattice."""

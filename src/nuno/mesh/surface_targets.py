@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from nuno.mesh.nearest import NearestOn
 
 FREE, LOOSE, FACE, EDGE, CORNER = range(5)
-"""What a vertex is bound to: nothing; the mesh, but it moves half of the way only; the mesh, a sharp edge, a corner."""
+"""Targets of a vertex: nothing; the mesh, but it moves half of the way only; the mesh, a sharp edge, a corner."""
 SHARP = np.cos(np.radians(45.0))
 """Of the angle between the normals of two faces: where it is larger, their edge is kept."""
 NEAR_EDGE, NEAR_CORNER = 0.7, 0.9
@@ -19,7 +19,7 @@ NEAR_EDGE, NEAR_CORNER = 0.7, 0.9
 
 @dataclass(frozen=True, eq=False)
 class SurfaceTargets:
-    """What each of n vertices is bound to.
+    """The targets of n vertices.
 
     Attributes:
         surface: The mesh's triangles.

@@ -17,7 +17,7 @@ its action and the topic of its state), "action_type", and "joint_names"."""
 
 
 class ControllerClient:
-    """What this program asked of one controller: its last goal.
+    """The client of one controller: the last goal that this program sent.
 
     Args:
         interface: The robot's.
@@ -41,7 +41,7 @@ class ControllerClient:
         return self.goal
 
     def is_interpolating(self) -> bool:
-        """Whether the last goal is under way."""
+        """Return whether the last goal is under way."""
         return self.goal is not None and not self.goal.is_done
 
     def wait_for_result(self, timeout: float = 0.0) -> bool:

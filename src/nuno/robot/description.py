@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from nuno import quaternion as quat
 from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotModelError, UnknownNameError
+from nuno.shapes import quaternion as quat
 from nuno.validation import count, finite_array, number
 
 KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
 ENTRY = ("urdf", "srdf", "posture", "frames", "feet", "cameras", "hands")
-"""What a table says of a robot; ``robots.toml`` explains it."""
+"""Entries of a robot's table; ``robots.toml`` explains them."""
 FileName = str | os.PathLike[str]
 
 
@@ -64,7 +64,7 @@ class CameraOnFrame:
 
 @dataclass(frozen=True, eq=False)
 class HandOnFrame:
-    """What a hand closes on, in the frame of the same name.
+    """The object that a hand closes on, in the frame of the same name.
 
     Attributes:
         low: (3,) float [m], lower corner of the volume between the open fingers.

@@ -29,7 +29,7 @@ SLACK = 1e-9
 
 @dataclass(frozen=True)
 class Footstep:
-    """Where a foot is put down.
+    """A pose at which a foot is put down.
 
     Attributes:
         foot: 0 left, 1 right.

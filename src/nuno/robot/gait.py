@@ -9,8 +9,8 @@ import numpy as np
 
 from nuno.errors import NunoError
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
+from nuno.robot.robot_state import RobotState
 from nuno.robot.simulated_joints import SimulatedJoints
-from nuno.robot.state import RobotState
 from nuno.robot.support import standing_place
 
 if TYPE_CHECKING:
@@ -49,11 +49,11 @@ class Gait:
 
     @property
     def is_walking(self) -> bool:
-        """Whether the robot is under way."""
+        """Return whether the robot is under way."""
         return self.walk is not None
 
     def moves(self, controller: str) -> bool:
-        """Whether the walk has the joints of a controller."""
+        """Return whether the walk has the joints of a controller."""
         return self.walk is not None and controller in self._names
 
     def plan(self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:

@@ -14,7 +14,7 @@ _numbers = itertools.count(1)
 
 
 class GoalStatus(IntEnum):
-    """Where a goal stands, numbered as in actionlib_msgs/GoalStatus."""
+    """The status of a goal, numbered as in actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -29,7 +29,7 @@ class GoalStatus(IntEnum):
 
 
 class ResultCode(IntEnum):
-    """How a trajectory ended, numbered as in control_msgs/FollowJointTrajectory."""
+    """The result of a trajectory, numbered as in control_msgs/FollowJointTrajectory."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -72,12 +72,12 @@ class Goal:
 
     @property
     def is_done(self) -> bool:
-        """Whether it has come to an end, of whichever kind."""
+        """Return whether it has come to an end, of whichever kind."""
         return self.status in ENDS
 
     @property
     def succeeded(self) -> bool:
-        """Whether what was asked for was done."""
+        """Return whether what was asked for was done."""
         return self.status == GoalStatus.SUCCEEDED
 
     def finish(self, status: GoalStatus, code: int | None = None, text: str = "") -> None:
@@ -89,7 +89,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How far joints may be from a trajectory; joints that are not named are free.
+    """Tolerances of joints along a trajectory; joints that are not named are free.
 
     Attributes:
         path: Along the way, by joint [rad; m for slides].

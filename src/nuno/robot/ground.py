@@ -10,7 +10,7 @@ GUESSES = 10
 FLAT = 1e-12
 """[m4] Determinant of the balance of corners that lie on a line: that of soles of a millimetre."""
 HEAVY = 1e4
-"""How much more the balance counts than an even spread, in the search for corner forces that only push."""
+"""Weight of the balance over that of an even spread, in the search for corner forces that only push."""
 
 
 def moment(arm: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.body import Body
-from nuno.coordinates import Coordinates, Pose, compose, invert
+from nuno.bodies.body import Body
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.grip import Grip
+from nuno.joints.grip import Grip
 from nuno.robot.description import HandOnFrame
 from nuno.robot.placement import pose_of
-from nuno.surface import SurfacePoints
+from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
+from nuno.shapes.surface import SurfacePoints
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Hand:
 
     @property
     def grips(self) -> tuple[Grip, ...]:
-        """What it holds with; a body that was detached or removed is no longer among them."""
+        """Return what it holds with; a body that was detached or removed is no longer among them."""
         return tuple(grip for grip in self._grips if grip.active)
 
     @property
@@ -70,7 +70,7 @@ class Hand:
 
     @property
     def width(self) -> float:
-        """How far apart the fingers are [m], by the joint as it is now; of a hand without a joint, when open."""
+        """Return how far apart the fingers are [m], by the joint as it is now; of a hand without a joint, when open."""
         own = self.description
         if own.joint is None:
             return own.width

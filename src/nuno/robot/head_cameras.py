@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.body import Body
+from nuno.bodies.body import Body
 from nuno.camera.camera import Camera
 from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
-from nuno.coordinates import Coordinates, compose
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.hands import carrier
 from nuno.robot.looks import looks_of
 from nuno.robot.sensor_model import EARLY
+from nuno.shapes.coordinates import Coordinates, compose
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ class HeadCameras:
 
 
 def _visual_bodies(links: Links) -> dict[Body, list[tuple[Body, Any]]]:
-    """What the links look like, by the bodies that stand for them in the world, and where in the bodies' frames."""
+    """Return the links' looks, by the bodies that stand for them in the world, and where in the bodies' frames."""
     drawn: dict[Body, list[tuple[Body, Any]]] = {body: [] for body in links.bodies}
     for look in looks_of(links):
         own = look.shape

@@ -12,19 +12,19 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nuno import quaternion as quat
 from nuno.camera.camera import Camera
-from nuno.coordinates import Coordinates, compose, invert
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.description import FileName, find_description
 from nuno.robot.placement import pose_of
 from nuno.robot.support import convex_outline
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Coordinates, compose, invert
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
-    from nuno.world import World
+    from nuno.world.world import World
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """A base at the origin, as a configuration has it."""
@@ -79,7 +79,7 @@ class Humanoid(Coordinates):
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Return what it is called."""
         return self.description.name
 
     # Joints
@@ -307,8 +307,8 @@ class Humanoid(Coordinates):
 
     @cached_property
     def geometry(self) -> Any:
-        """The meshes of the links (``nuno.robot.geometry.Geometry``), which are read on first use."""
-        from nuno.robot.geometry import Geometry
+        """The meshes of the links (``nuno.robot.link_geometry.Geometry``), which are read on first use."""
+        from nuno.robot.link_geometry import Geometry
 
         return Geometry(self)
 

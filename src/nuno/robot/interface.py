@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from nuno import quaternion as quat
-from nuno.coordinates import Coordinates, compose, invert
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.goal import Goal
 from nuno.robot.joint_interface import JointInterface
 from nuno.robot.readings import ImuReading
 from nuno.robot.support import standing_place, zero_moment_point
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Coordinates, compose, invert
 from nuno.validation import number
 
 logger = logging.getLogger(__name__)
@@ -93,7 +93,7 @@ class RobotInterface(JointInterface):
 
     @property
     def odom(self) -> Coordinates:
-        """Where the base link is in the world, as odometry tells."""
+        """Return where the base link is in the world, as odometry tells."""
         return self.read_base()
 
     def go_pos(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, wait: bool = True) -> bool:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.path import minimum_jerk
 from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.known_joints import KnownJoints
 from nuno.robot.trajectory import JointTrajectory
+from nuno.shapes.path import minimum_jerk
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:

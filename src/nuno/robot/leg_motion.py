@@ -31,7 +31,7 @@ LONGEST_STEP = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What is wanted, over n ticks.
+    """Targets of the legs over n ticks.
 
     Attributes:
         feet: (n, 2, 4) float, x, y, z [m] and yaw [rad] of the soles, which are level.

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from nuno import quaternion as quat
-from nuno.body import Body
-from nuno.coordinates import Pose
+from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.motion import Company, Convoy
 from nuno.robot.spatial_arrays import placement_arrays
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Pose
+from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
 from nuno.validation import number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
-    from nuno.world import World
+    from nuno.world.world import World
 
 MESHES = ("collision", "visual")
 
@@ -66,7 +66,7 @@ class Links:
         self._placements = robot.data.oMi.tolist()
         self._joint_axes, self._joint_places = placement_arrays(self._placements)
         self._inside = True
-        self._company = Company(self._keys)
+        self._kinematic_group = KinematicGroup(self._keys)
         for body in self.bodies:
             body._links = self  # a viewer draws the robot's visual meshes in their place
         positions, quaternions = self.poses()
@@ -107,10 +107,10 @@ class Links:
                 places, turns = np.empty((len(positions), 2, 3)), np.empty((len(positions), 2, 4))
                 places[:, 0], places[:, 1] = start[0], positions
                 turns[:, 0], turns[:, 1] = start[1], quaternions
-            company = self._company
-            company.convoy = Convoy(self._keys, times, places, turns)
-            if [body._path for body in self.bodies] != company.paths:
-                for body, path in zip(self.bodies, company.paths, strict=True):
+            kinematic_group = self._kinematic_group
+            kinematic_group.path_batch = PathBatch(self._keys, times, places, turns)
+            if [body._path for body in self.bodies] != kinematic_group.paths:
+                for body, path in zip(self.bodies, kinematic_group.paths, strict=True):
                     if body._path is None:  # the first time, and after anything else took the body elsewhere
                         self.world.move(body, path)
                     else:  # what ``World.move`` does to a body that follows a path already
@@ -121,10 +121,10 @@ class Links:
 
     def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
-        convoy = self._company.convoy
-        if convoy is not None and convoy.arrived is not None and convoy.arrived[0] == self.world.time:
-            if [body._path for body in self.bodies] == self._company.paths:
-                return convoy.arrived[1:]
+        path_batch = self._kinematic_group.path_batch
+        if path_batch is not None and path_batch.arrived is not None and path_batch.arrived[0] == self.world.time:
+            if [body._path for body in self.bodies] == self._kinematic_group.paths:
+                return path_batch.arrived[1:]
         return np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
 
     def leave(self) -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.body import Body
-from nuno.dynamics import ParticleDynamics
-from nuno.held_points import held_points
+from nuno.bodies.body import Body
+from nuno.bodies.dynamics import ParticleDynamics
+from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
 from nuno.robot.static_boxes import StaticBoxes
@@ -24,7 +24,7 @@ NEAR = 4e-3
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What a body does to a link.
+    """The load of a body on a link.
 
     Attributes:
         link: Which of the links' bodies bears it.
@@ -41,7 +41,7 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """How a body moves at a time [s].
+    """The motion of a body at a time [s].
 
     Attributes:
         time: [s].
@@ -162,7 +162,7 @@ class LinkLoads:
         return Load(min(links, key=self._joints.__getitem__), np.zeros(3), -missing[:3], -missing[3:])
 
     def _asked(self, body: Body) -> list[Load]:
-        """What the solver says of the body's contacts with links."""
+        """Return what the solver says of the body's contacts with links."""
         names = {other.name: k for other, k in self._index.items()}
         found = self._world.contacts(body)
         nothing = np.zeros(3)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
-from nuno.coordinates import Pose, compose, invert
-from nuno.robot.geometry import LinkShape
+from nuno.robot.link_geometry import LinkShape
+from nuno.shapes.coordinates import Pose, compose, invert
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nuno import quaternion as quat
-from nuno.coordinates import Pose
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Pose
 
 
 def quaternion_of(rotation: np.ndarray) -> np.ndarray:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, MissingPackageError, RobotModelError
 from nuno.robot.support import distance_inside, edges_of
+from nuno.shapes.coordinates import Coordinates
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ DAMPING = 1e-4
 POSTURE_WEIGHTS = (1e-2, 1e-3)
 """Of staying near the start, first and when the hands are near: 1e-2 holds them 1 mm away, 1e-3 does not."""
 TRUNK_SHARE = 3.0
-"""How much larger that weight is for joints that carry the stance or a fourth of the mass: the arms move first."""
+"""Factor of that weight for joints that carry the stance or a fourth of the mass: the arms move first."""
 LARGEST_RETURN = 0.005
 """[m] By which a step may have to take the centre of mass back inside."""
 STEADY_FEET = 1e-4
@@ -40,7 +40,7 @@ STEADY_FEET = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """What came of reaching; true in a condition where all targets are reached.
+    """The result of reaching; true in a condition where all targets are reached.
 
     Attributes:
         reached: Whether a configuration was found that keeps all conditions.

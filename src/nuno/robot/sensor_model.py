@@ -19,7 +19,7 @@ EARLY = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class SensorModel:
-    """How a sensor departs from the truth; as it is made, not at all.
+    """Errors of a sensor: rate, delay, noise and bias; none by default.
 
     Attributes:
         noise: Standard deviation of each sample, independent and normal, in the quantity's unit: a number, or one for

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nuno import quaternion as quat
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.ground import Soles, lowest_corners, moment
 from nuno.robot.imu import InertialUnit
 from nuno.robot.loads import LinkLoads, Load
+from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import Channel, SensorModel
 from nuno.robot.spatial_arrays import placement_arrays, spatial_array
-from nuno.robot.state import RobotState
 from nuno.robot.support import zero_moment_point
 from nuno.robot.wrenches import WrenchSensor
+from nuno.shapes import quaternion as quat
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ CONTACT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What all sensors tell at one time; each is what it was when its last sample was taken.
+    """Readings of all sensors at one time; each is what it was when its last sample was taken.
 
     Attributes:
         time: [s], of the world, when they were read.
@@ -241,7 +241,7 @@ class Sensors:
         return zero_moment_point(force, torque, self.ground)
 
     def _felt_links(self, sensor: WrenchSensor) -> list[bool]:
-        """Which of the bodies in the world are links beyond a sensor, of those that its joint carries."""
+        """Return which of the bodies in the world are links beyond a sensor, of those that its joint carries."""
         if self.links is None:
             return []
         return [sensor.feels(link) for link in self.links.names]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgesv
 
 from nuno.errors import InvalidInputError
-from nuno.robot.state import RobotState
+from nuno.robot.robot_state import RobotState
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ PERIOD = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ServoCommand:
-    """What the motors of some joints do from now on: tau + kp (q - angle) + kd (dq - velocity).
+    """The torque law of some joints' motors from now on: tau + kp (q - angle) + kd (dq - velocity).
 
     All but the names are (m,) or one number for all joints.
 

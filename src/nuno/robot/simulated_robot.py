@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.background import LATE
-from nuno.coordinates import Coordinates
 from nuno.errors import BodyStateError, InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.gait import Gait
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
@@ -18,20 +16,22 @@ from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
 from nuno.robot.readings import ImuReading, JointState
+from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
 from nuno.robot.sensors import Readings, Sensors
 from nuno.robot.servo import Servo, ServoCommand, external_forces
 from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.stance import Stance
-from nuno.robot.state import RobotState
 from nuno.robot.trajectory import JointTrajectory, Motion
+from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
+from nuno.world.background import LATE
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
-    from nuno.world import World
+    from nuno.world.world import World
 
 
 class SimulatedRobot(RobotInterface):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno import quaternion as quat
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
-    from nuno.world import World
+    from nuno.world.world import World
 
 
 class StaticBoxes:

@@ -281,7 +281,7 @@ def _corrected(
 
 
 def _motion(step: float) -> tuple[np.ndarray, np.ndarray]:
-    """What a time step does to (place, velocity), and the covariance that it adds: a random, constant acceleration."""
+    """Return a time step's effect on (place, velocity), and its covariance: a random, constant acceleration."""
     effect = np.concatenate([0.5 * step**2 * np.eye(3), step * np.eye(3)])
     move = np.eye(6)
     move[:3, 3:] = step * np.eye(3)
@@ -296,7 +296,7 @@ def _linear(cameras: tuple[Camera, Camera], points: np.ndarray, pixels: np.ndarr
 
 
 def _slopes(camera: Camera, points: np.ndarray) -> np.ndarray:
-    """How pixels change with points (k, 3): (k, 2, 3) [px/m], distortion included."""
+    """Return how pixels change with points (k, 3): (k, 2, 3) [px/m], distortion included."""
     step = 1e-5  # [m]; pixels are computed to 1e-12 of their size
     moves = step * np.eye(3)
     ahead, behind = (camera.project(points[:, None] + sign * moves) for sign in (1.0, -1.0))
@@ -304,7 +304,7 @@ def _slopes(camera: Camera, points: np.ndarray) -> np.ndarray:
 
 
 def _on_unit_plane(camera: Camera, pixels: np.ndarray) -> np.ndarray:
-    """Where rays of pixels (k, 2) are at one metre of depth, (k, 2) float64 [m], in the camera's frame."""
+    """Return where rays of pixels (k, 2) are at one metre of depth, (k, 2) float64 [m], in the camera's frame."""
     rays = camera.rays(pixels) @ camera.camera_to_world[:3, :3]
     return np.ascontiguousarray(rays[:, :2])
 

@@ -22,7 +22,7 @@ TURN = 0.25
 
 @dataclass(frozen=True)
 class Stride:
-    """How a robot walks; ``Stride.of(robot)`` has values for a robot, ``dataclasses.replace`` changes some.
+    """The stride of a robot; ``Stride.of(robot)`` has values for a robot, ``dataclasses.replace`` changes some.
 
     Attributes:
         step_length: How far a step brings the robot ahead at most [m].

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.path import minimum_jerk
 from nuno.robot.footsteps import Footstep, middle_of
 from nuno.robot.preview_control import TICK
 from nuno.robot.stride import Stride
+from nuno.shapes.path import minimum_jerk
 
 BOTH, LEFT_STANDS, RIGHT_STANDS = 0, 1, 2
-"""Which feet bear the robot."""
+"""Phases of support: the feet that bear the robot."""
 UPRIGHT = 0.08
 """Share of a swing in which the foot goes only up, and again only down: a sole does not scrape along the floor."""
 
@@ -43,30 +43,30 @@ class Schedule:
 
     @property
     def single(self) -> int:
-        """How long a foot is in the air [tick]."""
+        """Return how long a foot is in the air [tick]."""
         return _ticks(self.stride.single_support)
 
     @property
     def double(self) -> int:
-        """How long both stand between two steps [tick]."""
+        """Return how long both stand between two steps [tick]."""
         return _ticks(self.stride.double_support)
 
     @property
     def move(self) -> int:
-        """How long the point takes from a foot to the other before a step, at most [tick]."""
+        """Return how long the point takes from a foot to the other before a step, at most [tick]."""
         return _ticks(0.5 * self.stride.shift)
 
     def lift_off(self, k: int) -> int:
-        """When step k leaves the ground [tick]."""
+        """Return when step k leaves the ground [tick]."""
         return self.begin + self.lead + k * (self.single + self.double)
 
     def landing(self, k: int) -> int:
-        """When step k stands [tick]."""
+        """Return when step k stands [tick]."""
         return self.lift_off(k) + self.single
 
     @property
     def end(self) -> int:
-        """When the robot has come to rest [tick]."""
+        """Return when the robot has come to rest [tick]."""
         last = self.landing(len(self.steps) - 1) if self.steps else self.begin
         return last + _ticks(self.stride.shift) + _ticks(self.stride.settle)
 
@@ -88,7 +88,7 @@ class Schedule:
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """What is wanted at every tick, from ``begin`` on.
+    """Targets of a walk at every tick, from ``begin`` on.
 
     Attributes:
         begin: The first tick.

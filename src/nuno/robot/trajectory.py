@@ -65,7 +65,7 @@ class JointTrajectory:
 
     @property
     def duration(self) -> float:
-        """When the last point is due [s]."""
+        """Return when the last point is due [s]."""
         return float(self.times[-1])
 
     def of(self, names: Sequence[str]) -> JointTrajectory:
@@ -124,7 +124,7 @@ class Spline:
 
     @property
     def end(self) -> float:
-        """When the last point is due [s]."""
+        """Return when the last point is due [s]."""
         return self.start + self.trajectory.duration
 
     @property

@@ -20,7 +20,7 @@ SOON = 1e-9
 
 
 class Feedback(NamedTuple):
-    """How a trajectory is being followed.
+    """Feedback of a trajectory that is being followed.
 
     Attributes:
         time: [s] of the controller's clock.
@@ -83,7 +83,7 @@ class TrajectoryController:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a goal is under way."""
+        """Return whether a goal is under way."""
         return self.goal is not None and not self.goal.is_done
 
     def accept(

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from nuno.robot.footsteps import Footstep
-from nuno.robot.state import RobotState
+from nuno.robot.robot_state import RobotState
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Walk:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Return how long it takes [s]."""
         return float(self.times[-1] - self.times[0])
 
     def configuration_at(self, time: float) -> np.ndarray:

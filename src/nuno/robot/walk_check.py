@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nuno import quaternion as quat
 from nuno.errors import WalkError
 from nuno.robot.ground import Soles, moment
 from nuno.robot.stride import two_feet
 from nuno.robot.support import convex_outline, edges_of
 from nuno.robot.timeline import BOTH, LEFT_STANDS, Timeline
+from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -29,7 +29,7 @@ FLOOR_FRICTION = 0.6
 
 @dataclass(frozen=True)
 class WalkMeasures:
-    """How far a walk is from what a robot cannot do.
+    """Margins of a walk to what a robot cannot do.
 
     Attributes:
         margin: How far inside the outline of the soles that stand the zero moment point stays [m].

@@ -31,12 +31,12 @@ LEVEL = 0.01
 SAME_HEIGHT = 0.002
 """[m] By which soles may then differ in height."""
 TRIES = 3
-"""How many more steps may be made as they were planned, when a walk is changed."""
+"""Further steps that may be made as they were planned, when a walk is changed."""
 
 
 @dataclass(frozen=True, eq=False)
 class WalkPlan:
-    """What a walk was made from, and the states of both passes at its ticks."""
+    """The plan of a walk: what it was made from, and the states of both passes at its ticks."""
 
     planner: WalkPlanner
     schedule: Schedule
@@ -49,7 +49,7 @@ class WalkPlan:
 
 
 class WalkPlanner:
-    """What stays the same when a walk is changed under way; arguments are those of ``plan_walk``.
+    """A planner of walks that may change under way; arguments are those of ``plan_walk``.
 
     Attributes:
         robot: A copy of the robot, as it stands when the walk begins.

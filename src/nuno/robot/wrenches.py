@@ -59,11 +59,11 @@ class WrenchSensor:
         self._velocity, self._acceleration = data.v[self.joint], data.a_gf[self.joint]
 
     def feels(self, link: str) -> bool:
-        """Whether a link that its own joint carries lies beyond the sensor."""
+        """Return whether a link that its own joint carries lies beyond the sensor."""
         return self.feels_all or link in self._links
 
     def carries(self, joint: int) -> bool:
-        """Whether a joint other than its own lies beyond the sensor."""
+        """Return whether a joint other than its own lies beyond the sensor."""
         return joint in self._carried
 
     def read(self, before: np.ndarray | float = 0.0) -> np.ndarray:

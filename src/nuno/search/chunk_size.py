@@ -1,4 +1,4 @@
-"""How many worlds go into a batch: as many as help, fit the memory, and finish soon enough to be worth recording."""
+"""The size of a batch: as many worlds as help, fit the memory, and finish soon enough to be worth recording."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ WINDOW = 256
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a worker is sent.
+    """A task as a worker gets it.
 
     Attributes:
         trial: The trial.

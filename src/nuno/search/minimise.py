@@ -17,7 +17,7 @@ from nuno.search.sweep import check_trial, outcomes
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, make_source
 from nuno.validation import count, number
-from nuno.world import World
+from nuno.world.world import World
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class Generation:
-    """What one generation of a minimisation found.
+    """One generation of a minimisation.
 
     Attributes:
         best: The lowest value in it; NaN where all failed.
@@ -43,7 +43,7 @@ class Generation:
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """What a minimisation found.
+    """The result of a minimisation.
 
     Attributes:
         params: The parameters of the lowest value.
@@ -185,7 +185,7 @@ def minimise(
 
 
 class _Tried:
-    """All that a minimisation has tried so far.
+    """The trials of a minimisation so far.
 
     Args:
         value: Name of what the trials return that shall be low.

@@ -12,10 +12,10 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, ResultsInUseError, ResultsMismatchError
+from nuno.files.whole_file import replacing
 from nuno.search.parameters import Parameters
 from nuno.search.trial import Trial
 from nuno.search.values import as_json, from_json
-from nuno.whole_file import replacing
 
 FORMAT, VERSION = "nuno sweep", 1
 LARGE = 1000

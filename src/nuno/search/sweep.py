@@ -23,14 +23,14 @@ from nuno.search.rows import run_rows
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, WorldSource, make_source
 from nuno.validation import count
-from nuno.world import World
+from nuno.world.world import World
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """What a sweep found.
+    """The result of a sweep.
 
     Attributes:
         params: Parameters by name, (n, ...), one row for each trial; of a file that is read, for each in the file.
@@ -52,12 +52,12 @@ class SweepResult:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every trial has finished, or failed."""
+        """Return whether every trial has finished, or failed."""
         return all(trial is not None for trial in self.trials)
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why trials failed, by index."""
+        """Return why trials failed, by index."""
         return {trial.index: trial.error for trial in self.trials if trial is not None and trial.error is not None}
 
     @property

@@ -1,4 +1,4 @@
-"""What a trial returns: arrays by name, as rows of single trials, and as JSON."""
+"""Values of a trial: arrays by name, as rows of single trials, and as JSON."""
 
 from __future__ import annotations
 

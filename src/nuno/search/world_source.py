@@ -1,4 +1,4 @@
-"""Where the worlds of trials come from: copies of one world, made anew or restored in every process."""
+"""Sources of the worlds of trials: copies of one world, made anew or restored in every process."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nuno.device import checked_device, found_device
 from nuno.errors import InvalidInputError
 from nuno.search.device_share import own_device
 from nuno.search.trial import check_importable, name_of
-from nuno.snapshot import Snapshot
-from nuno.world import World
+from nuno.world.device import checked_device, found_device
+from nuno.world.snapshot import Snapshot
+from nuno.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
 class WorldSource:
-    """What makes the world that trials get copies of, in any process.
+    """The source of the world that trials get copies of, in any process.
 
     Attributes:
         function: Returns the world; None where ``snapshot`` holds it, or trials get no world.
@@ -101,7 +101,7 @@ class Worlds:
 
     @property
     def device(self) -> str:
-        """Where the copies run, "cpu" or "cuda:0" ..."""
+        """Return where the copies run, "cpu" or "cuda:0" ..."""
         if self._device is not None:
             return found_device(self._device)
         return "cpu" if self._world is None else self._world.device

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, ReachError, RobotModelError
 from nuno.robot.placement import quaternion_of
 from nuno.robot.support import distance_inside, standing_place
+from nuno.shapes.coordinates import Coordinates
 from nuno.tasks.fold_motion import FoldMotion
 from nuno.tasks.obstacles import Obstacles
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
     from nuno.robot.humanoid import Humanoid
 
 log = logging.getLogger(__name__)
@@ -51,12 +51,12 @@ MARGIN = 0.02
 SPARE = 0.9
 """Of the velocity limits, what a planned motion uses at most: a cubic's peak is above its mean."""
 STOPS = 200
-"""How many stops are tried on the way to the cloth, where the straight line to it is not free."""
+"""Stops that are tried on the way to the cloth, where the straight line to it is not free."""
 
 
 @dataclass(frozen=True, eq=False)
 class ArmPlan:
-    """How a robot is to move.
+    """A plan of a robot's motion.
 
     Attributes:
         hands: By hand of the motion, the robot's that does its part: "left_hand" or "right_hand".

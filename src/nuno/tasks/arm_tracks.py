@@ -1,4 +1,4 @@
-"""Where a robot's arms are along several motions: all that carrying needs to know of a robot, and a file of it."""
+"""Tracks of a robot's arms along several motions: all that carrying needs to know of a robot, and a file of it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, NunoError
-from nuno.shape import Box, Hull, Shape
-from nuno.whole_file import replacing
+from nuno.files.whole_file import replacing
+from nuno.shapes.shape import Box, Hull, Shape
 
 FORMAT = 1
 FRAME_RATE = 60.0
@@ -23,7 +23,7 @@ BY_SHAPE = ("positions", "quaternions")
 
 @dataclass(frozen=True, eq=False)
 class ArmTracks:
-    """Where the shapes of a robot's arms are along walks, one for each distance between the hands.
+    """Poses of the shapes of a robot's arms along walks, one for each distance between the hands.
 
     Attributes:
         robot: Its name.

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nuno import quaternion as quat
-from nuno.coordinates import Coordinates
 from nuno.errors import InvalidInputError, RobotModelError
-from nuno.robot.geometry import LinkShape
+from nuno.robot.link_geometry import LinkShape
 from nuno.robot.placement import quaternion_of
-from nuno.shape import Box, Hull, TriangleMesh
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Coordinates
+from nuno.shapes.shape import Box, Hull, TriangleMesh
 from nuno.tasks.simple_hull import simple_hull
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def hands_level(robot: Humanoid, distance: float, forward: float, height: float)
 
 @dataclass(frozen=True, eq=False)
 class ArmMotion:
-    """Where arms are along a motion.
+    """Poses of arms along a motion.
 
     Attributes:
         base: (k, 3) [m], of the robot's base link.

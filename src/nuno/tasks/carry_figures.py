@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies import mesh
+from nuno.bodies.make_bodies import mesh
 from nuno.camera.camera import Camera
-from nuno.color import rgb
-from nuno.tasks.onlooker import onlooker
-from nuno.world import World
+from nuno.shapes.color import rgb
+from nuno.tasks.look_at_camera import look_at_camera
+from nuno.world.world import World
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,7 +93,7 @@ def picture(robot: Humanoid, q: np.ndarray, vertices: np.ndarray, faces: np.ndar
     world.add(mesh((vertices, faces), color=MAT))
     colours = np.array([*(rgb(body.color) for body in world.bodies), (0.0, 0.0, 0.0)])
     colours[:-2] = 0.35 + 0.55 * colours[:-2]  # Talos' black parts would be flat spots
-    camera = onlooker(EYE, AIM, WIDTH, HEIGHT, FOCAL)
+    camera = look_at_camera(EYE, AIM, WIDTH, HEIGHT, FOCAL)
     depth, ids = world.depth(camera).numpy(), world.ids(camera).numpy()
     return _shaded(camera, depth, ids, colours)
 

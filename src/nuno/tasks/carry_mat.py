@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.bodies import sheet, soft_box
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import sheet, soft_box
 from nuno.errors import InvalidInputError, RobotModelError
 from nuno.materials import Cloth, Material, Soft
 from nuno.search.sweep import sweep

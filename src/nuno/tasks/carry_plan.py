@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.body import Body
+from nuno.bodies.body import Body
 from nuno.materials import Material
 from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
 from nuno.tasks.carry_trials import CarryPlan, mat_size

@@ -1,4 +1,4 @@
-"""What came of carrying a mat in many ways: a table, files, and pictures."""
+"""The result of carrying a mat in many ways: a table, files, and pictures."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
+from nuno.files.whole_file import replacing
 from nuno.tasks.arm_tracks import FRAME_RATE
 from nuno.tasks.carry_trials import CarryPlan, carry, make_room
-from nuno.whole_file import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +46,7 @@ class CarryTrial:
 
 @dataclass(frozen=True, eq=False)
 class CarryResult:
-    """What came of carrying a mat in many ways.
+    """The result of carrying a mat in many ways.
 
     Attributes:
         trials: By arm distance, then offset in x, then in y.

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from nuno import quaternion as quat
-from nuno.bodies import plane
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import plane
 from nuno.errors import InvalidInputError
 from nuno.materials import Cloth, Material
-from nuno.path import Path, minimum_jerk
-from nuno.shape import Box, Shape
+from nuno.shapes import quaternion as quat
+from nuno.shapes.path import Path, minimum_jerk
+from nuno.shapes.shape import Box, Shape
 from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
-from nuno.world import World
+from nuno.world.world import World
 
 CHUNK = 30
 """Frames for which the arms' poses are handed over at once: what one run of the solver takes."""
@@ -37,7 +37,7 @@ CALM = 6.0
 
 @dataclass(frozen=True, eq=False)
 class CarryPlan(ArmTracks):
-    """What all trials have in common: the arms' tracks, and what they carry how.
+    """The plan that all trials share: the arms' tracks, and what they carry how.
 
     Attributes:
         mat: The mat's shape; its x and y axes lie along the robot's.
@@ -64,7 +64,7 @@ class CarryPlan(ArmTracks):
 
 @dataclass(frozen=True, eq=False)
 class CarryOutcome:
-    """What came of some trials.
+    """The outcome of some trials.
 
     Attributes:
         value: (trials,) [m s], F; NaN where the mat fell.

@@ -12,7 +12,7 @@ from nuno.errors import InvalidInputError
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
 
 CORNERS = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 """u, v of the corners, in their order."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nuno.estimate.layers import Layers, find_layers
-from nuno.surface import closest_points
+from nuno.shapes.surface import closest_points
 from nuno.tasks.fold_motion import FoldMotion
 from nuno.validation import finite_array
 

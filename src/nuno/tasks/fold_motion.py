@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError
-from nuno.path import Path
+from nuno.shapes.path import Path
 from nuno.tasks.cloth_frame import ClothFrame
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
     from nuno.tasks.taught_fold import TaughtFold
-    from nuno.world import World
+    from nuno.world.world import World
 
 MOVED = 0.02
 """[m] A cloth of which a vertex is farther than this from where the motion begins is not as it was planned for."""
@@ -27,7 +27,7 @@ SETTLE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class FoldMotion:
-    """How points of a cloth are to be carried.
+    """The motion by which points of a cloth are to be carried.
 
     Attributes:
         frame: The cloth as it lies before.
@@ -51,7 +51,7 @@ class FoldMotion:
 
     @property
     def hand_count(self) -> int:
-        """How many hands it takes."""
+        """Return how many hands it takes."""
         return len(self.held)
 
     @cached_property

@@ -10,12 +10,12 @@ import numpy as np
 from nuno.robot.head_cameras import HeadCameras
 from nuno.robot.simulated_robot import SimulatedRobot
 from nuno.robot.support import standing_place
-from nuno.tasks.onlooker import onlooker
+from nuno.tasks.look_at_camera import look_at_camera
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nuno.body import Body
+    from nuno.bodies.body import Body
 
 AHEAD, ASIDE, OVER = 1.15, -0.85, 0.6
 """[m] From the cloth to the camera, as the robot sees it."""
@@ -42,7 +42,7 @@ class FoldPictures:
         middle = np.asarray(cloth.vertices).mean(axis=0)
         c, s = math.cos(yaw), math.sin(yaw)
         eye = middle + np.array((c * AHEAD - s * ASIDE, s * AHEAD + c * ASIDE, OVER))
-        self.camera = onlooker(eye, middle + np.array((0.0, 0.0, LIFTED)), WIDTH, HEIGHT, FOCAL)
+        self.camera = look_at_camera(eye, middle + np.array((0.0, 0.0, LIFTED)), WIDTH, HEIGHT, FOCAL)
         self.pictures: dict[str, np.ndarray] = {}
 
     def __call__(self, moment: str) -> None:

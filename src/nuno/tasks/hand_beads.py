@@ -5,14 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from nuno.bodies import sphere
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import sphere
 from nuno.camera.camera import Camera
-from nuno.color import linear, rgb
-from nuno.coordinates import Coordinates
 from nuno.errors import EstimationError
 from nuno.robot.hands import carrier
 from nuno.robot.links import Links
+from nuno.shapes.color import linear, rgb
+from nuno.shapes.coordinates import Coordinates
 
 BEAD = 0.014
 """[m] Radius."""

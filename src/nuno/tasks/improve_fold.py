@@ -7,21 +7,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from nuno.body import Body
+from nuno.bodies.body import Body
 from nuno.errors import InvalidInputError, SimulationDiverged
 from nuno.estimate.imagined_fold import batched
 from nuno.materials import Cloth
 from nuno.search.minimise import Minimum, minimise
 from nuno.tasks.fold_motion import SETTLE, FoldMotion, world_without_robots
 from nuno.validation import count, number
-from nuno.world import World
+from nuno.world.world import World
 
 FARTHEST = 0.25
 """Share of the longer side by which a way may end elsewhere than it was taught."""
 HEIGHTS = (0.6, 1.5)
 """Factors of the ways' height."""
 SHARES = np.linspace(0.25, 2.0, 8)
-"""What the corners are off is first taken off the ways' ends in these shares: a cloth that is dragged along needs more
+"""Shares of the corners' errors that are first taken off the ways' ends: a cloth that is dragged along needs more
 or less than all of it."""
 STEP = 0.04
 """Standard deviation of the first guesses around the best of these, as a share of the ranges."""

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from nuno.bodies import box, plane, soft_box
+from nuno.bodies.make_bodies import box, plane, soft_box
 from nuno.errors import EstimationError, InvalidInputError
 from nuno.materials import Soft
-from nuno.path import Path
 from nuno.search.sweep import sweep
+from nuno.shapes.path import Path
 from nuno.validation import count, number
-from nuno.world import World
+from nuno.world.world import World
 
 RUBBER = Soft(density=200.0, youngs_modulus=2e4, poisson_ratio=0.3, friction=0.5, damping=0.01)
 CLOSE, LIFT, HOLD = 0.5, 2.0, 1.0
@@ -39,7 +39,7 @@ ACROSS = 1
 
 @dataclass(frozen=True, eq=False)
 class LiftResult:
-    """Which squeezes hold a soft cube.
+    """The squeezes that hold a soft cube.
 
     Attributes:
         squeezes: (n,) [m], how far each hand pressed into the face that it touches, rising.
@@ -186,7 +186,7 @@ def _room(size: float, cells: int, friction: float, device: str, substeps: int |
 
 
 def _held(sunk: np.ndarray, slip: np.ndarray) -> np.ndarray:
-    """Whether a cube came along, by at least half of the way, and stays where it is."""
+    """Return whether a cube came along, by at least half of the way, and stays where it is."""
     return (sunk < 0.5 * RISE) & (slip < SLIP)
 
 

@@ -1,4 +1,4 @@
-"""What is read of a carried mat at every frame, on the device: where its middle is, and how near the arms are."""
+"""Measures of a carried mat at every frame, taken on the device: where its middle is, and how near the arms are."""
 
 # Warp: kernels are Python to a type checker, but not with Python's types
 # mypy: disable-error-code="misc, index, valid-type"
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.scene.colliders import spread
-from nuno.shape import Hull, Shape
+from nuno.shapes.shape import Hull, Shape
+from nuno.tables.colliders import spread
 from nuno.tasks.arm_tracks import ArmTracks
 
 FAR = wp.constant(1.0e6)
@@ -49,7 +49,7 @@ def see_gaps(
     # out
     gap_out: wp.array3d(dtype=float),
 ):
-    """How far each arm's shapes are from the nearest vertex, 0 where one is inside."""
+    """Measure how far each arm's shapes are from the nearest vertex, 0 where one is inside."""
     world, s = wp.tid()
     side = sides[s]
     if side < 0:
@@ -71,7 +71,7 @@ def see_gaps(
 
 
 class MatSight:
-    """What was read in each frame of a run, kept on the device until it ends.
+    """Measures of each frame of a run, kept on the device until it ends.
 
     Args:
         tracks: Of the arms.

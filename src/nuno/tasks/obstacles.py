@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from nuno.shape import Box, Capsule, Cylinder, Plane, Sphere
+from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
     from nuno.robot.humanoid import Humanoid
 
 

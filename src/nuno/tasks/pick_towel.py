@@ -12,31 +12,31 @@ from typing import Any
 
 import numpy as np
 
-from nuno.bodies import box, plane, sheet
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import box, plane, sheet
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.regions import grow
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
-from nuno.coordinates import Coordinates
 from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
 from nuno.materials import Cloth
-from nuno.path import Path, minimum_jerk
 from nuno.robot.head_cameras import STEREO, HeadCameras
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.interface import RobotInterface
 from nuno.robot.links import Links
 from nuno.robot.stereo import triangulate
+from nuno.shapes.coordinates import Coordinates
+from nuno.shapes.path import Path, minimum_jerk
 from nuno.tasks.hand_beads import BEAD_AT, find_bead, put_beads
-from nuno.world import World
+from nuno.world.world import World
 
 LEAN = {"torso_1_joint": 0.0, "torso_2_joint": 0.45, "head_1_joint": 0.785, "head_2_joint": 0.0}
 """[rad] How Talos looks down on the table: the trunk forward, the head as far down as it goes."""
 TRUNK = ("base_link", "torso_2_link")
-"""What keeps its place while an arm reaches, and the head with it: all images are taken from one place."""
+"""Frames that keep their place while an arm reaches, and the head with it: all images are taken from one place."""
 ARMS = {"left_hand": "larm", "right_hand": "rarm"}
 DOWN = (0.0, 1.0, 0.0, 0.0)
 """Of a hand that points straight down, (w, x, y, z)."""
@@ -63,7 +63,7 @@ RIM = 3
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """What the robot saw at one time, and what it knows of itself then.
+    """The robot's view at one time, and what it knows of itself then.
 
     Attributes:
         images: RGB (h, w, 3) uint8 by camera.
@@ -78,7 +78,7 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """At which point the robot says it holds the towel.
+    """The point at which the robot says it holds the towel.
 
     Attributes:
         pick: (i, j) of the candidates' grid.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from nuno.body import Body
+from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, EstimationError, InvalidInputError
 from nuno.robot.simulated_robot import SimulatedRobot
 from nuno.tasks.arm_plan import ArmPlan, plan_arms
@@ -27,7 +27,7 @@ SOON = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PlayedFold:
-    """What a robot has done to a cloth.
+    """A fold as a robot has played it on a cloth.
 
     Attributes:
         motion: What it was to do.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nuno.shape import Hull
+from nuno.shapes.shape import Hull
 
 NARROWER = 0.75
 """A hull that turns out too far off is tried again with this much less room."""

@@ -18,9 +18,9 @@ from nuno.tasks.fold_motion import FoldMotion, bent
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
-    from nuno.body import Body
+    from nuno.bodies.body import Body
     from nuno.estimate.fold_result import FoldResult
-    from nuno.world import World
+    from nuno.world.world import World
 
 BORDER = 0.1
 """Share of a side within which a hand is taken to hold the border: what a hand in a video is off, with its radius."""

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.bodies import box, plane, sheet
-from nuno.body import Body
+from nuno.bodies.body import Body
+from nuno.bodies.make_bodies import box, plane, sheet
 from nuno.camera.picture import Chequer
 from nuno.camera.table import Table
 from nuno.errors import BodyStateError
-from nuno.held_points import held_points
+from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.head_cameras import STEREO, HeadCameras
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.simulated_robot import SimulatedRobot
 from nuno.tasks.hand_beads import put_beads
 from nuno.tasks.pick_towel import TRUNK
-from nuno.world import World
+from nuno.world.world import World
 
 TABLE = Table(0.72, (0.42, 0.6), (0.77, 0.0), 0.04)
 TOWEL = (0.4, 0.3)

@@ -1,4 +1,4 @@
-"""Changes: what a page is told of what has changed on the stage."""
+"""Changes: what a page is told of what has changed on the scene."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from nuno.viewer.actor import Actor
+from nuno.viewer.scene_object import SceneObject
 
 
-def changes(left: Sequence[int], entered: Sequence[Actor], moved: Sequence[Actor]) -> list[dict[str, Any]]:
+def changes(left: Sequence[int], entered: Sequence[SceneObject], moved: Sequence[SceneObject]) -> list[dict[str, Any]]:
     """Return the commands that bring a page from the look before to this one.
 
     Args:
-        left: The numbers of actors that are there no more.
-        entered: Actors that are new.
+        left: The numbers of scene objects that are there no more.
+        entered: Scene objects that are new.
         moved: Those that are elsewhere, or of another form.
     """
     commands: list[dict[str, Any]] = []
     if left:
         commands.append({"do": "leave", "ids": left})
-    commands += [actor.entrance() for actor in entered]
-    placed = [actor for actor in moved if actor.pose is not None]
+    commands += [obj.entrance() for obj in entered]
+    placed = [obj for obj in moved if obj.pose is not None]
     if placed:
-        poses = np.array([actor.pose for actor in placed], np.float32).ravel()
-        commands.append({"do": "place", "ids": [actor.number for actor in placed], "poses": poses})
-    commands += [
-        {"do": "shift", "id": actor.number, "points": actor.points.ravel()} for actor in moved if actor.pose is None
-    ]
+        poses = np.array([obj.pose for obj in placed], np.float32).ravel()
+        commands.append({"do": "place", "ids": [obj.number for obj in placed], "poses": poses})
+    commands += [{"do": "shift", "id": obj.number, "points": obj.points.ravel()} for obj in moved if obj.pose is None]
     return commands
 
 

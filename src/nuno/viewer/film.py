@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.color import rgb
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.export import check_extension, one_world
+from nuno.files.export import check_extension, one_world
+from nuno.files.whole_file import replacing
 from nuno.mesh.primitives import PLANE_HALF
-from nuno.viewer.actor import Actor, light_of
-from nuno.viewer.cast import CREASE
+from nuno.shapes.color import rgb
+from nuno.viewer.body_objects import CREASE
 from nuno.viewer.message import pack
 from nuno.viewer.page import film_page
 from nuno.viewer.rigid_motion import rigid_motion
-from nuno.viewer.stage import Stage
-from nuno.viewer.view import View
-from nuno.whole_file import replacing
+from nuno.viewer.scene import Scene
+from nuno.viewer.scene_object import SceneObject, light_of
+from nuno.viewer.viewpoint import View
 
 if TYPE_CHECKING:
-    from nuno.recording import Recording
+    from nuno.files.recording import Recording
 
 logger = logging.getLogger(__name__)
 
@@ -36,10 +36,10 @@ STEPS = 65535  # into which the room that a thing's points ever take is divided,
 
 @dataclass(eq=False)
 class Track:
-    """One actor's way through a film.
+    """One scene object's way through a film.
 
     Attributes:
-        actor: The actor.
+        obj: The scene object.
         first: The frame that it entered at.
         last: The frame that it was gone at, or None.
         frames: Those at which it had moved.
@@ -47,7 +47,7 @@ class Track:
         points: its points then, (n, 3) each.
     """
 
-    actor: Actor
+    obj: SceneObject
     first: int
     last: int | None = None
     frames: list[int] = field(default_factory=list)
@@ -55,35 +55,35 @@ class Track:
     points: list[np.ndarray] = field(default_factory=list)
 
     def add(self, frame: int) -> None:
-        """Take the actor's present state in."""
+        """Take the scene object's present state in."""
         self.frames.append(frame)
-        if self.actor.pose is not None:
-            self.poses.append(self.actor.pose)
+        if self.obj.pose is not None:
+            self.poses.append(self.obj.pose)
         else:
-            self.points.append(self.actor.points)
+            self.points.append(self.obj.points)
 
     def content(self) -> dict[str, Any]:
         """Return what the page needs."""
-        actor = self.actor
+        obj = self.obj
         row: dict[str, Any] = {
             "first": self.first, "last": self.last, "frames": np.array(self.frames, np.uint32),
-            "path": actor.path, **{name: _short(value) for name, value in actor.shape.items()},
+            "path": obj.path, **{name: _short(value) for name, value in obj.shape.items()},
         }  # fmt: skip
         if self.poses:
-            return row | {"poses": np.array(self.poses, np.float32).ravel(), **_packed(actor.points[None])}
-        if actor.shape["kind"] in ("mesh", "lines"):
+            return row | {"poses": np.array(self.poses, np.float32).ravel(), **_packed(obj.points[None])}
+        if obj.shape["kind"] in ("mesh", "lines"):
             return row | _packed(np.array(self.points))
         counts = np.array([len(points) for points in self.points], np.uint32)
         return row | {"counts": counts, "values": np.concatenate(self.points).astype(np.float32).ravel()}
 
 
 class Film:
-    """What was drawn of a world while it was recorded; ``Viewer.record`` starts one, ``stop`` ends it.
+    """A recording of what was drawn of a world; ``Viewer.record`` starts one, ``stop`` ends it.
 
     With ``with``, it is stopped, and saved where a path was given, at the end of the block.
 
     Args:
-        stage: What is drawn; None where the tracks are known.
+        scene: What is drawn; None where the tracks are known.
         rate: Frames per simulated second [1/s].
         path: Where it is saved at the end of a ``with`` block, or None.
 
@@ -91,19 +91,19 @@ class Film:
         InvalidInputError: a path that does not end with .html.
     """
 
-    def __init__(self, stage: Stage | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
+    def __init__(self, scene: Scene | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
         if path is not None:
             check_extension(FilePath(path), ".html")  # now, not when all is done
-        self._stage, self._rate, self._path = stage, rate, path
+        self._scene, self._rate, self._path = scene, rate, path
         self._tracks: dict[int, Track] = {}
         self._times: list[float] = []
         self._failed: Exception | None = None
         self.view: View | None = None
-        self._period = 1 if stage is None else max(1, int(stage.world.frame_rate / rate + 1e-6))
-        if stage is not None:
-            with stage.world.lock:
+        self._period = 1 if scene is None else max(1, int(scene.world.frame_rate / rate + 1e-6))
+        if scene is not None:
+            with scene.world.lock:
                 self._take()
-                stage.world._watchers.append(self)
+                scene.world._watchers.append(self)
 
     @classmethod
     def of(cls, recording: Recording, *, world: int | None = None) -> Film:
@@ -124,21 +124,21 @@ class Film:
             points = one_world(body.skin(), world, axis=1)
             local, poses = rigid_motion(points)
             plane = points.shape[1] == 4 and float(np.ptp(local, axis=0).max()) >= PLANE_HALF  # stands for all of it
-            actor = Actor(
+            obj = SceneObject(
                 ("recording", body.name), "mesh", local, color=light_of(rgb(body.color)), opacity=1.0, endless=plane,
                 triangles=body.faces.astype(np.uint32).ravel(), lines=np.empty(0, np.uint32),
                 crease=CREASE if poses is not None else None,
             )  # fmt: skip
-            track = Track(actor, 0)
+            track = Track(obj, 0)
             for frame in range(len(points)):
                 if poses is not None:
-                    actor.place(poses[frame])
+                    obj.place(poses[frame])
                 else:
-                    actor.shift(points[frame])
-                if frame == 0 or actor.moved:
+                    obj.shift(points[frame])
+                if frame == 0 or obj.moved:
                     track.add(frame)
-                actor.moved = False
-            film._tracks[actor.number] = track
+                obj.moved = False
+            film._tracks[obj.number] = track
         return film
 
     def __enter__(self) -> Film:
@@ -163,10 +163,10 @@ class Film:
 
     @property
     def frames(self) -> int:
-        """How many frames of a run may go by between two calls of ``seen``, so that none is missed."""
-        if self._stage is None:
+        """Return the frames of a run that may go by between two calls of ``seen``, so that none is missed."""
+        if self._scene is None:
             return self._period
-        done = round((self._stage.world._time - self._times[-1]) * self._stage.world.frame_rate)
+        done = round((self._scene.world._time - self._times[-1]) * self._scene.world.frame_rate)
         return math.gcd(self._period, max(0, self._period - done))
 
     @property
@@ -181,8 +181,8 @@ class Film:
 
     @property
     def is_recording(self) -> bool:
-        """Whether it goes on."""
-        return self._stage is not None
+        """Return whether it goes on."""
+        return self._scene is not None
 
     def stop(self) -> None:
         """Take the last frame and end the recording; nothing where it has ended.
@@ -190,24 +190,24 @@ class Film:
         Raises:
             Exception: whatever kept it from taking a frame.
         """
-        stage = self._stage
-        if stage is None:
+        scene = self._scene
+        if scene is None:
             return
-        with stage.world.lock:
-            self._stage = None
-            stage.world._watchers = [other for other in stage.world._watchers if other is not self]
-            if self._failed is None and stage.world._time > self._times[-1]:
-                self._take(stage)
+        with scene.world.lock:
+            self._scene = None
+            scene.world._watchers = [other for other in scene.world._watchers if other is not self]
+            if self._failed is None and scene.world._time > self._times[-1]:
+                self._take(scene)
         if self.view is None:
-            self.view = View.around(*stage.bounds())
+            self.view = View.around(*scene.bounds())
         if self._failed is not None:
             raise self._failed
 
     def seen(self) -> None:
         """Take a frame in where one is due; the world calls this under its lock after each piece of a run."""
-        if self._stage is None or self._failed is not None:
+        if self._scene is None or self._failed is not None:
             return
-        now = self._stage.world._time
+        now = self._scene.world._time
         try:
             if now >= self._times[-1] + (1.0 - 1e-3) / self._rate:  # where time was set back, later than ever before
                 self._take()
@@ -237,7 +237,7 @@ class Film:
         Raises:
             BodyStateError: it is still being recorded.
         """
-        if self._stage is not None:
+        if self._scene is not None:
             raise BodyStateError("the film is being recorded; stop it first")
         view = self.view or self._view_of_all()
         times = np.array(self._times) - self._times[0]
@@ -247,28 +247,28 @@ class Film:
         }  # fmt: skip
         return pack({"commands": [view.command(), content]})
 
-    def _take(self, stage: Stage | None = None) -> None:
-        stage = stage or self._stage
-        assert stage is not None
-        stage.look()
-        left, entered, moved = stage.settle()
+    def _take(self, scene: Scene | None = None) -> None:
+        scene = scene or self._scene
+        assert scene is not None
+        scene.look()
+        left, entered, moved = scene.settle()
         frame = len(self._times)
-        self._times.append(stage.time)
+        self._times.append(scene.time)
         for number in left:
             if number in self._tracks:
                 self._tracks[number].last = frame
-        for actor in entered:
-            self._tracks[actor.number] = Track(actor, frame)
-        for actor in [*entered, *moved]:
-            self._tracks[actor.number].add(frame)
+        for obj in entered:
+            self._tracks[obj.number] = Track(obj, frame)
+        for obj in [*entered, *moved]:
+            self._tracks[obj.number].add(frame)
 
     def _view_of_all(self) -> View:
         corners = []
         for track in self._tracks.values():
-            if track.actor.shape.get("endless"):
+            if track.obj.shape.get("endless"):
                 continue
             if track.poses:
-                reach = np.abs(track.actor.points).max()
+                reach = np.abs(track.obj.points).max()
                 places = np.array(track.poses)[:, :3]
                 corners += [places.min(axis=0) - reach, places.max(axis=0) + reach]
             elif track.points:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.camera.camera import Camera
-from nuno.coordinates import Pose
-from nuno.held_points import held_points
+from nuno.joints.held_points import held_points
+from nuno.shapes.coordinates import Pose
 
 if TYPE_CHECKING:
-    from nuno.body import Body
-    from nuno.simulation import Simulation
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
 
 FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6], dtype=np.uint32)
 """Edges of ``frustum``: from the pinhole to the corners, round the image, and a stroke where up is."""
@@ -50,7 +50,7 @@ def contact_arrows(world: Simulation, scale: float, indices: list[int]) -> list[
         scale: Length [m/N].
         indices: Which worlds.
     """
-    from nuno.contact_points import contact_points
+    from nuno.world.contact_points import contact_points
 
     rows: list[list[np.ndarray]] = [[] for _ in indices]
     for body in list(world._bodies.values()):

@@ -1,4 +1,4 @@
-"""Whether vertices moved as one rigid thing, and how."""
+"""Rigid motion of vertices: whether they moved as one thing, and how."""
 
 from __future__ import annotations
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.body import Body, Color
-from nuno.color import rgb
-from nuno.drawing import Mode, draw
+from nuno.bodies.body import Body, Color
 from nuno.errors import InvalidInputError
-from nuno.soft_shape import SoftShape
+from nuno.shapes.color import rgb
+from nuno.shapes.soft_shape import SoftShape
 from nuno.validation import number
+from nuno.world.drawing import Mode, draw
 
 if TYPE_CHECKING:
     from nuno.viewer.marks import DrawnCamera
@@ -23,7 +23,7 @@ MODES = ("surface", "wireframe", "tetrahedra")
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """How a body is drawn.
+    """The style in which a body is drawn.
 
     Attributes:
         mode: "surface", "wireframe" or "tetrahedra".

@@ -18,27 +18,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.body import Body, Color
+from nuno.bodies.body import Body, Color
 from nuno.camera.camera import Camera
-from nuno.coordinates import compose, invert
-from nuno.drawing import Mode
 from nuno.errors import InvalidInputError, UnknownNameError, ViewerError
-from nuno.recording import Recording
-from nuno.simulation import CHUNK
+from nuno.files.recording import Recording
+from nuno.shapes.coordinates import compose, invert
 from nuno.validation import finite_array, number
 from nuno.viewer.changes import changes, clock
 from nuno.viewer.film import Film
 from nuno.viewer.marks import DrawnCamera, camera_pose
 from nuno.viewer.message import pack
-from nuno.viewer.server import Server
-from nuno.viewer.stage import Stage, checked_places
+from nuno.viewer.page_server import Server
+from nuno.viewer.scene import Scene, checked_places
 from nuno.viewer.style import Style, Styles
-from nuno.viewer.view import View
-from nuno.viewer.wardrobe import Wardrobe
+from nuno.viewer.viewpoint import View
+from nuno.viewer.visual_meshes import VisualMeshes
+from nuno.world.drawing import Mode
+from nuno.world.simulation import CHUNK
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
-    from nuno.world import World
+    from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
 
@@ -86,10 +86,10 @@ class Viewer:
         self._interval = 1.0 / number("frame_rate", frame_rate, above=0.0)
         scale = number("force_scale", force_scale, above=0.0)
         self._styles = Styles(Style(mode), grips=bool(grips), contacts=bool(contacts), force_scale=scale)
-        self._wardrobe = Wardrobe(robots)
+        self._visual_meshes = VisualMeshes(robots)
         with world.lock:
             self._places = checked_places(world, worlds, spacing)
-        self._stage = Stage(world, self._styles, self._wardrobe, self._places)
+        self._scene = Scene(world, self._styles, self._visual_meshes, self._places)
         self._view: View | None = None
         self._shown: Film | None = None  # that the page plays in place of the world
         self._turn = threading.RLock()  # whoever looks and sends holds it
@@ -129,12 +129,12 @@ class Viewer:
 
     @property
     def is_open(self) -> bool:
-        """Whether the page is served."""
+        """Return whether the page is served."""
         return not self._stop.is_set() and self._server.is_open
 
     @property
     def page_count(self) -> int:
-        """How many pages look on now."""
+        """Return how many pages look on now."""
         return self._server.client_count
 
     def show(self, *, open: bool = True) -> Viewer:
@@ -247,7 +247,7 @@ class Viewer:
         opening = number("field", field, above=0.0, high=179.0)
         self._check_open()
         with self._turn:
-            low, high = self._stage.bounds()
+            low, high = self._scene.bounds()
         reach = max(0.1, 0.5 * float(np.linalg.norm(high - low)), float(np.abs(b - (low + high) / 2.0).max()))
         self._view = View((a[0], a[1], a[2]), (b[0], b[1], b[2]), opening, reach)
         self._server.send(pack({"commands": [self._view.command()]}))
@@ -279,7 +279,7 @@ class Viewer:
         """
         wanted = number("rate", rate, above=0.0)
         styles = replace(self._styles, own=dict(self._styles.own), cameras=dict(self._styles.cameras))
-        film = Film(Stage(self.world, styles, self._wardrobe, self._places), wanted, path)
+        film = Film(Scene(self.world, styles, self._visual_meshes, self._places), wanted, path)
         film.view = self._view
         return film
 
@@ -326,7 +326,7 @@ class Viewer:
 
     @property
     def frames(self) -> int:
-        """How many frames of a run may go by between two calls of ``seen``; while it is filmed, films say."""
+        """Return the frames of a run that may go by between two calls of ``seen``; while it is filmed, films say."""
         films = [watcher.frames for watcher in self.world._watchers if isinstance(watcher, Film)]
         return math.gcd(*films) or self._piece
 
@@ -339,7 +339,7 @@ class Viewer:
         if self._wanted:
             self._wanted = False
             try:
-                self._stage.look(sparing=True)
+                self._scene.look(sparing=True)
             except Exception:  # the world must go on
                 logger.exception("the viewer could not look at the world")
             self._looked.set()
@@ -354,9 +354,9 @@ class Viewer:
         with self._turn:
             if self._shown is not None:
                 return self._shown.message()
-            view = self._view or View.around(*self._stage.bounds())
-            entered = [actor.entrance() for actor in self._stage.actors]
-            return pack({"commands": [{"do": "clear"}, view.command(), *entered, clock(self._stage.time)]})
+            view = self._view or View.around(*self._scene.bounds())
+            entered = [obj.entrance() for obj in self._scene.objects]
+            return pack({"commands": [{"do": "clear"}, view.command(), *entered, clock(self._scene.time)]})
 
     def _look(self, wait: bool) -> list[dict[str, Any]]:
         """Look at the world and return what changed; without waiting, only if that does not hold the world up.
@@ -367,11 +367,11 @@ class Viewer:
         if wait:
             with lock:
                 self._wanted = False
-                self._stage.look()
+                self._scene.look()
         elif lock.acquire(timeout=0.0):
             try:
                 self._wanted = False
-                self._stage.look(sparing=True)
+                self._scene.look(sparing=True)
             finally:
                 lock.release()
         else:
@@ -380,12 +380,12 @@ class Viewer:
                 self._wanted = True
             if not self._looked.wait(self._interval):
                 return []  # a long piece of a run, which looks when it is done
-        return changes(*self._stage.settle())
+        return changes(*self._scene.settle())
 
     def _send(self, commands: list[dict[str, Any]]) -> None:
-        if self._shown is None and (commands or self._stage.time != self._sent_time):
-            self._server.send(pack({"commands": [*commands, clock(self._stage.time)]}))
-            self._sent_time = self._stage.time
+        if self._shown is None and (commands or self._scene.time != self._sent_time):
+            self._server.send(pack({"commands": [*commands, clock(self._scene.time)]}))
+            self._sent_time = self._scene.time
 
     def _follow_once(self) -> None:
         now = time.perf_counter()

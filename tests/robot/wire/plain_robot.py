@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from nuno.coordinates import Coordinates
 from nuno.errors import RobotModelError, UnknownNameError
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.interface import RobotInterface
 from nuno.robot.readings import JointState
+from nuno.shapes.coordinates import Coordinates
 
 
 class PlainRobot(RobotInterface):

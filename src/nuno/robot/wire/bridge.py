@@ -76,7 +76,7 @@ class Bridge:
         self._sockets.close(1011 if reason else 1001, reason)  # an error of the server, or it goes away
 
     def has_subscribers(self, topic: str) -> bool:
-        """Whether anyone would get what is published."""
+        """Return whether anyone would get what is published."""
         return topic in self._subscribers
 
     def publish(self, topic: str, message: Message, latched: bool = False) -> None:

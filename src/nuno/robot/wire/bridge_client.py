@@ -22,7 +22,7 @@ TOLD = 20
 
 @dataclass(eq=False)
 class Subscription:
-    """What one client wants of a topic.
+    """A client's subscription to a topic.
 
     Attributes:
         interval: Shortest time between two messages [s].
@@ -60,7 +60,7 @@ class Client:
 
     @property
     def has_room(self) -> bool:
-        """Whether another command of its may wait."""
+        """Return whether another command of its may wait."""
         return self._begun - self._done < UNANSWERED
 
     def send(self, message: Message) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from nuno.coordinates import Coordinates
 from nuno.errors import NunoError, RefusedError, RobotModelError, RobotTimeoutError
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.humanoid import Humanoid
@@ -24,6 +23,7 @@ from nuno.robot.wire.connection import Connection, SentGoal
 from nuno.robot.wire.names import ADVANCE, GO_VELOCITY, Names
 from nuno.robot.wire.protocol import ABORTED, CANCELED, EXECUTING, SUCCEEDED
 from nuno.robot.wire.velocity import VelocityStream
+from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
 
 logger = logging.getLogger(__name__)

@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from nuno import quaternion as quat
-from nuno.coordinates import compose, invert
 from nuno.errors import MessageError, NunoError
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.interface import BASE, RobotInterface
@@ -21,6 +19,8 @@ from nuno.robot.wire.bridge_client import Client, told
 from nuno.robot.wire.broadcast import Broadcast, motion_fields
 from nuno.robot.wire.names import GO_VELOCITY, Names
 from nuno.robot.wire.protocol import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, Message
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import compose, invert
 
 logger = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ TOLD = {
     GoalStatus.SUCCEEDED: SUCCEEDED, GoalStatus.PREEMPTED: CANCELED, GoalStatus.RECALLED: CANCELED,
     GoalStatus.ABORTED: ABORTED, GoalStatus.LOST: ABORTED,
 }  # fmt: skip
-"""How goals end, in the words of the wire."""
+"""Ends of goals, in the words of the wire."""
 FEEDBACK_INTERVAL = 0.05
 """[s] Between two feedbacks of a goal."""
 DRIVE = 1.0
@@ -119,7 +119,7 @@ class Commands:
 
     @property
     def has_ended(self) -> bool:
-        """Whether a goal has ended that its client does not know of yet."""
+        """Return whether a goal has ended that its client does not know of yet."""
         return any(own.goal.is_done for own in self._running)
 
     def settle(self) -> None:

@@ -50,7 +50,7 @@ class SentGoal:
 
     @property
     def done(self) -> bool:
-        """Whether there is a result, or none will come as the connection is lost."""
+        """Return whether there is a result, or none will come as the connection is lost."""
         return self._answer.done()
 
     def result(self, timeout: float | None = None) -> tuple[int, Any, bool]:
@@ -121,7 +121,7 @@ class Connection:
 
     @property
     def lost(self) -> ConnectionLostError | None:
-        """Why there is no connection any more; None while there is."""
+        """Return why there is no connection any more; None while there is."""
         return self._lost
 
     def check(self) -> None:

@@ -57,27 +57,27 @@ class Link:
 
     @property
     def waiting(self) -> int:
-        """How many texts wait that were not begun to be sent."""
+        """Return how many texts wait that were not begun to be sent."""
         return len(self._outbox)
 
     @property
     def wants_room(self) -> bool:
-        """Whether something waits for room in the socket, so that ``flush`` is to be called when there is."""
+        """Return whether something waits for room in the socket, so that ``flush`` is to be called when there is."""
         return bool(self._rest) and not self._is_over
 
     @property
     def is_open(self) -> bool:
-        """Whether both sides have agreed on a websocket, and neither has ended it."""
+        """Return whether both sides have agreed on a websocket, and neither has ended it."""
         return self._is_open()
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing will come any more; then ``shut`` it."""
+        """Return whether nothing will come any more; then ``shut`` it."""
         return self._is_over
 
     @property
     def end(self) -> str:
-        """Why it ended, as far as either side said."""
+        """Return why it ended, as far as either side said."""
         protocol = self._protocol
         if self._given_up:
             return self._given_up

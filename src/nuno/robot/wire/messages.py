@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from nuno.coordinates import Coordinates
 from nuno.errors import MessageError
 from nuno.robot.goal import Tolerances
 from nuno.robot.readings import ImuReading, JointState
 from nuno.robot.trajectory import JointTrajectory
+from nuno.shapes.coordinates import Coordinates
 from nuno.validation import finite_array, number
 
 Fields = dict[str, Any]

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 
 class Nudge:
-    """What a selector watches beside its sockets, so that other threads can wake who waits there."""
+    """A socket pair that a selector watches, so that other threads can wake who waits there."""
 
     def __init__(self) -> None:
         self._out, self._in = socket.socketpair()

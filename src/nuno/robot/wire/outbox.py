@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter, deque
 
 KEPT = 16
-"""How many publications of one topic wait for a slow reader, unless it asks for another number; the oldest go first."""
+"""Publications of one topic that wait for a slow reader, unless it asks for another number; the oldest go first."""
 KEPT_MOST = 100
-"""How many it may ask for: they are kept in this program's memory."""
+"""The greatest number that it may ask for: they are kept in this program's memory."""
 LIMIT = 1000
 """So many texts that may not be dropped wait for a slow reader, and no more."""
 

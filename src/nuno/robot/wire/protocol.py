@@ -21,7 +21,7 @@ FROM_CLIENTS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "cancel_action_goal": {"action": str},
     "set_level": {"level": str},
 }
-"""What a server understands, by op: the fields that a message must have, and their types."""
+"""Messages that a server understands, by op: the fields that each must have, and their types."""
 
 FROM_SERVERS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "publish": {"topic": str, "msg": dict},
@@ -30,7 +30,7 @@ FROM_SERVERS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "action_result": {"action": str, "result": bool},
     "status": {"level": str},
 }
-"""What a client understands, likewise."""
+"""Messages that a client understands, likewise."""
 
 # The other fields that the programs here read, of whatever op
 OPTIONAL: dict[str, type | tuple[type, ...]] = {
@@ -38,7 +38,7 @@ OPTIONAL: dict[str, type | tuple[type, ...]] = {
 }  # fmt: skip
 
 UNKNOWN, EXECUTING, SUCCEEDED, CANCELED, ABORTED = 0, 2, 4, 5, 6
-"""How an action's goal stands: action_msgs/msg/GoalStatus."""
+"""The status of an action's goal: action_msgs/msg/GoalStatus."""
 
 
 def encode(message: Message) -> str:

@@ -101,18 +101,18 @@ class RobotServer:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Return where it listens."""
         return self._bridge.port
 
     @property
     def url(self) -> str:
-        """Where a ``WireRobot`` finds it."""
+        """Return where a ``WireRobot`` finds it."""
         host = self._bridge.host
         return f"ws://[{host}]:{self.port}" if ":" in host else f"ws://{host}:{self.port}"
 
     @property
     def alive(self) -> bool:
-        """Whether it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
+        """Return whether it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
         return self._thread.is_alive()
 
     def close(self) -> None:

@@ -1,0 +1,1 @@
+"""Bodies, and what they have while dynamics are attached to them."""

@@ -1,0 +1,414 @@
+"""Dynamics: what a body has while it is attached, around the solver that moves it.
+
+`ParticleDynamics` moves cloth and soft bodies, `nuno.bodies.rigid_dynamics.RigidDynamics` rigid ones.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.bodies.body_motion import BodyMotion, motion_of_particles
+from nuno.bodies.given_velocity import GivenVelocity
+from nuno.errors import InvalidInputError
+from nuno.joints.grip import Grip
+from nuno.materials import Cloth, Material, Rigid, Soft
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Pose, apply, compose, invert
+from nuno.shapes.shape import ClothMesh, Plane, Shape, Sheet
+from nuno.shapes.soft_shape import SoftShape
+from nuno.solvers.resolution import Resolution
+from nuno.validation import finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+
+logger = logging.getLogger(__name__)
+
+State = dict[str, np.ndarray]  # of a solver: "local" and "origin", which add up to positions, "velocities" ...
+SOON = 1e-9  # [s], below which two instants are the same
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A force on a body's vertices.
+
+    Attributes:
+        force: (worlds, n, 3) float32 [N]; of a rigid body (worlds, 6): force, and torque [N m], at the centre of mass.
+        end: The world's time [s] at which it ends, or None.
+    """
+
+    force: np.ndarray
+    end: float | None
+
+
+class Dynamics:
+    """The dynamics of an attached body, whatever its kind.
+
+    Attributes:
+        material: Its material.
+        friction: The body's coefficient, a number or (worlds,).
+        world_count: Worlds in the batch.
+        grips: What holds it.
+        pushes: What pushes it.
+        substeps: Substeps of a frame.
+    """
+
+    is_rigid: ClassVar[bool] = False
+
+    def __init__(self, material: Material, friction: Any, world: Simulation) -> None:
+        self.material, self.friction, self.world_count = material, friction, world.world_count
+        self.grips: list[Grip] = []
+        self.pushes: list[Push] = []
+        self.grips_changed = False
+        self.collider_version = -1
+
+    substeps: int
+
+    @property
+    def resolution(self) -> Resolution | None:
+        """Return what the substeps make of the material, or None where there is nothing to say."""
+        return None
+
+    def vertices(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m]."""
+        raise NotImplementedError
+
+    def velocities(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m/s] of the vertices."""
+        raise NotImplementedError
+
+    def pose(self, body: Body) -> Pose:
+        """Return where the body is."""
+        raise NotImplementedError
+
+    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Put the body elsewhere as a whole; velocities turn along."""
+        raise NotImplementedError
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves as a whole."""
+        raise NotImplementedError
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the body velocities; it stays where it is."""
+        raise NotImplementedError
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J], what the body's deformation stores."""
+        raise NotImplementedError
+
+    def state(self) -> State:
+        """Return copies of all that the next step depends on."""
+        raise NotImplementedError
+
+    def load_state(self, state: State) -> None:
+        """Set the state that `state` gave."""
+        raise NotImplementedError
+
+    def prepare(self, time: float, frame: float) -> None:
+        """Bring what acts on the body from ``time`` [s] on, once for each run or ``frame`` [s]."""
+        raise NotImplementedError
+
+    def finite(self) -> np.ndarray:
+        """Return (worlds,) bool, whether all numbers of the state are finite."""
+        raise NotImplementedError
+
+    def release(self) -> None:
+        """Give back what the world holds for the body."""
+
+    def add_push(self, push: Push) -> None:
+        """Add a push; one without an end takes the place of the last such push.
+
+        One with an end that is nothing here may be something in other worlds of a batch, whose frame it ends, too.
+        """
+        kept = [other for other in self.pushes if push.end is not None or other.end is not None]
+        self.pushes = [*kept, push] if push.end is not None or push.force.any() else kept
+
+    def pushing(self, time: float) -> tuple[Push, ...]:
+        """Return the pushes that act from ``time`` [s] on."""
+        return tuple(push for push in self.pushes if push.end is None or push.end > time + SOON)
+
+    def fits(self, material: Material, world_count: int, friction: Any) -> bool:
+        """Return whether this can take a state of the given material, worlds and friction."""
+        same_friction = np.array_equal(friction, self.friction)
+        return same_friction and self.world_count == world_count and self.material.same_as(material)
+
+
+class ParticleDynamics(Dynamics):
+    """An attached cloth's or soft body's solver, material, grips and pushes.
+
+    Args:
+        shape: Its shape.
+        material: Its material.
+        positions: (worlds, n, 3) [m].
+        velocities: (worlds, n, 3) [m/s].
+        friction: The body's coefficient, a number or (worlds,).
+        world: The world whose batch, device, gravity and frame rate are used.
+
+    Raises:
+        InvalidInputError: the shape has no dynamics, or the material does not fit the shape or the batch.
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        material: Material,
+        positions: np.ndarray,
+        velocities: np.ndarray,
+        friction: Any,
+        world: Simulation,
+    ) -> None:
+        check_material(shape, material, world.world_count)
+        super().__init__(material, friction, world)
+        self.solver = _solver_class(material)(
+            topology_of(shape), material, positions, velocities, device=world.device, gravity=world.gravity,
+            frame_rate=world.frame_rate, substeps=world.substeps, friction=friction,
+        )  # fmt: skip
+        self._pushing: tuple[Push, ...] = ()
+
+    @property
+    def substeps(self) -> int:  # type: ignore[override]
+        """Substeps of a frame, the solver's own."""
+        return int(self.solver.substeps)
+
+    @property
+    def resolution(self) -> Resolution:
+        """Return what the substeps make of the material."""
+        found: Resolution = self.solver.resolution
+        return found
+
+    def vertices(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m]."""
+        return self.solver.positions().astype(np.float64)
+
+    def velocities(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m/s]."""
+        return self.solver.velocities().astype(np.float64)
+
+    def pose(self, body: Body) -> Pose:
+        """Return the mean of the vertices, and the orientation that the body was last given."""
+        centre = self.vertices(body).mean(axis=-2)
+        return centre[0] if len(centre) == 1 else centre, body._quaternion
+
+    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Put the body elsewhere as a whole, in its shape; velocities turn along."""
+        motion = compose((position, quaternion), invert(self.pose(body)))
+        turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
+        self.solver.set_state(apply(motion, self.vertices(body)), turned.astype(np.float32))
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves as a whole: the motion of its vertices' masses."""
+        return motion_of_particles(self.solver.mass, self.vertices(body), self.velocities(body))
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the vertices velocities; they stay where they are, to the bit."""
+        from nuno.state.cloth_state import SPEED
+
+        velocities = given.vertices
+        if velocities is None:
+            velocities = given.at(self.vertices(body), self.motion(body).centre)
+        state = self.solver.save_state()
+        state["velocities"] = velocities.astype(np.float32)
+        state["notes"][:, SPEED] = (velocities**2).sum(axis=-1).max(axis=-1)  # which bounds what pairs are listed
+        self.solver.load_state(state)
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J], what the body's deformation stores."""
+        measures: Any
+        if isinstance(self.material, Soft):
+            from nuno.bodies import soft_measures as measures
+        else:
+            from nuno.bodies import cloth_measures as measures
+        energy: np.ndarray = measures.elastic_energy(
+            topology_of(body.shape), self.vertices(body), self.material, self.world_count
+        )
+        return energy
+
+    def set_self_contact(self, touching: bool) -> None:
+        """Let the body touch itself or not, from the next step on."""
+        if isinstance(self.material, Cloth) and touching != self.solver.self_contact:
+            self.solver.self_contact = touching
+            self.solver.load_state(self.solver.save_state())  # which forgets the list of pairs: it is out of date
+
+    def prepare(self, time: float, frame: float) -> None:
+        """Bring the grips and pushes of a span from ``time`` on; a leading body's last move takes a ``frame`` [s]."""
+        grips = [grip for grip in self.grips if not grip.is_tie]
+        for grip in self.grips:
+            if grip.is_tie and grip._offsets is not None:
+                grip._spec_for(time, frame)
+        if self.grips_changed or any(grip.target is not None for grip in grips):
+            self.solver.set_grips([grip._spec_for(time, frame) for grip in grips])
+            self.grips_changed = False
+        pushing = self.pushing(time)
+        if pushing != self._pushing:
+            self.solver.set_forces(np.sum([p.force for p in pushing], axis=0) if pushing else None)
+            self._pushing = pushing
+
+    def shape_impulses(self) -> dict[str, np.ndarray]:
+        """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""
+        told: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.told()
+        return told
+
+    def _forget_impulses(self) -> None:
+        if self.solver.sums is not None:
+            self.solver.sums.tell({})
+
+    def keep(self) -> Any:
+        """Return what `put_back` takes: as `state`, but where the solver has it."""
+        return self.solver.keep()
+
+    def put_back(self, kept: Any) -> None:
+        """Set the state that `keep` kept."""
+        self.solver.put_back(kept)
+        self._forget_impulses()
+
+    def state(self) -> State:
+        """Return copies of all that the next step depends on."""
+        return self.solver.save_state()
+
+    def load_state(self, state: State) -> None:
+        """Set the state that `state` gave; what shapes gave before that was in another past."""
+        self.solver.load_state(state)
+        self._forget_impulses()
+
+    def finite(self) -> np.ndarray:
+        """Return (worlds,) bool, whether all positions and velocities are finite."""
+        return self.solver.finite()
+
+    def make_room(self, body: Body) -> bool:
+        """Make lists longer that were too short in the last run; return whether that must be gone through again."""
+        known, longer = bool(self.solver.missed.any()), bool(self.solver.make_room())
+        if longer:
+            logger.info("%r touches itself at more places than expected: made room for them", body.name)
+        elif not known and self.solver.missed.any():
+            logger.warning(
+                "%r touches itself at more places than there is memory for: some contacts are passed over, now and "
+                "later, and %r.missed_contacts says in which worlds; coarser or thinner cloth has fewer",
+                body.name, body.name,
+            )  # fmt: skip
+        return longer
+
+
+def touches_itself(world: Simulation, body: Body) -> bool:
+    """Return whether contacts of a soft body with itself are looked for, which takes it through a frame by parts."""
+    return isinstance(body.material, Soft) and body.material.self_contact and world._rules.touches_itself(body)
+
+
+def default_material(body: Body) -> Material:
+    """Return the material that a body gets when none is named: its kind's, with the body's friction."""
+    if body.shape.is_cloth:
+        return Cloth(friction=body.friction)
+    if body.shape.is_soft:
+        return Soft(friction=body.friction)
+    return Rigid(friction=body.friction)
+
+
+def check_material(shape: Shape, material: Any, world_count: int) -> None:
+    """Check that a shape can have a material.
+
+    Raises:
+        InvalidInputError: the shape has no such dynamics, it is no material, or it fits neither shape nor batch.
+    """
+    valid = "Cloth or Rigid" if shape.is_cloth else "Soft or Rigid" if shape.is_soft else "Rigid"
+    if isinstance(shape, Plane):
+        raise InvalidInputError("a plane is endless and cannot be dynamic; take a box")
+    kinds = (Rigid, Cloth) if shape.is_cloth else (Rigid, Soft) if shape.is_soft else (Rigid,)
+    if not isinstance(material, kinds):
+        raise InvalidInputError(f"a {shape.kind} needs a {valid} material, got {type(material).__name__}")
+    material.resolved(world_count, 1 if isinstance(material, Rigid) else element_count(shape))
+
+
+def make_push(body: Body, force: ArrayLike, torque: Any, duration: float | None, world: Simulation) -> Push:
+    """Return a push from now on; see ``World.push``.
+
+    Raises:
+        InvalidInputError: a force or torque that is not finite or of another shape, a torque on a body that is not
+            rigid, or a duration that is not positive.
+    """
+    worlds = world.world_count
+    end = None if duration is None else world.time + number("duration", duration, above=0.0)
+    if body._dynamics is not None and body._dynamics.is_rigid:
+        pair = [
+            np.broadcast_to(finite_array(name, value, (3,), (worlds, 3)), (worlds, 3))
+            for name, value in (("force", force), ("torque", np.zeros(3) if torque is None else torque))
+        ]
+        return Push(np.concatenate(pair, axis=1).astype(np.float32), end)
+    if torque is not None:
+        raise InvalidInputError(f"a torque turns rigid bodies only; {body.name!r} deforms: push its vertices")
+    share = vertex_shares(body.shape)
+    n = len(share)
+    given = finite_array("force", force, (3,), (n, 3), (worlds, 3), (worlds, n, 3))
+    if given.shape in ((3,), (worlds, 3)) and given.shape != (n, 3):
+        given = given[..., None, :] * (share / share.sum())[:, None]
+    return Push(np.array(np.broadcast_to(given, (worlds, n, 3)), dtype=np.float32), end)
+
+
+def element_count(shape: Shape) -> int:
+    """Return how many elements a material may tell apart: cells, faces of a cloth mesh, or tetrahedra."""
+    if isinstance(shape, Sheet):
+        return shape.cells[0] * shape.cells[1]
+    return len(shape.tetrahedra().tets) if isinstance(shape, SoftShape) else len(shape.mesh()[1])
+
+
+def vertex_shares(shape: Shape) -> np.ndarray:
+    """Return (n,) float, the area at rest around each vertex of a cloth [m2], or the volume of a soft body's [m3]."""
+    if shape.is_soft:
+        topology = topology_of(shape)
+        return np.asarray(topology.masses(np.ones((1, 1))))[0]
+    vertices, faces = shape.mesh()
+    if isinstance(shape, ClothMesh) and shape.rest is not None:
+        vertices = np.pad(shape.rest, ((0, 0), (0, 3 - shape.rest.shape[1])))
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
+
+
+def backend() -> tuple[Any, Any, Any]:
+    """Return the classes of the cloth solver, of its topology and of static shapes' tables; imported on first use."""
+    from nuno.solvers.cloth_solver import ClothSolver
+    from nuno.tables.colliders import Colliders
+    from nuno.topology.cloth_topology import ClothTopology
+
+    return ClothSolver, ClothTopology, Colliders
+
+
+def make_colliders(bodies: list[Body], pair_friction: dict[str, Any], world: Simulation) -> Any:
+    """Return what solvers need of the static bodies that they touch; ``pair_friction`` is by name."""
+    return backend()[2].from_bodies(bodies, world.world_count, world.device, pair_friction=pair_friction)
+
+
+def _solver_class(material: Material) -> Any:
+    if isinstance(material, Soft):
+        from nuno.solvers.soft_solver import SoftSolver
+
+        return SoftSolver
+    return backend()[0]
+
+
+def topology_of(shape: Shape) -> Any:
+    """Return the elements of a cloth's or soft body's shape, made once."""
+    return _soft_topology(shape) if isinstance(shape, SoftShape) else _cloth_topology(shape, backend()[1])
+
+
+@lru_cache(maxsize=64)
+def _soft_topology(shape: SoftShape) -> Any:
+    from nuno.topology.soft_topology import SoftTopology
+
+    made = shape.tetrahedra()
+    return SoftTopology.of(made.vertices, made.tets, made.fraction, getattr(shape, "mean_strain", False))
+
+
+@lru_cache(maxsize=64)
+def _cloth_topology(shape: Shape, topology_class: Any) -> Any:
+    if isinstance(shape, Sheet):
+        return topology_class.sheet(shape.cells, shape.size)
+    assert isinstance(shape, ClothMesh)
+    return topology_class.mesh(shape.rest, shape.faces)

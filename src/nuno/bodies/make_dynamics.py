@@ -1,0 +1,46 @@
+"""Making dynamics of a body: by its material, from a saved state or at rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.bodies.dynamics import Dynamics, ParticleDynamics, State
+from nuno.materials import Material, Rigid
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+
+def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> Dynamics:
+    """Return dynamics for a body, in a state that dynamics of its kind gave.
+
+    Raises:
+        InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
+    """
+    if isinstance(material, Rigid):
+        from nuno.bodies.rigid_dynamics import RigidDynamics
+
+        return RigidDynamics(body, material, friction, world, state)
+    positions = state["local"].astype(np.float64) + state["origin"][:, None]
+    made = ParticleDynamics(body.shape, material, positions, state["velocities"], friction, world)
+    made.load_state(state)
+    return made
+
+
+def start_dynamics(body: Body, material: Any, world: Simulation) -> Dynamics:
+    """Return dynamics for a static body in the shape that it has now, at rest.
+
+    Raises:
+        InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
+    """
+    if isinstance(material, Rigid):
+        from nuno.bodies.rigid_dynamics import RigidDynamics
+
+        return RigidDynamics(body, material, material.friction, world)
+    vertices = body._vertices()
+    positions = np.broadcast_to(vertices, (world.world_count, *vertices.shape[-2:]))
+    still = np.broadcast_to(np.zeros(3), positions.shape)
+    return ParticleDynamics(body.shape, material, positions, still, material.friction, world)

@@ -1,0 +1,366 @@
+"""Rigid dynamics: a body's place among all rigid bodies of its world, which one solver moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
+from nuno.bodies.dynamics import Dynamics, State, check_material
+from nuno.bodies.given_velocity import GivenVelocity
+from nuno.materials import Rigid
+from nuno.rigid.convex_parts import RigidPart, rigid_shape
+from nuno.rigid.rigid_arrays import SAVED
+from nuno.rigid.saved_contacts import LASTING, LISTING
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Pose, compose, invert
+from nuno.shapes.mass_properties import mass_properties
+from nuno.solvers.rigid_solver import RigidSolver
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.bodies.dynamics import Push
+    from nuno.world.simulation import Simulation
+    from nuno.world.snapshot import BodyRecord
+
+
+@dataclass
+class StaticPlace:
+    """A static body as the rigid solver was told of it.
+
+    Attributes:
+        slot: Its slot.
+        what: Shape, friction, groups and thickness; None of a body that the solver is yet to forget.
+        deformed: Its vertices (worlds, n, 3) [m] where it was deformed, and the pose that they belong to.
+        where: Its pose, as bytes; None where the solver has moved it since.
+    """
+
+    slot: int
+    what: tuple[Any, ...] | None
+    deformed: tuple[np.ndarray, Pose] | None
+    where: tuple[bytes, bytes] | None
+
+    def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
+        """Return whether this is what a body is, or was when it was saved, but for where it is."""
+        return self.what == _what(body) and _same_shape(self.deformed, deformed)
+
+
+class RigidScene:
+    """The rigid solver of a world, and the static bodies that it has been told of.
+
+    Attributes:
+        solver: The solver.
+        settings: What of the world it was made for.
+        static: The static bodies, by key.
+        kept: By key, the slot and rows that are kept for bodies that are still to come.
+    """
+
+    def __init__(self, world: Simulation, origin: np.ndarray) -> None:
+        self.solver = RigidSolver(
+            world.world_count, device=world.device, gravity=world.gravity, frame_rate=world.frame_rate,
+            substeps=world.substeps, origin=np.round(np.asarray(origin) * 1024.0) / 1024.0,
+        )  # fmt: skip
+        self.settings = self.settings_of(world)
+        self.static: dict[str, StaticPlace] = {}
+        self.kept: dict[str, tuple[int, tuple[int, ...]]] = {}
+        self._moving: list[str] = []  # static bodies that had velocities in the last frame
+        self._version = -1
+
+    @staticmethod
+    def settings_of(world: Simulation) -> tuple[Any, ...]:
+        """Return what of a world a scene is made for."""
+        return world.world_count, world.device, world.gravity, world.frame_rate, world.substeps
+
+    def is_current(self, world: Simulation) -> bool:
+        """Return whether the solver has been told of all that has changed."""
+        return self._version == world._collider_version
+
+    def bring(self, world: Simulation) -> None:
+        """Tell the solver what changed among static bodies, and which pairs are exceptions."""
+        if self.is_current(world):
+            return
+        slots: dict[str, int] = {}
+        seen = set()
+        for body in world._bodies.values():
+            if body._dynamics is not None:
+                if isinstance(body._dynamics, RigidDynamics):
+                    slots[body.key] = body._dynamics.slot
+                    self.solver.set_groups(body._dynamics.slot, body.group, body.collides_with)
+                continue
+            seen.add(body.key)
+            slots[body.key] = self.bring_static(body)
+        for key in [key for key in self.static if key not in seen]:
+            self.solver.remove(self.static.pop(key).slot)
+        rules = world._rules
+        exceptions: dict[frozenset[str], Any] = {**rules.friction, **dict.fromkeys(rules.ignored | rules.held)}
+        pairs: dict[tuple[int, int], Any] = {}
+        for pair, mu in exceptions.items():
+            if len(pair) == 2 and all(key in slots for key in pair):
+                a, b = pair
+                pairs[slots[a], slots[b]] = mu
+        self.solver.set_exceptions(pairs)
+        self._version = world._collider_version
+
+    def lead(self, world: Simulation, time: float, duration: float) -> list[int]:
+        """Let static bodies that follow paths move at a steady pace for a frame or less; return their slots."""
+        schedule, keys = world._schedule, []
+        k = None if schedule is None else schedule.frame_at(time)
+        if schedule is not None and k is not None:
+            keys = [key for key in schedule.poses if key in self.static]
+        for key in set(self._moving).difference(keys):
+            if key in self.static and key in world._bodies:  # follows a path no longer, and stands where it arrived
+                self.solver.set_velocity(self.static[key].slot, np.zeros(3), np.zeros(3))
+                self.bring_static(world._bodies[key])
+        self._moving, slots = keys, []
+        if schedule is not None and k is not None:
+            for key in keys:
+                slot, (start, end) = self.static[key].slot, schedule.in_frame(key, k)
+                self.static[key].where = None
+                self.solver.set_pose(slot, *start)
+                turn = quat.multiply(end[1], quat.inverse(start[1]))
+                turn = np.where(turn[..., :1] < 0.0, -turn, turn)
+                sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+                angle = 2.0 * np.arctan2(sine, turn[..., :1])
+                axis = np.divide(turn[..., 1:], sine, out=np.zeros_like(turn[..., 1:]), where=sine > 0.0)
+                self.solver.set_velocity(slot, (end[0] - start[0]) / duration, axis * angle / duration)
+                slots.append(slot)
+        return slots
+
+    def save(self) -> dict[tuple[str, str], Any]:
+        """Return copies of the arrays of all bodies and contacts, to go back to."""
+        solver = self.solver
+        owners = {"state": SAVED, "manifolds": (*LASTING, *LISTING)}
+        return {(o, name): wp.clone(getattr(getattr(solver, o), name)) for o, names in owners.items() for name in names}
+
+    def load(self, saved: dict[tuple[str, str], Any]) -> None:
+        """Go back to what `save` returned, in the room that there is now."""
+        solver, longer = self.solver, False
+        for (owner, name), array in saved.items():
+            own = getattr(getattr(solver, owner), name)
+            if own.size == array.size:
+                wp.copy(own, array)
+            else:
+                longer = True
+        self._moving = list(self.static)  # whatever places and velocities they have now
+        for place in self.static.values():
+            place.where = None
+        if longer:
+            solver._list_anew()
+
+    def slot_of(self, world: Simulation, body: Body) -> int | None:
+        """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
+        if isinstance(body._dynamics, RigidDynamics):
+            return body._dynamics.slot
+        static = self.static.get(body.key)
+        return None if static is None else static.slot
+
+    def slots_of(self, world: Simulation) -> list[int]:
+        """Return the slot of each of the world's bodies, -1 for those that have none."""
+        slots = []
+        for key, body in world._bodies.items():
+            own, static = body._dynamics, self.static.get(key)
+            slots.append(own.slot if isinstance(own, RigidDynamics) else -1 if static is None else static.slot)
+        return slots
+
+    def bring_static(self, body: Body) -> int:
+        """Tell the solver of a static body as it is now; return its slot."""
+        pose = body._pose()
+        where = (pose[0].tobytes(), pose[1].tobytes())
+        known = self.static.get(body.key)
+        if known is not None and known.is_of(body, body._deformed):
+            if known.where != where:
+                self.solver.set_pose(known.slot, *pose)
+                known.where = where
+            return known.slot
+        if known is not None:
+            self.solver.remove(known.slot)
+        slot, rows = self.kept.pop(body.key, (None, None))
+        slot = self.solver.add(
+            parts_of(body, moves=False), position=pose[0], quaternion=pose[1], friction=body.friction,
+            group=body.group, collides_with=body.collides_with, slot=slot, rows=rows,
+        )  # fmt: skip
+        self.static[body.key] = StaticPlace(slot, _what(body), body._deformed, where)
+        return slot
+
+    def keep_stale(self, key: str, slot: int, rows: tuple[int, ...]) -> None:
+        """Take the place of a static body that has gone or changed, until the solver is told so."""
+        self.solver.reserve(slot, rows)
+        self.static[key] = StaticPlace(slot, None, None, None)
+
+
+class RigidDynamics(Dynamics):
+    """An attached rigid body.
+
+    Args:
+        body: The body, still static.
+        material: Its material.
+        friction: The body's coefficient, a number or (worlds,).
+        world: Its world.
+        state: What another's `state` gave, or None: at rest where the body is.
+
+    Attributes:
+        slot: The body's number in the world's rigid solver.
+        mass: (worlds,) [kg].
+        centre: (3,) [m], the centre of mass in the body's frame.
+
+    Raises:
+        InvalidInputError: no rigid material, or one that does not fit the batch.
+        MeshError: the shape has no volume that the density could fill, or cannot move.
+    """
+
+    is_rigid = True
+
+    def __init__(
+        self, body: Body, material: Rigid, friction: Any, world: Simulation, state: State | None = None
+    ) -> None:
+        check_material(body.shape, material, world.world_count)
+        super().__init__(material, friction, world)
+        self.parts = parts_of(body, moves=True)
+        self.deformed, self.thickness = body._deformed, body.thickness
+        values = material.resolved(world.world_count)
+        self.mass, self.inertia, self.centre = _mass_of(body, material, values["density"][:, 0])
+        place, turn = body._pose()
+        self.scene = world._rigid_scene(place)
+        self.solver = self.scene.solver
+        slot, rows = self.scene.kept.pop(body.key, (None, None))
+        self.slot = self.solver.add(
+            self.parts, position=place + quat.rotate(turn, self.centre), quaternion=turn, mass=self.mass,
+            inertia=self.inertia, centre=self.centre, friction=friction, restitution=values["restitution"][:, 0],
+            air_drag=values["air_drag"][:, 0], group=body.group, collides_with=body.collides_with, slot=slot, rows=rows,
+        )  # fmt: skip
+        self.radius = float(self.solver.rules.radius.numpy()[self.slot])  # [m], around the centre of mass
+        self._world = world
+        self._pushing: tuple[Push, ...] | None = ()  # whose forces the solver has; None: those of a loaded state
+        if state is not None:
+            self.load_state(state)
+
+    @property
+    def substeps(self) -> int:  # type: ignore[override]
+        """Substeps of a frame, the solver's own."""
+        return int(self.solver.substeps)
+
+    def pose(self, body: Body) -> Pose:
+        """Return where the body's frame is, (3,) and (4,), in a batch (worlds, 3) and (worlds, 4)."""
+        middle, turn = self.solver.pose(self.slot)
+        place = middle - quat.rotate(turn, np.broadcast_to(self.centre, middle.shape))
+        return (place[0], turn[0]) if self.world_count == 1 else (place, turn)
+
+    def vertices(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m]."""
+        vertices = body._rigid_vertices(self.pose(body))
+        return np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+
+    def velocities(self, body: Body) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m/s] of the vertices."""
+        velocity, spin = self.solver.velocity(self.slot)
+        middle, _ = self.solver.pose(self.slot)
+        return velocity[:, None] + np.cross(spin[:, None], self.vertices(body) - middle[:, None])
+
+    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Put the body elsewhere; its velocities turn along."""
+        motion = compose((position, quaternion), invert(self.pose(body)))
+        velocity, spin = self.solver.velocity(self.slot)
+        turn = np.broadcast_to(motion[1], (self.world_count, 4))
+        self.solver.set_pose(
+            self.slot, position + quat.rotate(quaternion, np.broadcast_to(self.centre, position.shape)), quaternion
+        )
+        self.solver.set_velocity(self.slot, quat.rotate(turn, velocity), quat.rotate(turn, spin))
+
+    def motion(self, body: Body) -> BodyMotion:
+        """Return how the body moves."""
+        place, turn = self.solver.pose(self.slot)
+        return motion_of_rigid(self.mass, place, self.inertia, turn, *self.solver.velocity(self.slot))
+
+    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
+        """Give the body a velocity and an angular velocity."""
+        place, _ = self.solver.pose(self.slot)
+        self.solver.set_velocity(self.slot, given.at(place[:, None], place)[:, 0], given.angular)
+
+    def elastic_energy(self, body: Body) -> np.ndarray:
+        """Return (worlds,) [J]: none, for it does not deform."""
+        return np.zeros(self.world_count)
+
+    def prepare(self, time: float, frame: float) -> None:
+        """Bring the pushes that act from ``time`` [s] on."""
+        pushing = self.pushing(time)
+        if pushing != self._pushing:
+            total = np.sum([push.force for push in pushing], axis=0) if pushing else np.zeros((self.world_count, 6))
+            self.solver.set_forces(self.slot, total[:, :3], total[:, 3:])
+            self._pushing = pushing
+
+    def state(self) -> State:
+        """Return copies of all that the next step depends on; contacts name bodies by their place in the world."""
+        saved = self.solver.save_state(self.slot)
+        slots = self.scene.slots_of(self._world)
+        saved["partner_slot"] = _replaced(saved["partner_slot"], {slot: k for k, slot in enumerate(slots)})
+        return saved
+
+    def load_state(self, state: State) -> None:
+        """Set the state that `state` gave; contacts last where the bodies in them are in the scene already."""
+        slots = self.scene.slots_of(self._world)
+        partner = _replaced(state["partner_slot"], dict(enumerate(slots)))
+        self.solver.load_state(self.slot, {**state, "partner_slot": partner})
+        self._pushing = None
+
+    def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
+        """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
+        return self.thickness == thickness and _same_shape(self.deformed, deformed)
+
+    def finite(self) -> np.ndarray:
+        """Return (worlds,) bool, whether pose and velocities are finite."""
+        return self.solver.finite(self.slot)
+
+    def release(self) -> None:
+        """Give the slot back."""
+        self.solver.remove(self.slot)
+
+
+def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
+    """Return the parts of a body in its own frame, in the shape that it has now."""
+    from nuno.shapes.compound import Compound
+    from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
+
+    plain = isinstance(body.shape, Box | Sphere | Capsule | Cylinder | Plane | Compound)
+    # the same bits wherever the body is
+    vertices = None if plain and body._deformed is None else body.local_vertices()
+    return rigid_shape(body.shape, moves=moves, thickness=body.thickness, vertices=vertices, is_solid=body.is_solid)
+
+
+def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
+    vertices = body.local_vertices() if body._deformed is not None else None
+    if vertices is not None and vertices.ndim == 3:
+        vertices = vertices[0]
+    unit = mass_properties(body.shape, thickness=body.thickness, vertices=vertices)
+    mass = density * unit.volume
+    inertia = density[:, None, None] * unit.inertia
+    if material.mass is not None:
+        given = np.broadcast_to(np.asarray(material.mass, dtype=float), mass.shape)
+        inertia, mass = inertia * (given / mass)[:, None, None], given
+    if material.inertia is not None:
+        inertia = np.broadcast_to(material.inertia, inertia.shape)
+    return mass, inertia, unit.centre
+
+
+def _what(body: Body | BodyRecord) -> tuple[Any, ...]:
+    """Return what the solver takes of a static body, besides its pose and how it was deformed."""
+    return body.shape, np.asarray(body.friction).tobytes(), body.group, body.collides_with, body.thickness
+
+
+def _same_shape(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pose] | None) -> bool:
+    """Return whether two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
+    if a is None or b is None:
+        return a is b
+    return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))
+
+
+def _replaced(numbers: np.ndarray, by: dict[int, int]) -> np.ndarray:
+    """Numbers replaced by a table; -1 where it has none."""
+    result = np.full(numbers.shape, -1, dtype=numbers.dtype)
+    for number, other in by.items():
+        if number >= 0:
+            result[numbers == number] = other
+    return result

@@ -1,0 +1,192 @@
+"""In-plane elasticity: stretch along warp and weft, and shear (XPBD, Macklin et al. 2016).
+
+Each function projects constraints once: ``alpha`` is the compliance over dt^2. Lambda starts at zero in every substep,
+and the update is d lambda = -(C + alpha lambda) / (grad C . W grad C + alpha), times an over-relaxation where a substep
+makes several sweeps (`nuno.constraints.sweeps`); each particle then moves by w_i d lambda grad_i C. An index may be an
+int, or a vector of sixteen where sixteen elements are projected at once (`nuno.numbers.element_access`).
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.numbers.element_access import at, corner, put
+from nuno.numbers.lanes import add, div, full_like, least, most, mul, root, sub  # noqa: F401
+from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
+
+MOST_RELAXED = wp.constant(1.45)
+"""Bound of the over-relaxation: at 2 it would oscillate, and near it short waves take long to die down."""
+
+
+@wp.func
+def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
+    """The over-relaxation of a constraint by its denominator D + alpha: 1 + rise (sqrt(q) - onset), q = D / (2 alpha).
+
+    None where ``rise`` is 0. For the two see `nuno.constraints.relaxation`.
+    """
+    if rise == 0.0:
+        return full_like(weight, 1.0)
+    q = (weight - alpha) / alpha * 0.5
+    return least(most((root(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
+
+
+@wp.func
+def stretch_grid_line(
+    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
+):
+    """All edges of a grid line at once: C_k = |x_k - x_k+1| - rest_k.
+
+    Linear in its lambdas, a grid line has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and coupling it -w_k
+    times the cosine between the edges that meet at vertex k. Elimination forth and substitution back solve it exactly,
+    so that a force runs the whole length of a grid line in one substep. (The direct solution of a chain of XPBD
+    constraints: Deul et al. 2018, "Direct Position-Based Solver for Stiff Rods".)
+
+    Args:
+        t: The world's state.
+        table: The edges, each grid line's one after the other.
+        rest: Their lengths at rest [m]; in a later sweep those that the one before left them with (`note_lengths`).
+        gains: Room for a number an edge; so are ``pulls`` and ``inverses``.
+        pulls: See ``gains``.
+        inverses: See ``gains``.
+        first: The grid line's first edge.
+        last: One past its last.
+        rate: 1 / dt^2 [1/s2].
+    """
+    head = corner(table.edge, first, 0, 2)
+    a = position(t, head)
+    wa = at(t.w, head)
+    zero = full_like(a.x, 0.0)
+    before = vec3(zero, zero, zero)  # the direction of the edge before
+    pivot = zero
+    pull = zero
+    for k in range(first, last):
+        j = corner(table.edge, k, 1, 2)
+        b = position(t, j)
+        wb = at(t.w, j)
+        edge = a - b
+        length = root(dot(edge, edge) + 1.0e-20)
+        direction = edge * (1.0 / length)
+        # minus the entry beside the diagonal, shared with the edge before
+        coupling = wa * dot(before, direction)
+        gain = coupling * pivot
+        if k > first:
+            put(gains, k - 1, gain)
+        alpha = at(t.stretch_compliance, table.edge_compliance[k]) * (table.edge_scale[k] * rate)
+        pivot = 1.0 / (wa + wb + alpha + 1.0e-12 - coupling * gain)
+        pull = (rest[k] - length + coupling * pull) * pivot
+        put(pulls, k, pull)
+        put(inverses, k, 1.0 / length)
+        a = b
+        wa = wb
+        before = direction
+    # pull is now the last edge's lambda, and a the last vertex
+    force = vec3(zero, zero, zero)
+    for back in range(last - first):
+        k = last - 1 - back
+        i = corner(table.edge, k, 0, 2)
+        j = corner(table.edge, k, 1, 2)
+        if back > 0:
+            pull = at(pulls, k) + at(gains, k) * pull
+        b = position(t, i)
+        own = (b - a) * (pull * at(inverses, k))
+        put_position(t, j, a + at(t.w, j) * (force - own))
+        a = b
+        force = own
+    move(t, head, force * at(t.w, head))
+
+
+@wp.func
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
+    """A rectangular cell: C = F_u . F_v = s (|p|^2 - |q|^2), p = x_d - x_a and q = x_b - x_c its diagonals.
+
+    Its gradients are 2 s p at d, -2 s p at a, 2 s q at c and -2 s q at b; ``scale`` is s = 1 / (4 area). Returned is
+    minus the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
+    """
+    xa = position(t, a)
+    xb = position(t, b)
+    xc = position(t, c)
+    xd = position(t, d)
+    p = xd - xa
+    q = xb - xc
+    pp = dot(p, p)
+    qq = dot(q, q)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
+    wd = at(t.w, d)
+    weight = ((wa + wd) * pp + (wb + wc) * qq) * (scale * 4.0 * scale) + alpha + 1.0e-12
+    gain = ((pp - qq) * scale - alpha * past) / weight * relaxation(weight, alpha, rise, onset)
+    s = gain * (scale * 2.0)
+    put_position(t, a, xa + p * (s * wa))
+    put_position(t, d, xd - p * (s * wd))
+    put_position(t, b, xb + q * (s * wb))
+    put_position(t, c, xc - q * (s * wc))
+    return gain
+
+
+@wp.func
+def weighed(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
+    """The sum of k_i x_i, the k adding up to zero."""
+    base = position(t, a)
+    near = offset(base, base) * ka + offset(position(t, b), base) * kb
+    return near + offset(position(t, c), base) * kc
+
+
+@wp.func
+def stretch_triangle(
+    t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, alpha: Any, past: Any, rise: float, onset: float
+):
+    """A triangle along one material direction: C = |f| - 1, f = F k = sum k_i x_i, with the gradients k_i f / |f|.
+
+    Returned is the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
+    """
+    f = weighed(t, a, b, c, ka, kb, kc)
+    length = root(dot(f, f) + 1.0e-20)
+    wa = at(t.w, a) * ka
+    wb = at(t.w, b) * kb
+    wc = at(t.w, c) * kc
+    weight = wa * ka + wb * kb + wc * kc + alpha + 1.0e-12
+    s = (1.0 - length - alpha * past) / (weight * length) * relaxation(weight, alpha, rise, onset)
+    move(t, a, f * (s * wa))
+    move(t, b, f * (s * wb))
+    move(t, c, f * (s * wc))
+    return s * length
+
+
+@wp.func
+def shear_gradient(u: Any, v: Any, uu: Any, vv: Any, uv: Any):
+    """The squared gradient |u F_v + v F_u|^2 at a corner with weights u and v."""
+    return vv * (u * u) + uv * (u * 2.0 * v) + uu * (v * v)
+
+
+@wp.func
+def shear_triangle(
+    t: Any, table: Any, k: int, a: Any, b: Any, c: Any, alpha: Any, past: Any, rise: float, onset: float
+):
+    """A triangle's shear: C = F_u . F_v, F_u = sum u_i x_i and F_v = sum v_i x_i, with the gradients u_i F_v + v_i F_u.
+
+    The last three and what is returned as in `stretch_triangle`.
+    """
+    ua = corner(table.triangle_u, k, 0, 3)
+    ub = corner(table.triangle_u, k, 1, 3)
+    uc = corner(table.triangle_u, k, 2, 3)
+    va = corner(table.triangle_v, k, 0, 3)
+    vb = corner(table.triangle_v, k, 1, 3)
+    vc = corner(table.triangle_v, k, 2, 3)
+    fu = weighed(t, a, b, c, ua, ub, uc)
+    fv = weighed(t, a, b, c, va, vb, vc)
+    uu = dot(fu, fu)
+    vv = dot(fv, fv)
+    uv = dot(fu, fv)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    wc = at(t.w, c)
+    weight = 1.0e-12 + alpha
+    weight = weight + wa * shear_gradient(ua, va, uu, vv, uv)
+    weight = weight + wb * shear_gradient(ub, vb, uu, vv, uv)
+    weight = weight + wc * shear_gradient(uc, vc, uu, vv, uv)
+    s = (-uv - alpha * past) / weight * relaxation(weight, alpha, rise, onset)
+    move(t, a, (fv * ua + fu * va) * (s * wa))
+    move(t, b, (fv * ub + fu * vb) * (s * wb))
+    move(t, c, (fv * uc + fu * vc) * (s * wc))
+    return s

@@ -1,0 +1,1 @@
+"""Contact of particles, edges and triangles with static and kinematic shapes."""

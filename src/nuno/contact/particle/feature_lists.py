@@ -1,0 +1,211 @@
+"""Shapes that are sharp or small enough to stand through between vertices, and the edges and triangles near them.
+
+Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box, the rim of a cylinder
+and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found which of
+those may come that near within the frame (`nuno.contact.particle.feature_contact` looks at them); where a cloth lies on
+a table, far from its rim, that is one question about its bounding box. What does not touch changes no bit, so that it
+does not matter what else is listed.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.particle.distances import BOX, CYLINDER, FAR, PLANE
+from nuno.contact.particle.kinematic_pose import led_pose
+from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
+from nuno.numbers.lanes import add, anywhere, barrier, lane_max, least, most, mul, root, size_of, sub  # noqa: F401
+from nuno.numbers.vec3 import position, transposed_mul, vec3
+from nuno.state.cloth_state import CLOCK, THICKNESS, Settings, Shapes
+
+ROUND = wp.constant(3.0)
+"""Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
+twenty-fourth of it into such a ball, its diagonal a twelfth."""
+QUICK = wp.constant(3.0)
+"""[m/s] What comes nearer faster than this, where the surfaces do not yet touch, may be seen a substep late."""
+TRAVELLED, EARLIEST, DUE = wp.constant(0), wp.constant(1), wp.constant(2)
+"""Places in `State.feature_due`: how far anything may have gone since the lists were made, and from when on the first
+element wakes, and each, by how far anything has gone then [m]."""
+
+
+MOST_SLACK = wp.constant(100.0)
+"""[m] As far as a mark counts."""
+
+
+@wp.func
+def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
+    """Place [m] and rotation (row major, shape to world) of a shape after ``clock`` substeps."""
+    origin = origin_of(t)
+    centre = three_of(like, t, shapes, s * COLUMNS) - origin
+    turn = rotation_of(like, t, shapes, s * COLUMNS)
+    slot = shapes.slot[s]
+    if slot >= 0:
+        centre, turn = led_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+    return centre, turn
+
+
+@wp.func
+def stands_between(
+    kind: int, p: Any, h: Any, sa: Any, sb: Any, sc: Any, broad: float
+):  # fmt: skip
+    """Return whether what is within a box about p (half sides h, all in the shape's frame) may touch between vertices.
+
+    Returns:
+        Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
+        triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
+    """
+    x = size_of(p.x)
+    y = size_of(p.y)
+    z = size_of(p.z)
+    # how far the box ends beyond the shape's sides: a face has two of three well inside, an edge one, a corner none
+    apart = x
+    along = x
+    point = x
+    if kind == BOX:
+        qx = x + h.x - sa
+        qy = y + h.y - sb
+        qz = z + h.z - sc
+        apart = most(most(x - h.x - sa, y - h.y - sb), z - h.z - sc)
+        along = most(most(least(qx, qy), least(qy, qz)), least(qx, qz))
+        point = least(least(qx, qy), qz)
+    else:
+        slim = broad - sa
+        rho = root(x * x + y * y)
+        diagonal = root(h.x * h.x + h.y * h.y)
+        if kind == CYLINDER:
+            apart = most(rho - diagonal - sa, z - h.z - sb)
+            rim = least(rho + diagonal - sa, z + h.z - sb)
+            along = most(rim, slim)
+            point = least(rim, slim)
+        else:
+            beyond = most(z - sb, 0.0)
+            size = root(diagonal * diagonal + h.z * h.z)
+            apart = root(rho * rho + beyond * beyond) - size - sa
+            # the outermost point is on the half ball of one end, which may stand through by half a cell
+            stands = most(sa, broad * (0.5 / ROUND) - sa)
+            point = least(slim, size + stands - root(rho * rho + (z - sb) * (z - sb)))
+            along = slim
+    return least(along, -apart), least(point, -apart)
+
+
+@wp.func
+def clear_features(t: Any, topo: Any, rank: int):
+    """Start the lists anew; one thread does it.
+
+    `State.feature_shapes` has how many shapes are listed, how many elements of each colour, and then the shapes.
+    """
+    if rank == 0:
+        for k in range(topo.feature_colour.shape[0]):
+            t.feature_shapes[k] = 0
+        t.feature_due[TRAVELLED] = 0.0
+
+
+@wp.func
+def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, size: int):
+    """List the sharp shapes near the cloth, and mark the vertices by which they may touch within the frame.
+
+    By 1 where an edge at the vertex may be touched, by 2 where a triangle may, and by four times how far anything must
+    go before [um].
+    """
+    like = t.x[0]
+    clock = int(lane_max(t.notes[CLOCK]))
+    grow = reach_of_frame(t, shapes, float(run.frame) * run.dt) + QUICK * run.dt
+    # no point of an edge or triangle is farther from the nearest of its vertices than 0.6 of its longest edge
+    around = grow + 0.6 * topo.longest
+    # and within a substep
+    soon = t.scalars[THICKNESS] * 0.5 + (QUICK * run.dt + 0.6 * topo.longest)
+    broad = ROUND * run.cell
+    found = int(0)
+    for near in range(t.near[0]):
+        s = t.near[1 + near]
+        kind = shapes.kind[s]
+        if kind < PLANE:
+            centre, r = pose_of(like, t, shapes, s, clock)
+            extent = three_of(like, t, shapes, s * COLUMNS + 12)
+            # the cloth's box as the shape sees it
+            low = vec3(t.box[0], t.box[1], t.box[2])
+            high = vec3(t.box[3], t.box[4], t.box[5])
+            middle = (low + high) * 0.5 - centre
+            w = (high - low) * 0.5
+            h = vec3(
+                size_of(r.x.x) * w.x + size_of(r.y.x) * w.y + size_of(r.z.x) * w.z + grow,
+                size_of(r.x.y) * w.x + size_of(r.y.y) * w.y + size_of(r.z.y) * w.z + grow,
+                size_of(r.x.z) * w.x + size_of(r.y.z) * w.y + size_of(r.z.z) * w.z + grow,
+            )
+            along, point = stands_between(kind, transposed_mul(r, middle), h, extent.x, extent.y, extent.z, broad)
+            if anywhere(along):
+                if found == 0:
+                    for i in range(rank, topo.particles, size):
+                        t.feature_mark[i] = 0
+                if rank == 0:
+                    t.feature_shapes[topo.feature_colour.shape[0] + found] = s
+                found = found + 1
+                for i in range(rank, topo.particles, size):
+                    p = transposed_mul(r, position(t, i) - centre)
+                    along, point = stands_between(
+                        kind, p, vec3(around, around, around), extent.x, extent.y, extent.z, broad
+                    )  # fmt: skip
+                    if anywhere(along):
+                        at_once, _point = stands_between(
+                            kind, p, vec3(soon, soon, soon), extent.x, extent.y, extent.z, broad
+                        )  # fmt: skip
+                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MOST_SLACK))
+                        mark = t.feature_mark[i]
+                        if mark != 0:
+                            slack = wp.min(slack, mark >> 2)
+                        mark = (mark & 3) | 1
+                        if anywhere(point):
+                            mark = mark | 2
+                        t.feature_mark[i] = mark | slack << 2
+    if rank == 0:
+        t.feature_shapes[0] = found
+        t.feature_due[EARLIEST] = wp.where(found > 0, 0.0, FAR)
+
+
+@wp.func
+def slack_of(t: Any, topo: Any, k: int):
+    """Return the way that anything must go before element k may be touched [um]; below zero for never."""
+    edges = topo.side.shape[0]
+    mark = int(0)
+    slack = int(1.0e6 * MOST_SLACK)
+    if k < edges:
+        e = topo.side[k]
+        for c in range(2):
+            at = t.feature_mark[e[c]]
+            mark = mark | (at & 1)
+            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
+    elif k < edges + topo.face.shape[0]:
+        f = topo.face[k - edges]
+        for c in range(3):
+            at = t.feature_mark[f[c]]
+            mark = mark | (at & 2)
+            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
+    return wp.where(mark != 0, slack, -1)
+
+
+@wp.func
+def note_feature_shape(t: Any, topo: Any, k: int, slack: int):
+    """List element k where its slack is not below zero."""
+    if slack >= 0:
+        c = int(0)
+        while k >= topo.feature_colour[c + 1]:
+            c += 1
+        place = topo.feature_colour[c] + wp.atomic_add(t.feature_shapes, 1 + c, 1)
+        t.feature_list[place] = k
+        t.feature_due[DUE + place] = 1.0e-6 * float(slack)
+
+
+@wp.func
+def list_features(t: Any, topo: Any, rank: int, size: int):
+    """List the edges and triangles with marked vertices, once all are marked."""
+    if t.feature_shapes[0] > 0:
+        for k in range(rank, topo.side.shape[0] + topo.face.shape[0], 4 * size):
+            # four at a time, so that a thread waits for all their marks together
+            a = slack_of(t, topo, k)
+            b = slack_of(t, topo, k + size)
+            c = slack_of(t, topo, k + 2 * size)
+            d = slack_of(t, topo, k + 3 * size)
+            note_feature_shape(t, topo, k, a)
+            note_feature_shape(t, topo, k + size, b)
+            note_feature_shape(t, topo, k + 2 * size, c)
+            note_feature_shape(t, topo, k + 3 * size, d)

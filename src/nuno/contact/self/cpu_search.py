@@ -1,0 +1,378 @@
+"""The listing of one world's self-contact pairs on the CPU, sixteen elements at a time.
+
+The sixteen worlds of a lane vector fold in different places and at different times. So each is listed by itself, when
+it needs it: its positions are copied out of the lanes, and the vector then holds sixteen boxes, triangles or edges of
+that one world. One world alone is listed by the same code.
+
+The order of a list is that of the vertices and edges sorted by block, whatever its margin and the moment it was made.
+Pairs that touch are solved one after the other on the CPU, and so in the same order in every plan.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.self.cpu_flat_regions import survey_world
+from nuno.contact.self.cpu_scratch import ROOM, bound_world, copy_world
+from nuno.contact.self.simd_tests import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
+from nuno.state.cloth_state import MOST_NEIGHBOURS, Topology
+from nuno.topology.leaves import WINDOW
+
+RANGES = 48
+"""Ranges of consecutive leaves near a block that are kept apart."""
+
+
+@wp.func_native(
+    PRELUDE
+    + ROOM
+    + NEAR_TRIANGLES
+    + NEAR_EDGES
+    + KEEP
+    + """
+const int spans = boxes;
+const int *face_start = leaf_face_start.data, *edge_start = leaf_edge_start.data;
+const V limit = (V){} + far * far;
+auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        gap = least(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
+        gap = least(gap, high[c] - *(const V*)(rows + c * count + k));
+    }
+    return bits(gap > 0.f);
+};
+auto within = [&](const float* rows, int count, int k, float x, float y, float z, float reach) {
+    const V dx = x - *(const V*)(rows + k), dy = y - *(const V*)(rows + count + k);
+    const V dz = z - *(const V*)(rows + 2 * count + k), r = reach + *(const V*)(rows + 3 * count + k);
+    return r * r > dx * dx + dy * dy + dz * dz;
+};
+// the spheres that reach into a box
+auto reach = [&](const float* rows, int count, int k, const float* low, const float* high) {
+    const V r = *(const V*)(rows + 3 * count + k);
+    V gap = (V){} + 1e30f;
+    for (int c = 0; c < 3; ++c) {
+        const V x = *(const V*)(rows + c * count + k);
+        gap = least(gap, least(x - low[c], high[c] - x));
+    }
+    return gap + r > 0.f;
+};
+// the blocks, of sixteen, that fit a tame window together with block a: no two of their elements are near
+auto safe = [&](int a, int start) ALONE {
+    const int* span = leaf_span.data;
+    const I left = smaller(*(const I*)(span + start), span[a]);
+    const I right = larger(*(const I*)(span + spans + start), span[spans + a]);
+    const I low = smaller(*(const I*)(span + 2 * spans + start), span[2 * spans + a]);
+    const I high = larger(*(const I*)(span + 3 * spans + start), span[3 * spans + a]);
+    const I at = smaller(low, points / columns - WINDOW) * columns + smaller(left, columns - WINDOW);
+    return bits((right - left < WINDOW) & (high - low < WINDOW) & take_int(tame, at));
+};
+int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
+for (int c = 0; c < 2; ++c) {
+    int* most_counted = counted[c] + MOST_NEIGHBOURS * lanes;
+    if (*counted[c] > *most_counted) *most_counted = *counted[c];
+    *counted[c] = 0;
+}
+// suspects wait until there are sixteen
+int vertex_of[32], face_of[32], edge_of[32], other_of[32], faces_waiting = 0, edges_waiting = 0;
+auto test_faces = [&](int count) ALONE {
+    const I i = *(const I*)vertex_of, f = *(const I*)face_of;
+    const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
+    const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit, 1e9f) > 0.f);
+    keep(hit & ((1u << count) - 1), i, a, b, c, *counted[0], (int*)triangles, 1, most_triangles, most_triangles);
+};
+auto test_edges = [&](int count) ALONE {
+    const I e = *(const I*)edge_of, f = *(const I*)other_of;
+    const I a = take_int(end, e), b = take_int(end + edges, e), c = take_int(end, f), d = take_int(end + edges, f);
+    const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+};
+for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
+for (int a = 0; a < leaves; ++a) {
+    float low[3], high[3];
+    for (int c = 0; c < 3; ++c) {
+        low[c] = box[c * boxes + a] - far;
+        high[c] = box[(c + 3) * boxes + a] + far;
+    }
+    // ranges of consecutive blocks that meet block a; where there are too many, the last one stretches
+    int first[RANGES], last[RANGES], ranges = 0;
+    for (int g = 0; g < leaves_16; g += 16)
+        for (unsigned some = meet(group, groups, g, low, high); some; some &= some - 1) {
+            const int start = 16 * (g + __builtin_ctz(some));
+            unsigned near = meet(box, boxes, start, low, high);
+            if (near && columns > 0) near &= ~safe(a, start);
+            while (near) {
+                const int skip = __builtin_ctz(near), length = __builtin_ctz(~(near >> skip));
+                near &= ~(((1u << length) - 1) << skip);
+                const bool apart = ranges == 0 || last[ranges - 1] != start + skip;
+                if (apart && ranges < RANGES) first[ranges++] = start + skip;
+                last[ranges - 1] = start + skip + length;
+            }
+        }
+    if (ranges == 0) continue;
+    // the elements near the block, side by side
+    int face_count = 0, edge_count = 0;
+    for (int r = 0; r < ranges; ++r) {
+        const int face_stop = face_start[last[r]], edge_stop = edge_start[last[r]];
+        for (int j = face_start[first[r]]; j < face_stop; j += 16) {
+            const unsigned some = bits(reach(ball, faces, j, low, high) & (OWN + j < face_stop));
+            if (some == 0) continue;
+            ROLLED for (int c = 0; c < 4; ++c)
+                pack((int*)near_ball + c * faces, face_count, *(const I*)(ball + c * faces + j), some);
+            ROLLED for (int c = 0; c < 3; ++c)
+                pack(near_corner + c * faces, face_count, *(const I*)(corner + c * faces + j), some);
+            face_count = pack(near_face, face_count, OWN + j, some);
+        }
+        const int begin = edge_start[first[r]];
+        for (int j = begin > edge_start[a] ? begin : edge_start[a]; j < edge_stop; j += 16) {
+            const unsigned some = bits(reach(rod, edges, j, low, high) & (OWN + j < edge_stop));
+            if (some == 0) continue;
+            ROLLED for (int c = 0; c < 4; ++c)
+                pack((int*)near_rod + c * edges, edge_count, *(const I*)(rod + c * edges + j), some);
+            ROLLED for (int c = 0; c < 2; ++c)
+                pack(near_end + c * edges, edge_count, *(const I*)(end + c * edges + j), some);
+            edge_count = pack(near_edge, edge_count, OWN + j, some);
+        }
+    }
+    for (int k = leaf_vertex_start.data[a]; k < leaf_vertex_start.data[a + 1]; ++k) {
+        const int i = leaf_vertex.data[k];
+        const float x = point[4 * i], y = point[4 * i + 1], z = point[4 * i + 2];
+        for (int j = 0; j < face_count; j += 16) {
+            I near = within(near_ball, faces, j, x, y, z, far) & (OWN + j < face_count);
+            for (int c = 0; c < 3; ++c) near &= *(const I*)(near_corner + c * faces + j) != i;
+            const unsigned some = bits(near);
+            if (some) {
+                *(I*)(vertex_of + faces_waiting) = (I){} + i;
+                faces_waiting = pack(face_of, faces_waiting, *(const I*)(near_face + j), some);
+                if (faces_waiting >= 16) {
+                    test_faces(16);
+                    faces_waiting -= 16;
+                    *(I*)vertex_of = *(const I*)(vertex_of + 16);
+                    *(I*)face_of = *(const I*)(face_of + 16);
+                }
+            }
+        }
+    }
+    for (int k = edge_start[a]; k < edge_start[a + 1]; ++k) {
+        const float x = rod[k], y = rod[edges + k], z = rod[2 * edges + k], rod_reach = rod[3 * edges + k] + far;
+        const int p = end[k], q = end[edges + k];
+        for (int j = 0; j < edge_count; j += 16) {
+            const I other = *(const I*)(near_edge + j);
+            I near = within(near_rod, edges, j, x, y, z, rod_reach) & (OWN + j < edge_count) & (other > k);
+            for (int c = 0; c < 2; ++c) {
+                const I ends = *(const I*)(near_end + c * edges + j);
+                near &= (ends != p) & (ends != q);
+            }
+            const unsigned some = bits(near);
+            if (some) {
+                *(I*)(edge_of + edges_waiting) = (I){} + k;
+                edges_waiting = pack(other_of, edges_waiting, other, some);
+                if (edges_waiting >= 16) {
+                    test_edges(16);
+                    edges_waiting -= 16;
+                    *(I*)edge_of = *(const I*)(edge_of + 16);
+                    *(I*)other_of = *(const I*)(other_of + 16);
+                }
+            }
+        }
+    }
+}
+if (faces_waiting) test_faces(faces_waiting);
+if (edges_waiting) test_edges(edges_waiting);
+const int creases = crease.shape[0];
+for (int k = 0; k < creases; k += 16) {
+    I near = OWN + k < creases;
+    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_window.data, smaller(OWN + k, creases - 1)));
+    if (bits(near) == 0) continue;
+    const I row = smaller(OWN + k, creases - 1) * 4;
+    const int* table = (const int*)crease.data;
+    const I a = take_int(table, row), b = take_int(table + 1, row);
+    const I c = take_int(table + 2, row), d = take_int(table + 3, row);
+    const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
+    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+}
+#endif
+""".replace("RANGES", str(RANGES))
+    .replace("WINDOW", str(WINDOW))
+    .replace("MOST_NEIGHBOURS", str(MOST_NEIGHBOURS))
+)
+def search_world(
+    face: wp.array(dtype=wp.vec3i),
+    edge: wp.array(dtype=wp.vec2i),
+    leaf_vertex: wp.array(dtype=int),
+    leaf_vertex_start: wp.array(dtype=int),
+    leaf_face_start: wp.array(dtype=int),
+    leaf_edge_start: wp.array(dtype=int),
+    leaf_span: wp.array(dtype=int),
+    crease: wp.array(dtype=wp.vec4i),
+    crease_window: wp.array(dtype=int),
+    columns: int,
+    points: int,
+    leaves: int,
+    room: wp.uint64,
+    far: float,
+    lanes: int,
+    pair_count: wp.uint64,
+    triangles: wp.uint64,
+    most_triangles: int,
+    pairs: wp.uint64,
+    most_pairs: int,
+):
+    """List the pairs that share no vertex and are nearer than ``far`` [m].
+
+    The lists have every ``lanes``-th number; what does not fit is counted but not kept.
+    """
+    ...
+
+
+@wp.func_native(
+    PRELUDE
+    + NEAR_TRIANGLES
+    + NEAR_EDGES
+    + KEEP
+    + """
+const float *x0 = (const float*)x, *y0 = (const float*)y, *z0 = (const float*)z;
+const V limit = (V){} + far * far;
+const int* from[2] = {(const int*)triangles, (const int*)pairs};
+int* to[2] = {(int*)near_triangles_out, (int*)near_pairs_out};
+const int room[2] = {most_triangles, most_pairs};
+for (int kind = 0; kind < 2; ++kind) {
+    const int found = ((const int*)counts)[kind * lanes], count = found < room[kind] ? found : room[kind];
+    int near_count = 0;
+    for (int k = 0; k < count; k += 16) {
+        I q[4];
+        for (int c = 0; c < 4; ++c) q[c] = *(const I*)(from[kind] + c * room[kind] + k);
+        V near;
+        if (kind == 0)
+            near = near_triangles(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit, rim);
+        else
+            near = near_edges(x0, y0, z0, lanes, q[0], q[1], q[2], q[3], limit);
+        const unsigned hit = bits((near > 0.f) & (OWN + k < count));
+        keep(hit, q[0], q[1], q[2], q[3], near_count, to[kind], next, next == 1 ? room[kind] : lanes, room[kind]);
+    }
+    ((int*)near_counts)[kind * lanes] = near_count;
+}
+#endif
+"""
+)
+def filter_world(
+    x: wp.uint64,
+    y: wp.uint64,
+    z: wp.uint64,
+    far: float,
+    lanes: int,
+    counts: wp.uint64,
+    triangles: wp.uint64,
+    most_triangles: int,
+    pairs: wp.uint64,
+    most_pairs: int,
+    near_counts: wp.uint64,
+    near_triangles_out: wp.uint64,
+    near_pairs_out: wp.uint64,
+    next: int,
+    rim: float,
+):
+    """Copy those pairs of a list that are nearer than ``far`` [m] to another, in their order.
+
+    The other list is one like the first where ``next`` is 1; where it is 4 ``lanes`` it has every ``lanes``-th number.
+    """
+    ...
+
+
+@wp.func
+def pairs_of(pairs: wp.array(dtype=Any), which: int):
+    """Return where the list of world ``which`` of a vector stands: first vertices, then second ones, and so on."""
+    return pairs.ptr + wp.uint64(4 * which) * wp.uint64(pairs.shape[0])
+
+
+@wp.func
+def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
+    """List anew the pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
+    n = topo.particles
+    skip = wp.uint64(4 * which)
+    room = t.middle.ptr
+    copy_world(t.x.ptr + skip, t.y.ptr + skip, t.z.ptr + skip, t.reference.ptr + skip, lanes, n, room)
+    bound_world(
+        topo.leaf_face,
+        topo.leaf_edge,
+        topo.leaf_corner,
+        topo.leaf_corner_start,
+        n,
+        topo.leaves,
+        room,
+        lanes,
+        t.bounds.ptr + skip,
+    )
+    if topo.columns > 0:
+        survey_world(
+            topo.leaf_face, topo.leaf_edge, topo.columns, n, topo.leaves, room, far
+        )  # fmt: skip
+    search_world(
+        topo.leaf_face,
+        topo.leaf_edge,
+        topo.leaf_vertex,
+        topo.leaf_vertex_start,
+        topo.leaf_face_start,
+        topo.leaf_edge_start,
+        topo.leaf_span,
+        topo.crease,
+        topo.crease_window,
+        topo.columns,
+        n,
+        topo.leaves,
+        room,
+        far,
+        lanes,
+        t.pair_count.ptr + skip,
+        pairs_of(t.vertex_triangle, which),
+        t.vertex_triangle.shape[0] / 4,
+        pairs_of(t.edge_edge, which),
+        t.edge_edge.shape[0] / 4,
+    )
+
+
+@wp.func
+def fill_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
+    """Pick the listed pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
+    skip = wp.uint64(4 * which)
+    filter_world(
+        t.x.ptr + skip,
+        t.y.ptr + skip,
+        t.z.ptr + skip,
+        far,
+        lanes,
+        t.pair_count.ptr + skip,
+        pairs_of(t.vertex_triangle, which),
+        t.vertex_triangle.shape[0] / 4,
+        pairs_of(t.edge_edge, which),
+        t.edge_edge.shape[0] / 4,
+        t.inner_count.ptr + skip,
+        pairs_of(t.inner_triangle, which),
+        pairs_of(t.inner_edge, which),
+        1,
+        1.0e9,
+    )
+
+
+@wp.func
+def reach_world(t: Any, far: float, which: int, lanes: int):
+    """Find the picked pairs of world ``which`` nearer than ``far`` [m]: those that this substep may bring together.
+
+    It takes the worlds of a vector together, as many pairs as the one of them has that has the most.
+    """
+    skip = wp.uint64(4 * which)
+    filter_world(
+        t.x.ptr + skip,
+        t.y.ptr + skip,
+        t.z.ptr + skip,
+        far,
+        lanes,
+        t.inner_count.ptr + skip,
+        pairs_of(t.inner_triangle, which),
+        t.inner_triangle.shape[0] / 4,
+        pairs_of(t.inner_edge, which),
+        t.inner_edge.shape[0] / 4,
+        t.active_count.ptr + skip,
+        t.active_triangle.ptr + skip,
+        t.active_edge.ptr + skip,
+        4 * lanes,
+        2.0e-3,
+    )

@@ -1,0 +1,1 @@
+"""Contacts, ties and joints between bodies that move, solved together."""

@@ -1,0 +1,1 @@
+"""Files: recordings, meshes, animations, and files that appear whole or not at all."""

@@ -1,0 +1,1 @@
+"""Grips, ties, welds and joints as handles, and the numbers that solvers need of them."""

@@ -1,0 +1,177 @@
+"""Drives along a joint's free direction: motors, springs, friction and stops, as users give them and as a table."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nuno.errors import InvalidInputError
+from nuno.validation import finite_array
+
+DRIVES = (
+    "lower", "upper", "friction", "stiffness", "damping", "position", "velocity", "max_effort", "spring", "rest",
+    "spring_damping",
+)  # fmt: skip
+"""Numbers of a drive along the free direction, in the solver's order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motor:
+    """A motor of a hinge or slider; each value is a number or (worlds,).
+
+    Without ``position`` it turns or slides at ``velocity``: exactly, as long as that takes no more than
+    ``max_effort``, or with ``damping`` as a gain. With ``position`` its effort is ``stiffness`` times what is missing,
+    less ``damping`` times what the velocity is over ``velocity``.
+
+    Attributes:
+        velocity: [rad/s] or [m/s].
+        position: [rad] or [m], or None.
+        stiffness: [N m/rad] or [N/m], with ``position`` only.
+        damping: [N m s/rad] or [N s/m]; None is 0 with ``position``, else endless.
+        max_effort: [N m] or [N].
+
+    Raises:
+        InvalidInputError: a gain or effort that is negative, a position without stiffness, or stiffness without one.
+    """
+
+    velocity: Any = 0.0
+    position: Any = None
+    stiffness: Any = 0.0
+    damping: Any = None
+    max_effort: Any = math.inf
+
+    def __post_init__(self) -> None:
+        _checked("velocity", self.velocity)
+        stiffness = _checked("stiffness", self.stiffness, low=0.0)
+        if self.damping is not None:
+            _checked("damping", self.damping, low=0.0)
+        _checked("max_effort", self.max_effort, low=0.0, endless=True)
+        if self.position is None:
+            if np.any(stiffness > 0.0):
+                raise InvalidInputError("a motor's stiffness needs the position that it pulls to")
+        else:
+            _checked("position", self.position)
+            if not np.all(stiffness > 0.0):
+                raise InvalidInputError(f"a motor that goes to a position needs a stiffness, got {self.stiffness!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Spring:
+    """A spring of a hinge, slider or ball; each value is a number or (worlds,).
+
+    Attributes:
+        stiffness: [N m/rad] or [N/m].
+        rest: The position [rad] or [m] in which it is not stretched; of a ball joint 0.
+        damping: [N m s/rad] or [N s/m].
+
+    Raises:
+        InvalidInputError: a stiffness or damping that is negative.
+    """
+
+    stiffness: Any
+    rest: Any = 0.0
+    damping: Any = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping"):
+            _checked(name, getattr(self, name), low=0.0)
+        _checked("rest", self.rest)
+
+
+def drive_table(worlds: int, values: dict[str, Any], before: np.ndarray | None = None) -> np.ndarray:
+    """(worlds, 11), some of them changed."""
+    table = np.zeros((worlds, len(DRIVES))) if before is None else before.copy()
+    if before is None:
+        table[:, 0], table[:, 1] = -np.inf, np.inf
+    for name, value in values.items():
+        if np.shape(value) not in ((), (worlds,)):
+            raise InvalidInputError(f"{name} must be one value or ({worlds},), got shape {np.shape(value)}")
+        table[:, DRIVES.index(name)] = value
+    return table
+
+
+def _checked(name: str, value: Any, *, low: float = -np.inf, endless: bool = False) -> np.ndarray:
+    if endless and np.ndim(value) == 0 and value == np.inf:
+        return np.array(np.inf)
+    checked = finite_array(name, value, (), ("worlds",))
+    if (checked < low).any():
+        raise InvalidInputError(f"{name} must be at least {low:g}, got {value!r}")
+    return checked
+
+
+def limit_drives(kind: str, value: Any) -> dict[str, Any]:
+    """Return the numbers of stops, or of a ball joint's cone; None is none.
+
+    Raises:
+        InvalidInputError: a fixed joint, or stops that are out of range or in the wrong order.
+    """
+    if value is None:
+        return {"lower": 0.0 if kind == "ball" else -np.inf, "upper": np.inf}
+    if kind == "fixed":
+        raise InvalidInputError("a fixed joint has no limits")
+    if kind == "ball":
+        most = _checked("limit", value, low=0.0)
+        if (most >= 3.0).any():
+            raise InvalidInputError(f"limit must be below 3 rad, or None, got {value!r}")
+        return {"lower": 0.0, "upper": most}
+    try:
+        lower, upper = value
+    except (TypeError, ValueError) as problem:
+        raise InvalidInputError(f"limits must be (lower, upper), got {value!r}") from problem
+    lower, upper = _checked("the lower limit", lower), _checked("the upper limit", upper)
+    if (lower > upper).any():
+        raise InvalidInputError(f"the lower limit must not be above the upper, got {value!r}")
+    if kind == "hinge" and ((lower < -np.pi).any() or (upper > np.pi).any()):
+        raise InvalidInputError(f"a hinge's limits must lie within -pi and pi, got {value!r}")
+    return {"lower": lower, "upper": upper}
+
+
+def friction_drives(kind: str, value: Any) -> dict[str, Any]:
+    """Return the number of a joint's friction.
+
+    Raises:
+        InvalidInputError: a fixed joint, or friction that is negative.
+    """
+    if kind == "fixed":
+        raise InvalidInputError("a fixed joint has no friction")
+    return {"friction": _checked("friction", value, low=0.0)}
+
+
+def motor_drives(kind: str, value: Motor | None) -> dict[str, Any]:
+    """Return the numbers of a motor, or of none.
+
+    Raises:
+        InvalidInputError: no motor, or a joint that has none.
+    """
+    if value is None:
+        return dict.fromkeys(("stiffness", "damping", "position", "velocity", "max_effort"), 0.0)
+    if kind not in ("hinge", "slider"):
+        raise InvalidInputError(f"a {kind} joint has no motor; a hinge or a slider may have one")
+    if not isinstance(value, Motor):
+        raise InvalidInputError(f"motor must be a Motor or None, got {type(value).__name__}")
+    free = value.position is None
+    damping = (math.inf if free else 0.0) if value.damping is None else value.damping
+    return {
+        "stiffness": value.stiffness, "damping": damping, "position": 0.0 if free else value.position,
+        "velocity": value.velocity, "max_effort": value.max_effort,
+    }  # fmt: skip
+
+
+def spring_drives(kind: str, value: Spring | None) -> dict[str, Any]:
+    """Return the numbers of a spring, or of none.
+
+    Raises:
+        InvalidInputError: no spring, or a joint that has none.
+    """
+    if value is None:
+        return dict.fromkeys(("spring", "rest", "spring_damping"), 0.0)
+    if kind == "fixed":
+        raise InvalidInputError("a fixed joint has no spring")
+    if not isinstance(value, Spring):
+        raise InvalidInputError(f"spring must be a Spring or None, got {type(value).__name__}")
+    if kind == "ball" and np.any(value.rest):
+        raise InvalidInputError("a ball joint's spring rests where the joint was made: rest must be 0")
+    return {"spring": value.stiffness, "rest": value.rest, "spring_damping": value.damping}

@@ -1,0 +1,1 @@
+"""Number types of kernels: SIMD lanes, doubles, warps and groups of CUDA blocks, with their arithmetic."""

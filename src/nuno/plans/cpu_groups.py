@@ -1,0 +1,77 @@
+"""Groups of lanes on the cores of the CPU."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import warp as wp
+
+from nuno.state.cloth_state import Settings
+
+PIECES = 12
+"""Launches of a group of lanes in a run, between which threads may change groups."""
+
+_threads: ThreadPoolExecutor | None = None
+
+
+def run_groups(
+    launch: Callable[[int, Settings, int], None], module: Any, groups: int, run: Settings, substeps: int
+) -> None:
+    """Call ``launch`` with every group, settings and a number of substeps, a thread per core.
+
+    Each group goes through the run piece by piece, so that three groups on two cores take one and a half times as long
+    as one, not twice. Warp's CPU launches release the GIL.
+
+    Args:
+        launch: Launches a kernel for a group.
+        module: The kernel's module.
+        groups: How many there are.
+        run: Settings of the run.
+        substeps: Its length.
+    """
+    if groups == 1:
+        launch(0, run, substeps)
+        return
+    wp.load_module(module, device="cpu")  # here, for every thread would compile it for itself
+    pieces = [run] if substeps < 2 * PIECES else [_from(run, k * substeps // PIECES) for k in range(PIECES)]
+    ends = [piece.first - run.first for piece in pieces[1:]] + [substeps]
+    waiting: SimpleQueue[tuple[int, int]] = SimpleQueue()
+    for group in range(groups):
+        waiting.put((group, 0))
+
+    def work(_: int) -> None:
+        while True:
+            try:
+                group, k = waiting.get_nowait()
+            except Empty:
+                return
+            launch(group, pieces[k], ends[k] - (pieces[k].first - run.first))
+            if k + 1 < len(pieces):
+                waiting.put((group, k + 1))
+
+    list(_pool().map(work, range(min(_cores(), groups))))
+
+
+def _pool() -> ThreadPoolExecutor:
+    """A thread per core."""
+    global _threads
+    if _threads is None:
+        _threads = ThreadPoolExecutor(_cores(), thread_name_prefix="nuno-lanes")
+    return _threads
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+def _from(run: Settings, start: int) -> Settings:
+    """The same settings from a later substep on."""
+    later = Settings()
+    for name in run._cls.vars:  # type: ignore[attr-defined]
+        setattr(later, name, getattr(run, name))
+    later.first = run.first + start
+    return later

@@ -1,0 +1,1 @@
+"""Rigid bodies: convex parts, broad phase, contact manifolds, and the passes of a substep."""

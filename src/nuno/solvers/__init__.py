@@ -1,0 +1,1 @@
+"""Solvers: the arrays of bodies on a device, and the plan that runs them."""

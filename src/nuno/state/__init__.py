@@ -1,0 +1,1 @@
+"""The state of particles on the device, and the prediction and velocities of a substep."""

@@ -1,0 +1,182 @@
+"""Small kernels between the solver's layout and the rest: positions for the renderer, the clock, what is finite."""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from nuno.numbers.doubles import double_lane
+from nuno.numbers.lanes import lane
+from nuno.state.cloth_state import CLOCK, NOTES, ORIGIN, SCALARS
+
+
+@wp.kernel(enable_backward=False)
+def pack(
+    x: wp.array(dtype=Any),
+    y: wp.array(dtype=Any),
+    z: wp.array(dtype=Any),
+    scalars: wp.array(dtype=Any),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """One world after the other, (worlds, n) of vec3."""
+    world, i = wp.tid()
+    k = world * n + i
+    o = world * SCALARS + ORIGIN
+    out[world, i] = wp.vec3(x[k] + scalars[o], y[k] + scalars[o + 1], z[k] + scalars[o + 2])
+
+
+@wp.kernel(enable_backward=False)
+def pack_lanes(
+    x: wp.array(dtype=lane),
+    y: wp.array(dtype=lane),
+    z: wp.array(dtype=lane),
+    scalars: wp.array(dtype=lane),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """The same out of lanes."""
+    group, i = wp.tid()
+    k = group * n + i
+    a = x[k]
+    b = y[k]
+    c = z[k]
+    o = group * SCALARS + ORIGIN
+    a = a + scalars[o]
+    b = b + scalars[o + 1]
+    c = c + scalars[o + 2]
+    for j in range(16):
+        world = group * 16 + j
+        if world < out.shape[0]:
+            out[world, i] = wp.vec3(a[j], b[j], c[j])
+
+
+# A module of its own: only bodies with coordinates as doubles need it.
+@wp.kernel(enable_backward=False, module="nuno.state.pack_doubles")
+def pack_doubles(
+    x: wp.array(dtype=wp.float64),
+    y: wp.array(dtype=wp.float64),
+    z: wp.array(dtype=wp.float64),
+    scalars: wp.array(dtype=float),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """`pack` of doubles, rounded once."""
+    world, i = wp.tid()
+    k = world * n + i
+    o = world * SCALARS + ORIGIN
+    a = x[k] + wp.float64(scalars[o])
+    b = y[k] + wp.float64(scalars[o + 1])
+    c = z[k] + wp.float64(scalars[o + 2])
+    out[world, i] = wp.vec3(float(a), float(b), float(c))
+
+
+@wp.kernel(enable_backward=False, module="nuno.state.pack_doubles")
+def pack_doubles_lanes(
+    x: wp.array(dtype=double_lane),
+    y: wp.array(dtype=double_lane),
+    z: wp.array(dtype=double_lane),
+    scalars: wp.array(dtype=lane),
+    n: int,
+    out: wp.array2d(dtype=wp.vec3),
+):
+    """The same out of lanes."""
+    group, i = wp.tid()
+    k = group * n + i
+    o = group * SCALARS + ORIGIN
+    lanes = int(16)
+    for j in range(lanes):
+        world = group * 16 + j
+        if world < out.shape[0]:
+            a = x[k][j] + wp.float64(scalars[o][j])
+            b = y[k][j] + wp.float64(scalars[o + 1][j])
+            c = z[k][j] + wp.float64(scalars[o + 2][j])
+            out[world, i] = wp.vec3(float(a), float(b), float(c))
+
+
+@wp.kernel(enable_backward=False)
+def zero_note(notes: wp.array(dtype=Any), stride: int, entry: int):
+    """Set a note of each world or group to zero."""
+    i = wp.tid() * stride + entry
+    notes[i] = notes[i] * 0.0
+
+
+wp.overload(
+    pack,
+    [
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        wp.array(dtype=float),
+        int,
+        wp.array2d(dtype=wp.vec3),
+    ],
+)
+wp.overload(zero_note, [wp.array(dtype=float), int, int])
+wp.overload(zero_note, [wp.array(dtype=lane), int, int])
+
+
+# A module of its own: only CUDA asks it.
+@wp.kernel(enable_backward=False, module="nuno.state.finite")
+def find_broken(
+    x: wp.array(dtype=float),
+    y: wp.array(dtype=float),
+    z: wp.array(dtype=float),
+    vx: wp.array(dtype=float),
+    vy: wp.array(dtype=float),
+    vz: wp.array(dtype=float),
+    n: int,
+    broken: wp.array(dtype=int),
+):
+    """Note the worlds with a number that is not finite."""
+    world, i = wp.tid()
+    k = world * n + i
+    if not (
+        wp.isfinite(x[k])
+        and wp.isfinite(y[k])
+        and wp.isfinite(z[k])
+        and wp.isfinite(vx[k])
+        and wp.isfinite(vy[k])
+        and wp.isfinite(vz[k])
+    ):
+        broken[world] = 1
+
+
+def finite_worlds(
+    state: Any, worlds: int, n: int, device: str, counts: wp.array | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """(worlds,) bool: whether every position and velocity is finite, found on the device; and (worlds, k) ``counts``.
+
+    All comes in one piece, which the device is waited for once.
+    """
+    flags = wp.zeros(worlds + (0 if counts is None else counts.size), dtype=int, device=device)
+    arrays = [getattr(state, name) for name in ("x", "y", "z", "vx", "vy", "vz")]
+    wp.launch(find_broken, dim=(worlds, n), inputs=[*arrays, n, flags], device=device)
+    if counts is not None:
+        wp.copy(flags, counts, dest_offset=worlds)
+    values = flags.numpy()
+    return np.asarray(values[:worlds] == 0), None if counts is None else values[worlds:].reshape(worlds, -1)
+
+
+def pack_positions(
+    state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None,
+    places: list[wp.array] | None = None,
+) -> wp.array:  # fmt: skip
+    """(worlds, n) array of vec3 [m] from a solver's state, or into ``out``; from doubles, where they are ``places``."""
+    if out is None:
+        out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
+    places = [state.x, state.y, state.z] if places is None else places
+    kernels = (pack_doubles, pack_doubles_lanes) if places[0].dtype in (wp.float64, double_lane) else (pack, pack_lanes)
+    count = -(-worlds // lanes)
+    wp.launch(kernels[lanes > 1], dim=(count, n), inputs=[*places, state.scalars, n, out], device=device)
+    return out
+
+
+def reset_note(state: Any, groups: int, device: str, entry: int) -> None:
+    """Set one of the notes to zero in all worlds."""
+    wp.launch(zero_note, dim=groups, inputs=[state.notes, NOTES, entry], device=device)
+
+
+def reset_clock(state: Any, groups: int, device: str) -> None:
+    """Start a run's clock at zero."""
+    reset_note(state, groups, device, CLOCK)

@@ -1,0 +1,170 @@
+"""The state of a soft body as kernels have it: the arrays of its worlds, and the tetrahedra that they share."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.numbers.doubles import double_lane, float64
+from nuno.numbers.lanes import lane, lane_int, window
+from nuno.state.cloth_state import INNER_REACH, LISTINGS, LOADS, NOTES, PARTICLE_ARRAYS, PLACES
+
+INVERTED, SEEN = LISTINGS, INNER_REACH
+"""Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
+whether one is in this."""
+
+SHIFTS = ("shift_x", "shift_y", "shift_z")
+"""Shifts of a particle in the substep by elements that are inside out, which give it no speed [m]."""
+
+
+def _make(name: str, number: type, integer: type, place: type) -> Any:
+    """A struct under the names that `nuno.state.cloth_state` has for the arrays that all particles have."""
+    numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box")
+    numbers += SHIFTS
+    numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_inverse_mass", "grip_load")
+    fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
+    fields |= {name: wp.array(dtype=place) for name in PLACES}
+    fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
+    fields |= {
+        name: wp.array(dtype=int)
+        for name in ("near", "feature_shapes", "feature_mark", "feature_list", "gone_to", "moved")
+    }
+    fields["feature_due"] = wp.array(dtype=float)
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+
+
+SoftFloat = _make("SoftFloat", float, int, float)
+"""One world after the other: CUDA, and one world alone on the CPU."""
+
+SoftLanes = _make("SoftLanes", lane, lane_int, lane)
+"""Sixteen worlds in the lanes of each element: batches on the CPU."""
+
+SoftDouble, SoftDoubleLanes = (
+    _make("SoftDouble", float, int, float64),
+    _make("SoftDoubleLanes", lane, lane_int, double_lane),
+)
+"""The same with coordinates as doubles, as `nuno.state.cloth_state` has them."""
+
+
+CLUSTER = wp.constant(5)
+"""Elements that a cluster has room for: see `nuno.topology.element_clusters`."""
+
+
+@wp.struct
+class Tetrahedra:
+    """A soft body's elements, the same in every world, in clusters that are sorted by colour.
+
+    ``inner`` and ``outer`` are a cluster's vertices, ``shape`` where the ``number`` of its elements begin and how many
+    outer elements it has. Rest shapes are rows of `CLUSTER` elements, two vectors of four columns of
+    `nuno.constraints.tetrahedron` each. ``modulus`` is which of a world's moduli an element has, where they ``differ``.
+    """
+
+    particles: int
+    rows: int
+    differ: int
+    speed: float
+    height: float
+    inner: wp.array(dtype=wp.vec4i)
+    outer: wp.array(dtype=wp.vec4i)
+    shape: wp.array(dtype=wp.vec2i)
+    number: wp.array(dtype=wp.vec4)
+    modulus: wp.array(dtype=int)
+    colour: wp.array(dtype=int)
+
+
+@wp.struct
+class SimdClusters:
+    """The same by groups of sixteen clusters, and room for what all particles of a world have in common."""
+
+    rows: int
+    differ: int
+    speed: float
+    height: float
+    inner: wp.array(dtype=lane_int)
+    outer: wp.array(dtype=lane_int)
+    count: wp.array(dtype=int)
+    number: wp.array(dtype=lane)
+    modulus: wp.array(dtype=lane_int)
+    colour: wp.array(dtype=int)
+    scalars: wp.array(dtype=lane)
+    notes: wp.array(dtype=lane)
+
+
+@wp.struct
+class Sides:
+    """A soft body's surface, under the names that `nuno.state.cloth_state.Topology` has for a cloth's."""
+
+    particles: int
+    side: wp.array(dtype=wp.vec2i)
+    face: wp.array(dtype=wp.vec3i)
+    feature_colour: wp.array(dtype=int)
+    side_colours: int
+    longest: float
+
+
+@wp.struct
+class FarSides:
+    """`Sides` in kernels that go on for as long as nothing sharp is near."""
+
+    particles: int
+    side: wp.array(dtype=wp.vec2i)
+    face: wp.array(dtype=wp.vec3i)
+    feature_colour: wp.array(dtype=int)
+    side_colours: int
+    longest: float
+
+
+@wp.struct
+class SoftSizes:
+    """Elements of each per-world array that belong to one world."""
+
+    modulus: int
+    forces: int
+    keys: int
+    grips: int
+    near: int
+    feature_shapes: int
+    feature_list: int
+    moved: int
+
+
+@wp.func
+def view(s: Any, group: int, n: int, sizes: SoftSizes):
+    """The part of the state that belongs to one world, or to one group of lanes."""
+    t = s
+    t.group = group
+    t.x = window(s.x, group * n, n)
+    t.y = window(s.y, group * n, n)
+    t.z = window(s.z, group * n, n)
+    t.px = window(s.px, group * n, n)
+    t.py = window(s.py, group * n, n)
+    t.pz = window(s.pz, group * n, n)
+    t.vx = window(s.vx, group * n, n)
+    t.vy = window(s.vy, group * n, n)
+    t.vz = window(s.vz, group * n, n)
+    t.w = window(s.w, group * n, n)
+    t.shift_x = window(s.shift_x, group * n, n)
+    t.shift_y = window(s.shift_y, group * n, n)
+    t.shift_z = window(s.shift_z, group * n, n)
+    t.fx = window(s.fx, group * sizes.forces, sizes.forces)
+    t.fy = window(s.fy, group * sizes.forces, sizes.forces)
+    t.fz = window(s.fz, group * sizes.forces, sizes.forces)
+    t.mu = window(s.mu, group * sizes.modulus, sizes.modulus)
+    t.bulk = window(s.bulk, group * sizes.modulus, sizes.modulus)
+    t.scalars = window(s.scalars, group * 7, 7)
+    t.notes = window(s.notes, group * NOTES, NOTES)
+    t.box = window(s.box, group * 6, 6)
+    t.grip_x = window(s.grip_x, group * sizes.keys, sizes.keys)
+    t.grip_y = window(s.grip_y, group * sizes.keys, sizes.keys)
+    t.grip_z = window(s.grip_z, group * sizes.keys, sizes.keys)
+    t.grip_weight = window(s.grip_weight, group * 3 * sizes.grips, 3 * sizes.grips)
+    t.grip_inverse_mass = window(s.grip_inverse_mass, group * sizes.grips, sizes.grips)
+    t.grip_load = window(s.grip_load, group * LOADS * sizes.grips, LOADS * sizes.grips)
+    t.grip_corner = window(s.grip_corner, group * 3 * sizes.grips, 3 * sizes.grips)
+    t.near = window(s.near, group * sizes.near, sizes.near)
+    t.feature_shapes = window(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
+    t.gone_to = window(s.gone_to, group, 1)
+    t.feature_mark = window(s.feature_mark, group * n, n)
+    t.feature_list = window(s.feature_list, group * sizes.feature_list, sizes.feature_list)
+    t.feature_due = window(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
+    t.moved = window(s.moved, group * sizes.moved, sizes.moved)
+    return t

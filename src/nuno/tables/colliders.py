@@ -1,0 +1,315 @@
+"""Static and moving shapes as tables for the contact kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
+from nuno.contact.particle.shape_contact import COLUMNS
+from nuno.errors import BodyStateError
+from nuno.shapes import quaternion as quat
+from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
+from nuno.state.cloth_state import Shapes
+from nuno.tables.kinematic_motion import Schedule, is_kinematic
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+
+UNBOUNDED = 1.0e9
+"""[m] Bounding radius of a plane."""
+ENDLESS = 2**30
+"""Substeps of the frame in which all stand still."""
+
+
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotation matrices of unit quaternions (..., 4) as (w, x, y, z)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternions, dtype=float), -1, 0)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+class Colliders:
+    """The static bodies as the kernels see them.
+
+    A body that follows a path, or a body that does, has a slot of key poses, which `follow` sets for each run without
+    making any table anew.
+
+    Attributes:
+        shapes: The Warp struct.
+        count: Number of shapes.
+        keys: The keys of their bodies, in the table's order.
+        kinematic: Bodies with a slot, in the slots' order.
+        least_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
+    """
+
+    def __init__(
+        self, shapes: Shapes, keys: Sequence[str], meshes: list[Any], kinematic: Sequence[Body],
+        centres: Sequence[np.ndarray], least_radius: float,
+    ) -> None:  # fmt: skip
+        self.shapes, self.count, self.keys = shapes, len(keys), tuple(keys)
+        self.kinematic, self.least_radius = tuple(kinematic), least_radius
+        self._meshes = meshes
+        # (worlds, led, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
+        self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
+        self._has_centres = bool(self._centres.any())
+        self._times = np.zeros(0)
+        self._path_batch: tuple[tuple[str, ...], np.ndarray, np.ndarray] | None = None
+
+    @classmethod
+    def from_bodies(
+        cls,
+        bodies: Sequence[Body],
+        world_count: int = 1,
+        device: str = "cpu",
+        *,
+        pair_friction: Mapping[str, float] | None = None,
+    ) -> Colliders:
+        """Build the tables.
+
+        Args:
+            bodies: Static bodies; poses may be per world.
+            world_count: Worlds in the batch.
+            device: Where the tables live.
+            pair_friction: By body name, a friction coefficient against the touching body that overrides the
+                geometric mean.
+        """
+        pair_friction = pair_friction or {}
+        per_world = any(_differs(body, pair_friction.get(body.name)) for body in bodies)
+        worlds = world_count if per_world else 1
+        meshes: list[Any] = []
+        kinematic: list[Body] = []
+        centres: list[np.ndarray] = []
+        kinds = np.full(max(1, len(bodies)), PLANE, dtype=np.int32)
+        slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
+        table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
+        ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
+        faces = np.zeros((max(1, len(bodies)), 2), dtype=np.int32)
+        planes = [np.zeros((1, 4), dtype=np.float32)]
+        for k, body in enumerate(bodies):
+            row = table[:, k]
+            row[:, 15] = body.friction
+            row[:, 16] = pair_friction.get(body.name, -1.0)
+            position, quaternion = body.position, np.asarray(body.quaternion)
+            primitive, centre = _describe(body), np.zeros(3)
+            if isinstance(body.shape, Hull) and not body.is_deformed:
+                kinds[k] = HULL
+                own, centre, row[:, 12:15] = _hull(body.shape)
+                faces[k, 0] = sum(map(len, planes))
+                faces[k, 1] = faces[k, 0] + len(own)
+                planes.append(own)
+                row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
+                position = position + quat.rotate(quaternion, centre)
+            elif primitive is None:
+                kinds[k] = SOLID_MESH if body.is_solid else SHELL_MESH
+                made, centre, row[:, 12:15] = _meshes_of(body, device)
+                meshes += made
+                ids[:, k] = [mesh.id for mesh in made] if len(made) > 1 else made[0].id
+                row[:, 17] = 0.0 if body.is_solid else 0.5 * body.thickness
+                row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
+                position = position + quat.rotate(quaternion, centre)
+            else:
+                kinds[k], row[:, 12:15], row[:, 18] = primitive
+            row[:, :3] = position
+            row[:, 3:12] = rotation_matrices(quaternion).reshape(-1, 9)
+            if is_kinematic(body):
+                slots[k] = len(kinematic)
+                kinematic.append(body)
+                centres.append(np.broadcast_to(centre, (worlds, 3)))
+        shapes = Shapes()
+        shapes.count = len(bodies)
+        shapes.stride = table.shape[1] * COLUMNS if worlds > 1 else 0
+        shapes.mesh_stride = ids.shape[1] if worlds > 1 else 0
+        size = max(1, len(kinematic)) * SLOT_SIZE
+        shapes.pose_stride = size if worlds > 1 else 0
+        shapes.kind = wp.array(kinds, dtype=int, device=device)
+        shapes.table = wp.array(table.ravel(), dtype=float, device=device)
+        shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
+        shapes.faces = wp.array(faces, dtype=wp.vec2i, device=device)
+        shapes.planes = wp.array(np.concatenate(planes), dtype=wp.vec4, device=device)
+        shapes.slot = wp.array(slots, dtype=int, device=device)
+        shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
+        shapes.timing = wp.zeros(2, dtype=int, device=device)
+        shapes.shape_speed = wp.zeros(1, dtype=float, device=device)
+        curved = np.where((kinds == BOX) | (kinds == CYLINDER), 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
+        keys = [body.key for body in bodies]
+        return cls(shapes, keys, meshes, kinematic, centres, float(curved.min()))
+
+    def follow(self, schedule: Schedule) -> None:
+        """Take where the kinematic bodies are during the next run; arrays keep their places on the device."""
+        if not self.kinematic:
+            return
+        frames = len(schedule.times) // 2
+        if not 1 <= frames < FRAMES:
+            raise ValueError(f"a run may have 1 to {FRAMES - 1} frames, got {frames}")
+        worlds = len(self.shapes.pose) // (len(self.kinematic) * SLOT_SIZE)
+        place = np.empty((worlds, len(self.kinematic), 2 * frames + 1, 3))
+        turn = np.empty((worlds, len(self.kinematic), 2 * frames + 1, 4))
+        slots = self._slots
+        for key, pose in schedule.alone.items():
+            if key in slots:
+                place[:, slots[key]], turn[:, slots[key]] = pose
+        for keys, places, turns in schedule.path_batches:
+            own, rows = self._slots_of(keys)
+            place[:, own], turn[:, own] = places[rows], turns[rows]
+        if self._has_centres:
+            place += quat.rotate(turn, self._centres[:, :, None])
+        # the short way round between neighbours, which the kernels blend number by number
+        flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
+        turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
+        table = self._table
+        first = 2 * np.arange(frames + 1)
+        base = np.round(place[:, :, first] * 1024.0) / 1024.0
+        table[:, :, : frames + 1, :3] = base
+        for k in range(3):
+            # the frame that begins at the end stands still
+            which = np.minimum(first + k, 2 * frames)
+            into = table[:, :, : frames + 1, 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
+            into[..., :3] = place[:, :, which] - base
+            into[..., 3:] = turn[:, :, which]
+        shape_speed = self._shape_speed(schedule.times, place, turn)
+        if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
+            self._shape_speed_on_cpu[0] = shape_speed
+        else:
+            self.shapes.pose.assign(table.ravel())
+            self.shapes.shape_speed.assign(np.array([shape_speed], dtype=np.float32))
+        self._times = schedule.times
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        """Key poses (worlds, led, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
+        shape = (-1, len(self.kinematic), FRAMES, FRAME_SIZE)
+        pose = self.shapes.pose
+        found = pose.numpy() if pose.device.is_cpu else np.zeros(len(pose), dtype=np.float32)
+        return np.asarray(found.reshape(shape))
+
+    @cached_property
+    def _shape_speed_on_cpu(self) -> np.ndarray:
+        return np.asarray(self.shapes.shape_speed.numpy())
+
+    @cached_property
+    def _slots(self) -> dict[str, int]:
+        return {body.key: slot for slot, body in enumerate(self.kinematic)}
+
+    def _slots_of(self, keys: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the slots of those of many bodies that have one, and which they are."""
+        if self._path_batch is None or self._path_batch[0] is not keys:
+            pairs = [(self._slots[key], row) for row, key in enumerate(keys) if key in self._slots]
+            own, rows = np.array(pairs, dtype=int).reshape(-1, 2).T
+            self._path_batch = (keys, own, rows)
+        return self._path_batch[1], self._path_batch[2]
+
+    def _shape_speed(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray) -> float:
+        """The fastest that any point of the kinematic bodies moves [m/s]."""
+        span = np.diff(times)
+        radii = self._radii[:, None]
+        speed = np.linalg.norm(place[:, :, 1:] - place[:, :, :-1], axis=-1) / span
+        dot = np.minimum(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 1.0)
+        return float((speed + 2.0 * np.arccos(dot) / span * radii).max())
+
+    @cached_property
+    def _radii(self) -> np.ndarray:
+        """Bounding radii of the kinematic bodies [m]; 0 for a plane, of which no bound is needed."""
+        slots = self.shapes.slot.numpy()
+        rows = np.argsort(slots)[len(slots) - len(self.kinematic) :]
+        radii = self.shapes.table.numpy().reshape(-1, len(slots), COLUMNS)[0, rows, 18]
+        return np.where(radii < UNBOUNDED, radii, 0.0)
+
+    def begin(self, time: float, dt: float) -> None:
+        """Be told that a launch begins at ``time`` with substeps of ``dt`` [s]."""
+        if self.kinematic and len(self._times) > 1:
+            starts = self._times[::2]
+            first = int(np.argmin(np.abs(starts - time)))
+            # at the end all stand still, for however long: that frame has no end
+            span = round((starts[first + 1] - starts[first]) / dt) if first + 1 < len(starts) else ENDLESS
+            self.shapes.timing.assign(np.array([first, max(1, span)], dtype=np.int32))
+
+
+@lru_cache(maxsize=256)
+def _rigid_mesh(shape: Shape, device: str) -> tuple[Any, np.ndarray, np.ndarray]:
+    """A shape's triangles on a device about the middle of their bounding box; the middle, and the half sides."""
+    return _centred(*shape.mesh(), device)
+
+
+def _centred(points: np.ndarray, faces: np.ndarray, device: str) -> tuple[Any, np.ndarray, np.ndarray]:
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    mesh = wp.Mesh(
+        points=wp.array((points - middle).astype(np.float32), dtype=wp.vec3, device=device),
+        indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
+    )
+    return mesh, middle, 0.5 * (high - low)
+
+
+@lru_cache(maxsize=256)
+def _hull(shape: Hull) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A hull's planes (k, 4) about the middle of its bounding box; the middle, and the half sides."""
+    points = shape.mesh()[0]
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    planes = spread(shape.planes)
+    planes[:, 3] -= planes[:, :3] @ middle
+    return planes.astype(np.float32), middle, 0.5 * (high - low)
+
+
+def spread(planes: np.ndarray) -> np.ndarray:
+    """Return planes (k, 4) in an order in which each looks elsewhere than all before it.
+
+    What is beside a hull is then found to be so by the first few.
+    """
+    order = [0]
+    likeness = planes[:, :3] @ planes[0, :3]
+    for _ in range(1, len(planes)):
+        likeness[order[-1]] = np.inf
+        order.append(int(np.argmin(likeness)))
+        likeness = np.maximum(likeness, planes[:, :3] @ planes[order[-1], :3])
+    return np.array(planes[order])
+
+
+def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarray]:
+    """Meshes of a body, one or one a world, their frames' origins in the body's frame and half sides, (..., 3)."""
+    if len(body.faces) == 0:
+        raise BodyStateError(f"{body.name!r} has neither a known shape nor faces to collide with")
+    if not body.is_deformed:
+        mesh, middle, half = _rigid_mesh(body.shape, device)
+        return [mesh], middle, half
+    points = body.local_vertices()
+    made = [_centred(p, body.faces, device) for p in points.reshape(-1, *points.shape[-2:])]
+    middles, halves = np.stack([m for _, m, _ in made]), np.stack([h for _, _, h in made])
+    return [mesh for mesh, _, _ in made], middles if len(made) > 1 else middles[0], halves
+
+
+def _differs(body: Body, pair: Any) -> bool:
+    """Return whether anything about a body is given per world."""
+    posed = np.ndim(body.position) == 2 or np.ndim(body.quaternion) == 2
+    rubs = np.ndim(body.friction) == 1 or np.ndim(pair if pair is not None else 0.0) == 1
+    curved = body.is_deformed and np.ndim(body.surface()[0]) == 3 and len(body.surface()[0]) > 1
+    return posed or rubs or curved
+
+
+def _describe(body: Body) -> tuple[int, tuple[float, float, float], float] | None:
+    """Kind, sizes and bounding radius of a body's shape; None for triangles."""
+    shape = body.shape
+    if isinstance(shape, Box):
+        half = np.asarray(shape.size, dtype=float) / 2
+        return BOX, (float(half[0]), float(half[1]), float(half[2])), float(np.linalg.norm(half))
+    if isinstance(shape, Sphere):
+        return SPHERE, (shape.radius, 0.0, 0.0), shape.radius
+    if isinstance(shape, Cylinder):
+        return CYLINDER, (shape.radius, shape.height / 2, 0.0), float(np.hypot(shape.radius, shape.height / 2))
+    if isinstance(shape, Capsule):
+        return CAPSULE, (shape.radius, shape.height / 2, 0.0), shape.radius + shape.height / 2
+    if isinstance(shape, Plane):
+        return PLANE, (0.0, 0.0, 0.0), UNBOUNDED
+    return None

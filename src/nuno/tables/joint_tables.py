@@ -1,0 +1,79 @@
+"""The joints of a group of bodies, as the tables that the solver takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from nuno.coupled.joint_response import Joints
+from nuno.joints.joint import KINDS, Joint, JointSpec
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+
+class CoupledJoints:
+    """Joints of rigid bodies that go together.
+
+    Args:
+        world: Whose they are.
+        joints: The joints.
+        bodies: Those of the group, in the coupling's order.
+    """
+
+    def __init__(self, world: Simulation, joints: list[Joint], bodies: list[Body]) -> None:
+        self.joints = joints
+        self.table = Joints()
+        self._specs: list[JointSpec] = []
+        self._device = str(world.device)
+        count, worlds, scene = len(joints), world.world_count, world._rigid
+        self.table.count = count
+        if not count:
+            return
+        assert scene is not None
+        places, others = [], []
+        for joint in joints:
+            spec: JointSpec = joint._spec
+            own: Any = joint.body._dynamics
+            other: Any = None if joint.target is None else joint.target._dynamics
+            places.append(spec.place - own.centre)
+            # a static body's slot has its shape's frame; the world's is relative to the scene's origin
+            others.append(spec.other_place - (scene.solver.origin if joint.target is None else 0.0))
+            if other is not None:
+                others[-1] = spec.other_place - other.centre
+        specs: list[JointSpec] = [joint._spec for joint in joints]
+        slots = [scene.slot_of(world, joint.body) for joint in joints]
+        other_slots = [-1 if j.target is None else scene.slot_of(world, j.target) for j in joints]
+        for name, numbers in (
+            ("kind", [KINDS.index(spec.kind) for spec in specs]),
+            ("body", [bodies.index(joint.body) for joint in joints]),
+            ("slot", slots),
+            ("other", other_slots),
+        ):
+            setattr(self.table, name, wp.array(np.array(numbers, np.int32), dtype=int, device=self._device))
+        self._put("place", places, wp.vec3)
+        self._put("other_place", others, wp.vec3)
+        self._put("turn", [np.roll(spec.turn, -1, axis=1) for spec in specs], wp.quat)
+        self._put("other_turn", [np.roll(spec.other_turn, -1, axis=1) for spec in specs], wp.quat)
+        self._put("limit", [np.broadcast_to(spec.max_force, (worlds,)) for spec in specs], float)
+        for name, kind in (
+            ("pull", wp.vec3), ("twist", wp.vec3), ("free", wp.vec3), ("axial", float), ("total", wp.vec3),
+            ("total_twist", wp.vec3), ("total_axial", float), ("unmet", int),
+        ):  # fmt: skip
+            setattr(self.table, name, wp.zeros(worlds * count, dtype=kind, device=self._device))
+        self.bring()
+
+    def bring(self) -> None:
+        """Take over what motors, springs, friction and limits are now."""
+        specs: list[JointSpec] = [joint._spec for joint in self.joints]
+        if len(specs) != len(self._specs) or any(a is not b for a, b in zip(specs, self._specs, strict=True)):
+            self._put("drive", [spec.drives for spec in specs], float)
+            self._specs = specs
+
+    def _put(self, name: str, values: list[np.ndarray], dtype: Any) -> None:
+        table = np.stack(values, axis=1).astype(np.float32)  # (worlds, joints, ...)
+        flat = table.ravel() if dtype is float else table.reshape(-1, table.shape[-1])
+        setattr(self.table, name, wp.array(flat, dtype=dtype, device=self._device))

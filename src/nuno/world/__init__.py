@@ -1,0 +1,1 @@
+"""World: bodies that come and go, time, islands, snapshots."""

@@ -1,0 +1,122 @@
+"""Running a world in the background at real time: the lock that frames are made under, and the thread."""
+
+from __future__ import annotations
+
+import threading
+import time
+import weakref
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nuno.world.simulation import Simulation
+
+LATE = 0.25  # a thread that is later than this [s] gives the lost time up instead of rushing after it
+
+
+class FrameLock:
+    """A re-entrant lock that knows whether anyone waits for it.
+
+    A plain lock starves the caller when frames take longer than real time: the thread that lets it go takes
+    it again at once.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._waiting = 0
+        self._count = threading.Lock()
+
+    def __enter__(self) -> FrameLock:
+        if not self._lock.acquire(blocking=False):
+            with self._count:
+                self._waiting += 1
+            try:
+                self._lock.acquire()
+            finally:
+                with self._count:
+                    self._waiting -= 1
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+    def acquire(self, timeout: float) -> bool:
+        """Take the lock within ``timeout`` [s], without counting as a waiting caller."""
+        return self._lock.acquire(timeout=timeout)
+
+    def release(self) -> None:
+        """Let the lock go."""
+        self._lock.release()
+
+    def let_others(self) -> None:
+        """Wait until no caller waits, up to 50 ms."""
+        for _ in range(100):
+            if not self._waiting:
+                return
+            time.sleep(0.0005)
+
+
+class Background:
+    """The thread that makes a world's frames.
+
+    It holds the world weakly, so that a world that is dropped ends its thread.
+
+    Args:
+        world: The world to run.
+        real_time_factor: Simulated over real time; ``inf`` is as fast as possible.
+    """
+
+    def __init__(self, world: Simulation, real_time_factor: float) -> None:
+        self.error: BaseException | None = None
+        self._stop = threading.Event()
+        self._frame = threading.Condition()
+        arguments = (weakref.ref(world), world.lock, real_time_factor)
+        self._thread = threading.Thread(target=self._loop, args=arguments, name="nuno-world", daemon=True)
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        """Return whether frames are still made."""
+        return self._thread.is_alive() and not self._stop.is_set() and self.error is None
+
+    @property
+    def is_current_thread(self) -> bool:
+        """Return whether the caller is the background thread itself."""
+        return threading.current_thread() is self._thread
+
+    def stop(self) -> None:
+        """End the thread after the frame that it is in."""
+        self._stop.set()
+        if not self.is_current_thread:
+            self._thread.join()
+
+    def wait_for_frame(self, timeout: float = 0.1) -> None:
+        """Sleep until a frame is done, or for ``timeout`` [s]."""
+        with self._frame:
+            self._frame.wait(timeout)
+
+    def _loop(self, reference: weakref.ref[Simulation], lock: FrameLock, factor: float) -> None:
+        due = time.perf_counter()
+        while not self._stop.is_set():
+            if not lock.acquire(timeout=0.05):
+                continue
+            try:
+                world = reference()
+                if world is None:
+                    return
+                if self._stop.is_set():
+                    return
+                span = 1.0 / world.frame_rate
+                world._advance(span)
+            except BaseException as error:
+                self.error = error  # raised again in the caller's next call
+                return
+            finally:
+                world = None
+                lock.release()
+                with self._frame:
+                    self._frame.notify_all()
+            lock.let_others()
+            now = time.perf_counter()
+            due = max(due + span / factor, now - LATE)
+            if due > now:
+                self._stop.wait(due - now)

@@ -1,0 +1,24 @@
+"""Drivers: what moves static bodies of a world from frame to frame, such as a robot's controllers."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+
+class Driver(Protocol):
+    """The driver of a world's static bodies, asked around each frame, its lock held; see ``World.drivers``."""
+
+    def begin_frame(self, start: float, end: float) -> None:
+        """Send bodies on their way in the frame from ``start`` to ``end`` [s]."""
+
+    def end_frame(self) -> None:
+        """Be told that the frame is done."""
+
+    def cancel_frame(self) -> None:
+        """Be told that the frame failed: the world is as it was at its start."""
+
+    def save(self) -> Any:
+        """Return all that it is, never to be written to, as part of a snapshot that is kept in memory."""
+
+    def load(self, saved: Any) -> None:
+        """Become what it was when ``save`` returned ``saved``."""

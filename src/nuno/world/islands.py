@@ -1,0 +1,113 @@
+"""Islands: the bodies that go through a frame together, world by world, and their number of substeps.
+
+Bodies whose boxes, as they may grow within the frame, meet, directly or through others, and bodies that a grip or weld
+joins, are an island: they go through the frame in as many substeps as the one among them that needs most. Each world
+has its own islands, for it must go as it would alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.joints.tie import TieSpec
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.joints.grip import Grip
+    from nuno.world.simulation import Simulation
+
+GROWTH = 1.5
+"""Times its present speed that a body may have within a frame, besides what gravity adds."""
+SLACK = 0.02
+"""[m] What constraints may throw a particle within a frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Islands:
+    """The islands of some bodies.
+
+    Attributes:
+        first: (bodies, worlds) int, the first body of each one's island.
+        substeps: (bodies, worlds) int, of a whole frame.
+    """
+
+    first: np.ndarray
+    substeps: np.ndarray
+
+    def at(self, substeps: int) -> np.ndarray:
+        """Return ``first`` in worlds where a body takes so many substeps; where it does not, it is by itself."""
+        return np.where(self.substeps == substeps, self.first, np.arange(len(self.first))[:, None])
+
+
+def find_islands(world: Simulation, moving: list[Body], duration: float, substeps: np.ndarray | None = None) -> Islands:
+    """Return the islands of dynamic bodies for the next ``duration`` [s], at most a frame.
+
+    Args:
+        world: Whose bodies.
+        moving: The bodies.
+        duration: [s].
+        substeps: (bodies, worlds) int, how many of a frame each needs; None takes the bodies' own.
+    """
+    low, high = (np.stack(corner) for corner in zip(*(_box(world, body, duration) for body in moving), strict=True))
+    near = np.asarray((low[:, None] <= high[None]).all(axis=-1) & (low[None] <= high[:, None]).all(axis=-1))
+    joined = np.zeros_like(near)  # (bodies, bodies, worlds)
+    for a, b in np.argwhere(np.triu(near.any(axis=-1), 1)):
+        if world._rules.touch(moving[a], moving[b]):
+            joined[a, b] = near[a, b]
+    place = {body: k for k, body in enumerate(moving)}
+    for body in moving:
+        for grip in body._dynamics.grips:  # type: ignore[union-attr]
+            if grip.is_tie and grip.target in place:
+                a, b = sorted((place[body], place[grip.target]))
+                joined[a, b] |= holding(grip, world.world_count)
+    first = _connected(joined)
+    if substeps is None:
+        substeps = np.array([body._dynamics.substeps for body in moving])[:, None]  # type: ignore[union-attr]
+    most, column = np.zeros_like(first), np.arange(world.world_count)
+    np.maximum.at(most, (first, column), np.broadcast_to(substeps, first.shape))
+    return Islands(first, most[first, column])
+
+
+def holding(grip: Grip, worlds: int) -> np.ndarray:
+    """Return (worlds,) bool, where a tie or hold holds anything."""
+    spec = grip._spec
+    held = (spec.corners >= 0).any(axis=(1, 2)) if isinstance(spec, TieSpec) else True
+    return np.array(np.broadcast_to(held, (worlds,)))
+
+
+def _connected(joined: np.ndarray) -> np.ndarray:
+    """Return (n, worlds), the first of all that each of n is joined to, through others too; joined (n, n, worlds)."""
+    a, b, column = np.nonzero(joined)
+    n, worlds = joined.shape[1:]
+    first = np.repeat(np.arange(n)[:, None], worlds, axis=1)
+    while True:
+        least = np.minimum(first[a, column], first[b, column])
+        found = first.copy()
+        for end in (a, b):
+            np.minimum.at(found, (end, column), least)
+            np.minimum.at(found, (first[end, column], column), least)
+        found = np.take_along_axis(found, found, axis=0)
+        if np.array_equal(found, first):
+            return first
+        first = found
+
+
+def _box(world: Simulation, body: Body, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """The box (worlds, 3) that a body may reach within ``duration`` [s]: lower and upper corner."""
+    dynamics: Any = body._dynamics
+    fall = 0.5 * float(np.linalg.norm(world.gravity)) * duration**2
+    if dynamics.is_rigid:
+        middle, _ = dynamics.solver.pose(dynamics.slot)
+        velocity, spin = dynamics.solver.velocity(dynamics.slot)
+        radius = dynamics.radius
+        speed = np.linalg.norm(velocity, axis=-1) + np.linalg.norm(spin, axis=-1) * radius
+        grow = (radius + GROWTH * speed * duration + fall + SLACK)[:, None]
+        return middle - grow, middle + grow
+    positions = dynamics.solver.positions()
+    speed = np.linalg.norm(dynamics.solver.velocities(), axis=-1).max(axis=-1)
+    thickness = np.asarray(getattr(dynamics.material, "thickness", 0.0), dtype=float)
+    grow = (GROWTH * speed * duration + fall + SLACK + thickness)[:, None]
+    return positions.min(axis=1) - grow, positions.max(axis=1) + grow

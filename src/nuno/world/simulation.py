@@ -1,0 +1,400 @@
+"""Simulation: the bodies of a world, their dynamics and contact rules, and the passing of time.
+
+``World`` adds the verbs that a program uses.
+"""
+
+from __future__ import annotations
+
+import uuid
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.bodies.body import Body
+from nuno.bodies.contact_rules import ContactRules
+from nuno.bodies.dynamics import SOON, Dynamics, ParticleDynamics, make_colliders
+from nuno.bodies.make_dynamics import make_dynamics
+from nuno.errors import BodyStateError, InvalidInputError, SimulationDiverged, UnknownNameError
+from nuno.joints.grip import Grip
+from nuno.tables.kinematic_motion import Schedule, arrive, is_kinematic, make_schedule, path_batches_of
+from nuno.validation import count, finite_array, number
+from nuno.world.background import FrameLock
+from nuno.world.device import checked_device, found_device
+from nuno.world.impacts import are_fast
+from nuno.world.run_start import RunStart
+from nuno.world.stepping import Stepping
+
+if TYPE_CHECKING:
+    from nuno.bodies.rigid_dynamics import RigidScene
+    from nuno.materials import Material
+    from nuno.world.background import Background
+    from nuno.world.driver import Driver
+    from nuno.world.watcher import Watcher
+
+CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
+CUDA_CHUNK = 60  # the same on CUDA, which idles while it is looked at
+
+
+class Simulation:
+    """The bodies of one world, or of a batch of equal ones, and their time; the arguments are ``World``'s."""
+
+    def __init__(
+        self, *, device: str = "auto", gravity: ArrayLike = (0.0, 0.0, -9.81), frame_rate: float = 60.0,
+        substeps: int | None = None,
+    ) -> None:  # fmt: skip
+        self._device = checked_device(device)
+        gx, gy, gz = finite_array("gravity", gravity, (3,))
+        self.gravity: tuple[float, float, float] = (float(gx), float(gy), float(gz))
+        self.frame_rate = number("frame_rate", frame_rate, above=0.0)
+        self.substeps = None if substeps is None else count("substeps", substeps)
+        self.world_count = 1
+        self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
+        self._time = 0.0
+        self._family = uuid.uuid4().hex
+        # whether its materials are guesses, of which many are imagined: nobody is told of their resolution, and one
+        # that passes through itself is a guess that does not fit
+        self._quiet = False
+        self._bodies: dict[str, Body] = {}
+        self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
+        self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
+        self._rules = ContactRules()
+        self._colliders: dict[Any, Any] = {}
+        self._collider_version = 0
+        # bodies that follow a path or a body that does; None: to be found anew
+        self._kinematic: list[Body] | None = None
+        self._schedule: Schedule | None = None
+        self._rests = False  # whether kinematic bodies are where they were in the frame before
+        self._reported = 0.0  # [s], up to when the present run has told of itself
+        self._telling = False  # whether it tells of a frame just now
+        self._resting: tuple[Any, ...] | None = None  # what kinematic bodies followed when they were told to rest
+        self.drivers: list[Driver] = []  # asked around every frame, such as a simulated robot
+        self._left_out: list[Driver] = []  # those of which it was said that imagined worlds are without them
+        self._background: Background | None = None
+        self._rigid: RigidScene | None = None
+        self._stepping = Stepping(self)
+        self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
+
+    def __repr__(self) -> str:
+        batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
+        return f"<World at t = {self._time:.3f} s, {len(self._bodies)} bodies{batch}>"
+
+    @property
+    def time(self) -> float:
+        """The simulated time [s]."""
+        return self._time
+
+    @property
+    def device(self) -> str:
+        """The device that dynamics run on, "cpu" or "cuda:0" ..."""
+        self._device = found_device(self._device)
+        return self._device
+
+    @property
+    def is_running(self) -> bool:
+        """Return whether frames are made in the background."""
+        return self._background is not None and self._background.alive
+
+    @contextmanager
+    def _call(self) -> Iterator[None]:
+        with self.lock:
+            self._raise_background_error()
+            yield
+
+    @contextmanager
+    def _change(self, what: str) -> Iterator[None]:
+        """Hold the lock for a call that changes the world, or takes what it is as a whole.
+
+        Raises:
+            BodyStateError: the call comes from ``each_frame``, where the world's clock is behind its dynamic bodies.
+        """
+        with self._call():
+            self._check_between_frames(what)
+            yield
+
+    def _check_between_frames(self, what: str) -> None:
+        if self._telling:
+            raise BodyStateError(
+                f"{what} was called in each_frame, in the midst of a run; there a world can only be read: "
+                "run or step up to then, and call it after that"
+            )
+
+    def _raise_background_error(self) -> None:
+        background = self._background
+        if background is not None and background.error is not None and not background.is_current_thread:
+            self._background = None
+            raise background.error
+
+    def _own(self, body: Body | str) -> Body:
+        """Return this world's body for a name, one of its bodies, or one of the world it comes from."""
+        if isinstance(body, str):
+            named = next((b for b in self._bodies.values() if b.name == body), None)
+            if named is None:
+                raise UnknownNameError("body", body, [b.name for b in self._bodies.values()])
+            return named
+        if not isinstance(body, Body):
+            raise InvalidInputError(f"a body or its name is needed, got {type(body).__name__}")
+        own = self._bodies.get(body.key)
+        if own is None:
+            where = "no world" if body._world is None else "another world"
+            raise BodyStateError(f"{body.name!r} is in {where}, not in this one")
+        return own
+
+    def _pair(self, a: Body | str, b: Body | str) -> frozenset[str]:
+        first, second = self._own(a), self._own(b)
+        if first is second:
+            raise InvalidInputError(f"a pair needs two bodies, got {first.name!r} twice")
+        return frozenset((first.key, second.key))
+
+    def _attached(self) -> list[Dynamics]:
+        return [body._dynamics for body in self._bodies.values() if body._dynamics is not None]
+
+    def _check_worlds(self, what: str, axes: tuple[int, ...]) -> None:
+        if axes and axes != (self.world_count,):
+            raise InvalidInputError(f"{what} must be one value or {self.world_count}, one a world, got {axes[0]}")
+
+    def _register(self, body: Body) -> None:
+        body._world = self
+        self._bodies[body.key] = self._known_bodies[body.key] = body
+
+    def _detach(self, body: Body) -> None:
+        assert body._dynamics is not None
+        tied = [grip for other in self._attached() for grip in other.grips if grip.is_tie and grip.target is body]
+        for grip in [*body._dynamics.grips, *tied]:
+            self._drop_grip(grip)
+        dynamics, body._thickness = body._dynamics, body.thickness
+        body._freeze()
+        dynamics.release()
+        self._colliders_changed()
+
+    def _hold(self, grip: Grip) -> None:
+        assert grip.body._dynamics is not None
+        grip._world = self
+        self._known_grips[grip.key] = grip
+        grip.body._dynamics.grips.append(grip)
+        grip.body._dynamics.grips_changed = True
+        if grip.ignored:
+            self._colliders_changed()
+
+    def _drop_grip(self, grip: Grip) -> None:
+        grip._world = None
+        dynamics = grip.body._dynamics
+        if dynamics is not None:
+            dynamics.grips = [other for other in dynamics.grips if other is not grip]
+            dynamics.grips_changed = True
+            if grip.ignored:
+                self._colliders_changed()
+
+    def _colliders_changed(self) -> None:
+        self._collider_version += 1
+        self._rules.set_held(grip for dynamics in self._attached() for grip in dynamics.grips)
+        self._colliders.clear()
+        self._kinematic = None
+
+    def _body_changed(self, body: Body) -> None:
+        """Be told that a body was moved, or its friction or groups changed."""
+        dynamics = body._dynamics
+        if dynamics is not None and not np.array_equal(dynamics.friction, body.friction):
+            self._renew(body, dynamics.material)  # a solver takes its friction when it is made
+        self._colliders_changed()
+
+    def _renew(self, body: Body, material: Material) -> None:
+        """Give a dynamic body a solver for another material or friction, in the state that it is in."""
+        dynamics = body._dynamics
+        assert dynamics is not None
+        state = dynamics.state()
+        renewed = make_dynamics(body, material, state, body.friction, self)
+        dynamics.release()
+        renewed.grips, renewed.pushes, renewed.grips_changed = dynamics.grips, dynamics.pushes, True
+        body._dynamics = renewed
+        renewed.load_state(state)
+
+    def _bring_colliders(self) -> None:
+        static: list[Body] | None = None
+        for body in self._bodies.values():
+            dynamics = body._dynamics
+            if not isinstance(dynamics, ParticleDynamics):
+                continue
+            dynamics.solver.sum_impulses(body.key in self._rules.summed)
+            if dynamics.collider_version == self._collider_version:
+                continue
+            if static is None:
+                static = [b for b in self._bodies.values() if b._dynamics is None]
+            touched, friction = self._rules.colliders_of(body, static)
+            key = (
+                *(b.key for b in touched),
+                *((name, np.asarray(mu).tobytes()) for name, mu in friction.items()),
+            )
+            if key not in self._colliders:
+                self._colliders[key] = make_colliders(touched, friction, self)
+            dynamics.solver.set_colliders(self._colliders[key])
+            dynamics.collider_version = self._collider_version
+
+    def _bring_rigid(self) -> None:
+        if self._rigid is not None:
+            self._rigid.bring(self)
+
+    def _rigid_scene(self, origin: np.ndarray) -> RigidScene:
+        """Return what moves the rigid bodies, made anew where the world has become another."""
+        from nuno.bodies.rigid_dynamics import RigidScene
+
+        settings = (self.world_count, self.device, self.gravity, self.frame_rate, self.substeps)
+        if self._rigid is None or self._rigid.settings != settings:
+            self._rigid = RigidScene(self, origin)
+        return self._rigid
+
+    def _wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+        """Return force [N] and torque [N m], (worlds, 3) each, that an active grip bears."""
+        return self._stepping.wrench(grip)
+
+    def _kinematic_bodies(self) -> list[Body]:
+        if self._kinematic is None:
+            self._kinematic = [b for b in self._bodies.values() if b._dynamics is None and is_kinematic(b)]
+        return self._kinematic
+
+    def _schedule_kinematic(self, start: float, duration: float) -> None:
+        """Tell colliders and grips where the kinematic bodies are in the run from ``start`` on."""
+        kinematic = self._kinematic_bodies()
+        self._rests = self._kinematic_rest(kinematic, start)
+        if self._rests:
+            return
+        self._schedule = None
+        if kinematic:
+            self._schedule = make_schedule(kinematic, start, duration, 1.0 / self.frame_rate)
+            for colliders in self._colliders.values():
+                colliders.follow(self._schedule)
+
+    def _kinematic_rest(self, kinematic: list[Body], start: float) -> bool:
+        """Return whether all paths had ended when they were last told of, and nothing has changed since."""
+        before, self._resting = self._resting, None
+        if not kinematic or self._rigid is not None:
+            return False
+        path_batches, others = path_batches_of(kinematic)
+        if others or any(start < path_batch.times[-1] for path_batch, _ in path_batches):
+            return False
+        self._resting = (self._collider_version, *(path_batch for path_batch, _ in path_batches))
+        return self._resting == before
+
+    def _advance(
+        self, duration: float, end: float | None = None, look: Callable[[float], None] | None = None,
+        instants: np.ndarray | None = None, again: Callable[[], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Advance everything, or leave the world as it was and raise.
+
+        ``look`` is called with the time [s] at each of ``instants`` (k,), or else at the end of each frame. Where the
+        run is gone through once more, as a list of contacts was too short, ``again`` is called first and ``look``
+        anew for every instant; without ``again`` lists are looked at before each call, which is for good.
+        """
+        start = self._time
+        finish = start + duration if end is None else end
+        for driver in self.drivers:
+            driver.begin_frame(start, finish)
+        moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
+        self._rests = False
+        if any(dynamics.is_rigid for dynamics in moving.values()):
+            # what a run goes back to has the static bodies that it met, and lists pairs as it did
+            self._bring_rigid()
+        before = RunStart(self, moving)
+        self._bring_colliders()
+        try:
+            self._reported = start
+            while not self._go_through(moving, finish, look, instants, again is None):
+                before.go_back()
+                if again is not None:
+                    self._reported = start
+                    again()
+        except BaseException:
+            before.go_back()
+            for driver in self.drivers:
+                driver.cancel_frame()
+            raise
+        for body, dynamics in moving.items():
+            dynamics.pushes = [p for p in dynamics.pushes if p.end is None or p.end > finish + SOON]
+            if body._children:
+                self._colliders_changed()  # what follows the body has moved along
+        if not self._rests:
+            arrive(self._kinematic_bodies(), finish)
+        self._time = finish
+        for driver in self.drivers:
+            driver.end_frame()
+        for watcher in tuple(self._watchers):
+            watcher.seen()
+
+    def _go_through(
+        self, moving: dict[Body, Dynamics], finish: float, look: Callable[[float], None] | None,
+        instants: np.ndarray | None, careful: bool,
+    ) -> bool:  # fmt: skip
+        """Advance all bodies to ``finish`` [s]; return whether no list was too short: else all are longer now."""
+        start = now = self._time
+        ends = sorted({p.end for d in moving.values() for p in d.pushes if p.end is not None})
+        # of instants that rounding alone keeps apart one
+        ends = [t for k, t in enumerate(ends) if k == 0 or t > ends[k - 1] + SOON]
+        stops = [*(t for t in ends if start + SOON < t < finish - SOON), finish]
+        for body, dynamics in moving.items():
+            if isinstance(dynamics, ParticleDynamics):
+                dynamics.set_self_contact(self._rules.touches_itself(body))
+        for stop in stops:
+            if moving:
+                self._schedule_kinematic(now, stop - now)
+            if look is None:
+                self._stepping.run(now, stop)
+            elif not self._run_looking(now, stop, look, instants, moving if careful else None):
+                return False
+            now = stop
+        broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
+        if self._must_repeat(moving):
+            return False
+        self._stepping.careful = not self._quiet and are_fast(moving)
+        for body, finite in broken:
+            if not finite.all():
+                raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
+        return True
+
+    def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
+        """Return whether the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
+        longer = self._make_room()
+        if not self._quiet and not self._stepping.careful and are_fast(moving):
+            self._stepping.careful = True
+            return True
+        return longer
+
+    def _make_room(self) -> bool:
+        """Make lists longer that were too short since this was asked last; return whether any is."""
+        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := b._dynamics, ParticleDynamics)])
+
+    def _run_looking(
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,
+        careful: dict[Body, Dynamics] | None,
+    ) -> bool:  # fmt: skip
+        """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each.
+
+        Returns:
+            Whether nothing must be repeated, as far as this was looked at: of ``careful``, all that moves, before each
+            instant.
+        """
+        if instants is None:
+            frame = 1.0 / self.frame_rate
+            ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
+            if not len(ends) or stop - ends[-1] > SOON:
+                ends = np.append(ends, stop)
+        else:
+            ends = instants[(instants > time + SOON) & (instants < stop + SOON)]
+        now = time
+        for end in ends.tolist():
+            self._stepping.run(now, end)
+            if end > self._reported + SOON:
+                if careful is not None and self._must_repeat(careful):
+                    return False
+                self._telling = True
+                try:
+                    look(end)
+                finally:
+                    self._telling = False
+                self._reported = end
+            now = end
+        if stop - now > SOON:
+            self._stepping.run(now, stop)
+        return True

@@ -1,0 +1,456 @@
+"""World: bodies that come and go, and dynamics that come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.bodies.body import Body
+from nuno.bodies.dynamics import ParticleDynamics, check_material, default_material, make_push
+from nuno.bodies.given_velocity import given_velocity, present_velocity
+from nuno.bodies.make_dynamics import start_dynamics
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.joints.grip import Grip, make_grip, warn_shared
+from nuno.joints.joint import Joint, check_joined
+from nuno.joints.tie import check_leader, check_weld, tie_to_leader
+from nuno.materials import Material, Rigid
+from nuno.shapes.path import Path
+from nuno.solvers.resolution import warn_of_resolution
+from nuno.tables.kinematic_motion import arrive, path_for
+from nuno.validation import finite_array, number
+from nuno.world.saving import Saving
+
+if TYPE_CHECKING:
+    from nuno.camera.camera import Camera
+    from nuno.world.contact_points import ContactPoints
+
+
+class World(Saving):
+    """A room: static bodies, which cost nothing, and attached ones, which move.
+
+    All methods may be called while the world runs in the background; they take effect between frames. In what a run
+    calls for each frame, a world can only be read: all that would change or copy it raises BodyStateError. Where a body
+    is asked for, an imagined world also takes the body of the world that it was imagined from.
+
+    Args:
+        device: "auto" (CUDA where there is a device, else the CPU), "cpu", "cuda" or "cuda:1" ...
+        gravity: (3,) [m/s2].
+        frame_rate: Frames per second of simulated time [1/s].
+        substeps: Substeps of a frame; None lets each solver choose by its rule.
+
+    Raises:
+        InvalidInputError: a value that is not finite or out of range.
+    """
+
+    # Bodies
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, in the order in which they were added."""
+        with self._call():
+            return tuple(self._bodies.values())
+
+    def add(self, body: Body) -> Body:
+        """Put a body into the world and return it; a name that is taken gets a number ("box_1").
+
+        Raises:
+            BodyStateError: the body is in a world already.
+            InvalidInputError: no body, or one that has values for another number of worlds.
+        """
+        with self._change("add"):
+            if not isinstance(body, Body):
+                raise InvalidInputError(f"add needs a Body, got {type(body).__name__}")
+            if body._world is not None or body.key in self._bodies:
+                where = "this" if body.key in self._bodies else "another"
+                raise BodyStateError(f"{body.name!r} is in {where} world already")
+            for what, array in (("position", body._position), ("quaternion", body._quaternion)):
+                self._check_worlds(what, array.shape[:-1])
+            for what, value in (("friction", body.friction), ("thickness", body.thickness)):
+                self._check_worlds(what, np.shape(value))
+            if body._deformed is not None and len(body._deformed[0]) not in (1, self.world_count):
+                raise InvalidInputError(f"{body.name!r} has the shapes of {len(body._deformed[0])} worlds")
+            taken = {other.name for other in self._bodies.values()}
+            name, number_ = body._name, 0
+            while name in taken:
+                number_ += 1
+                name = f"{body._name}_{number_}"
+            body._name = name
+            self._register(body)
+            self._colliders_changed()
+        return body
+
+    def remove(self, body: Body | str) -> Body:
+        """Take a body out of the world, detached in the shape that it has now, and return it."""
+        with self._change("remove"):
+            gone = self._own(body)
+            if gone._dynamics is not None:
+                self._detach(gone)
+            for other in self._attached():
+                for grip in [g for g in other.grips if g.target is gone]:
+                    self._drop_grip(grip)
+            del self._bodies[gone.key]
+            gone._world = gone._path = None
+            self._colliders_changed()
+        return gone
+
+    def find(self, name: str) -> Body:
+        """Return the body of that name.
+
+        Raises:
+            UnknownNameError: there is none.
+        """
+        with self._call():
+            return self._own(name)
+
+    # Dynamics
+
+    def attach(
+        self, body: Body | str, material: Material | None = None, *, velocity: ArrayLike | None = None,
+        angular_velocity: ArrayLike | None = None, keep_velocity: bool = False,
+    ) -> Body:  # fmt: skip
+        """Give a body dynamics, from the shape that it has now, at rest or moving; no other body changes.
+
+        The body takes the material's friction and thickness over, and keeps them when it is detached. Without
+        a material a cloth gets ``Cloth``, a soft body ``Soft`` and any other ``Rigid``, with the body's friction.
+        ``Rigid`` may be given to all but planes: a cloth or soft body then keeps the shape that it has now.
+
+        Args:
+            body: The body.
+            material: The material.
+            velocity: As of ``set_velocity``; None is at rest.
+            angular_velocity: As of ``set_velocity``; None is without a turn.
+            keep_velocity: Take a dynamic body over from the dynamics that it has, which end as ``detach`` ends them
+                (its grips let go). What becomes cloth or soft keeps the velocities of the vertices. What becomes rigid
+                keeps the velocity of the centre of mass and the angular velocity I^-1 L. A static body has no velocity
+                to keep, also where it was detached at this instant: it starts at rest.
+
+        Raises:
+            BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path,
+                or would deform while it holds a rigid body.
+            InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
+            MeshError: a rigid body without volume.
+        """
+        with self._change("attach"):
+            own = self._own(body)
+            if own._dynamics is not None and not keep_velocity:
+                raise BodyStateError(
+                    f"{own.name!r} is dynamic already; detach it first to change its material, or set keep_velocity"
+                )
+            if keep_velocity and not (velocity is None and angular_velocity is None):
+                raise InvalidInputError("keep_velocity leaves no room for a velocity or angular_velocity")
+            if own._parent is not None:
+                raise BodyStateError(f"{own.name!r} follows another frame; dissoc it first")
+            if own._path is not None:
+                raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
+            chosen: Any = default_material(own) if material is None else material
+            check_material(own.shape, chosen, self.world_count)
+            check_joined(own, chosen, self)
+            given = None if own._dynamics is None else present_velocity(own)
+            if velocity is not None or angular_velocity is not None:
+                is_rigid = isinstance(chosen, Rigid)
+                given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            following = [
+                grip
+                for other in self._attached()
+                for grip in other.grips
+                if grip.target is own and not isinstance(grip, Joint)
+            ]
+            if own._dynamics is None:
+                check_leader(own, not isinstance(chosen, Rigid), following)
+            dynamics = start_dynamics(own._as_static(), chosen, self)
+            if given is not None:
+                dynamics.set_velocity(own, given)
+            if own._dynamics is not None:
+                self._detach(own)
+                following = []
+            own._friction, own._dynamics = chosen.friction, dynamics
+            for grip in following:
+                tie_to_leader(grip, self.world_count)
+                grip.body._dynamics.grips_changed = True  # type: ignore[union-attr]
+            if not dynamics.is_rigid:
+                own._deformed = None
+            self._colliders_changed()
+            warn_of_resolution(own, self)
+        return own
+
+    def detach(self, body: Body | str) -> Body:
+        """Take a body's dynamics away: static from now on, in the shape that it has now. Its grips let go.
+
+        Raises:
+            BodyStateError: it has none.
+        """
+        with self._change("detach"):
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; there is nothing to detach")
+            self._detach(own)
+        return own
+
+    def move(self, body: Body | str, to: Path | None) -> None:
+        """Let a static body follow a path from now on; what touches it feels its surface move.
+
+        The body is where the path is at once, which is a jump where that is elsewhere, keeps its own orientation
+        where the path has none, and rests at the last key. Bodies that follow it (``assoc``) move along. Another
+        path takes the place of this one; ``locate`` and its like end it.
+
+        Args:
+            body: The body.
+            to: The path; None ends it, and the body stays where it is.
+
+        Raises:
+            BodyStateError: the body is dynamic, or follows another frame.
+            InvalidInputError: ``to`` is no path, or one for another number of worlds.
+        """
+        with self._change("move"):
+            own = self._own(body)
+            before = (own._path is None, own._position.ndim, own._quaternion.ndim)
+            own._path = None if to is None else path_for(own, to, self.world_count)
+            arrive([own], self._time)
+            if before != (own._path is None, own._position.ndim, own._quaternion.ndim):
+                self._colliders_changed()
+
+    def set_material(self, body: Body | str, material: Material) -> None:
+        """Change the material of a dynamic body as it moves: its shape, velocity, grips and pushes stay.
+
+        Raises:
+            BodyStateError: the body is static, or of another kind (detach it, and attach it with the new one).
+            InvalidInputError: the material does not fit the shape or the batch.
+        """
+        with self._change("set_material"):
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it with the material")
+            if type(material) is not type(own._dynamics.material):
+                kinds = f"{type(own._dynamics.material).__name__}, not {type(material).__name__}"
+                raise BodyStateError(f"{own.name!r} moves as {kinds}; detach it to attach it as another kind")
+            chosen: Any = material
+            check_material(own.shape, chosen, self.world_count)
+            own._friction = chosen.friction
+            self._renew(own, chosen)
+            self._colliders_changed()
+            warn_of_resolution(own, self)
+
+    def grip(
+        self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,
+        max_force: ArrayLike | None = None, ignore: Sequence[Body | str] | None = None,
+    ) -> Grip:  # fmt: skip
+        """Hold points of a dynamic body, or a rigid one as a whole, from now on.
+
+        Args:
+            body: The body.
+            where: Vertex indices, (k,) for the same ones in every world or (worlds, k), -1 for none; or
+                ``SurfacePoints``, from ``body.at`` or ``body.closest``. None for a rigid body.
+            to: Where the mean of the points goes: a ``Path``, or a fixed point (3,) or (worlds, 3) [m]. The
+                points keep their present offsets from it, which turn with the path's quaternions. Or a
+                ``Body``: then they keep their present places in its frame, or, where it is a cloth or soft body, at its
+                nearest points. If that body is dynamic it bears the force.
+            compliance: [m/N]; 0 is stiff. Of a rigid body's turns as much [1/(N m)].
+            free: (3,), a direction of the world along which a rigid body may slide; None holds it entirely.
+            max_force: [N], a number or (worlds,): the most that the grip bears, at each point where it holds points,
+                and as much [N m] of a rigid body's turns. None is 10 kN, or 1,000 m/s2 times the mass of the heaviest
+                rigid body that it joins; points that follow a path, a place or a static body have no limit then. With
+                one they are solved beside the body's contacts, which takes longer.
+            ignore: Bodies that a rigid body passes through while it is held; None is ``to``, where that is a body.
+
+        Raises:
+            BodyStateError: the body is static.
+            InvalidInputError: a vertex out of range, a target that cannot be used, or a limit that is not positive.
+        """
+        with self._change("grip"):
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
+            target = self._own(to) if isinstance(to, Body) else None
+            if target is own:
+                raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
+            if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
+                if not target._dynamics.is_rigid:
+                    raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
+            grip = make_grip(
+                own, where, to, number("compliance", compliance, low=0.0), target, free, self, max_force=max_force,
+                ignored=None if ignore is None else [self._own(other) for other in ignore],
+            )  # fmt: skip
+            warn_shared(grip)
+            self._hold(grip)
+        return grip
+
+    def weld(
+        self, a: Body | str, b: Body | str, where: Any = None, *, compliance: float = 0.0,
+        max_force: ArrayLike | None = None,
+    ) -> Grip:  # fmt: skip
+        """Join two dynamic bodies where they are now, until the grip that is returned is released.
+
+        Args:
+            a: A cloth or soft body, of which ``where`` says the points as in ``grip``; or a rigid body.
+            b: Another body. Points of ``a`` stay on its nearest points, or at their places in its frame if it is rigid.
+            where: None where both are rigid.
+            compliance: [m/N]; 0 is stiff.
+            max_force: [N], the most that it bears; see ``grip``.
+
+        Raises:
+            BodyStateError: one of them is static.
+            InvalidInputError: points that ``a`` does not have, or a rigid ``a`` and a ``b`` that deforms.
+        """
+        with self._change("weld"):
+            check_weld(self._own(a), self._own(b))
+            return self.grip(a, where, to=self._own(b), compliance=compliance, max_force=max_force)
+
+    def push(
+        self, body: Body | str, force: ArrayLike, torque: ArrayLike | None = None, duration: float | None = None
+    ) -> None:
+        """Apply a force to a dynamic body.
+
+        Args:
+            body: The body.
+            force: (3,) or (worlds, 3), spread over the vertices by their share of the mass at even density; or of every
+                vertex, (n, 3) or (worlds, n, 3) [N]. Where worlds = n, two axes mean vertices. On a rigid body it acts
+                at the centre of mass.
+            torque: (3,) or (worlds, 3) [N m], on rigid bodies only.
+            duration: How long [s], on top of other pushes; None is until the next such push, which takes its
+                place (a force of zero ends it).
+
+        Raises:
+            BodyStateError: the body is static.
+        """
+        with self._change("push"):
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
+            own._dynamics.add_push(make_push(own, force, torque, duration, self))
+
+    def set_velocity(
+        self, body: Body | str, velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None
+    ) -> None:
+        """Give a dynamic body a velocity in place of the one that it has; it stays where it is.
+
+        Every vertex of a cloth or soft body takes the velocity of the rigid motion. What a grip holds goes on with the
+        grip.
+
+        Args:
+            body: The body.
+            velocity: (3,) or (worlds, 3) [m/s] of the centre of mass; of a cloth or soft body also of every vertex,
+                (n, 3) or (worlds, n, 3). Where worlds = n, two axes mean vertices. None is zero.
+            angular_velocity: (3,) or (worlds, 3) [rad/s], along the world's axes; None is zero.
+
+        Raises:
+            BodyStateError: the body is static.
+            InvalidInputError: not finite, of another shape, or an angular velocity on top of those of vertices.
+        """
+        with self._change("set_velocity"):
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; attach it with a velocity")
+            is_rigid = own._dynamics.is_rigid
+            given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            own._dynamics.set_velocity(own, given)
+
+    def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
+        """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back.
+
+        Raises:
+            InvalidInputError: the same body twice, or a coefficient that is negative or not finite.
+        """
+        with self._change("set_friction"):
+            pair = self._pair(a, b)
+            if mu is None:
+                self._rules.friction.pop(pair, None)
+            else:
+                value = finite_array("mu", mu, (), (self.world_count,))
+                if (value < 0.0).any():
+                    raise InvalidInputError(f"mu must be at least 0, got {mu!r}")
+                self._rules.friction[pair] = float(value) if value.ndim == 0 else value
+            self._colliders_changed()
+
+    def ignore_contact(self, a: Body | str, b: Body | str, ignore: bool = True) -> None:
+        """Let two bodies pass through each other, or, with ``ignore=False``, touch again.
+
+        A cloth given twice passes through itself, which saves most of a step's time where it does not fold.
+        """
+        with self._change("ignore_contact"):
+            own = self._own(a)
+            pair = frozenset((own.key,)) if own is self._own(b) else self._pair(a, b)
+            (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
+            self._colliders_changed()
+
+    def sum_impulses(self, body: Body | str, on: bool = True) -> None:
+        """Sum up what static bodies give a cloth or soft body, from the next frame on, or, with ``on=False``, no more.
+
+        ``world.contacts(body).impulses`` then tells of them too. A body's frames take several times as long while its
+        impulses are summed up; its motion keeps every bit. Copies of the world sum up as it does, and a body that is
+        attached anew as before. For rigid bodies all is summed up in any case.
+        """
+        with self._change("sum_impulses"):
+            own = self._own(body)
+            (self._rules.summed.add if on else self._rules.summed.discard)(own.key)
+
+    def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:
+        """Return where a dynamic body touches others: points, normals and forces.
+
+        Those with static bodies are what the next substep would make of them, for cloth and soft bodies; all others
+        are those of the last substep.
+
+        Args:
+            body: The body.
+            itself: Whether contacts of a cloth or soft body with itself are told too, under its own name. Both sides of
+                each are, so that their forces add up to nothing. Of a cloth they are what the next substep would make
+                of them, vertex by vertex, which takes the time of two substeps.
+
+        Raises:
+            BodyStateError: the body is static.
+        """
+        from nuno.world.contact_points import contact_points
+
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
+            return contact_points(self, own, itself)
+
+    def state(self, body: Body | str) -> dict[str, Any]:
+        """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
+
+        They are copies on the world's device, in the layout that other libraries expect (``__dlpack__``,
+        ``__cuda_array_interface__``). Positions are copied there; velocities pass through the host.
+
+        Raises:
+            BodyStateError: the body is static.
+        """
+        import warp as wp
+
+        with self._call():
+            own = self._own(body)
+            if own._dynamics is None:
+                raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
+            dynamics = own._dynamics
+            velocities: Any = wp.array(dynamics.velocities(own), dtype=wp.vec3, device=self.device)
+            if isinstance(dynamics, ParticleDynamics):
+                positions: Any = dynamics.solver.positions_on_device()
+            else:
+                positions = wp.array(dynamics.vertices(own), dtype=wp.vec3, device=self.device)
+            return {"positions": positions, "velocities": velocities}
+
+    # Cameras
+
+    def masks(self, camera: Camera, body: Body | str) -> Any:
+        """Return where ``body`` is seen: bool (h, w) or (worlds, h, w), on the device."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_masks(self, camera, self._own(body))
+
+    def depth(self, camera: Camera) -> Any:
+        """Return the depth along the camera's axis [m]: float (h, w) or (worlds, h, w), on the device."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_depth(self, camera)
+
+    def ids(self, camera: Camera) -> Any:
+        """Return which body is seen, its index in ``bodies`` or -1: int (h, w) or (worlds, h, w)."""
+        from nuno.camera import render
+
+        with self._call():
+            return render.render_ids(self, camera)
