@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.numbers.doubles import double_lane
+from nuno.numbers.doubles import add, at, double_lane, to_float  # noqa: F401 (add: the operator)
 from nuno.numbers.lanes import lane
 from nuno.state.cloth_state import CLOCK, NOTES, ORIGIN, SCALARS
 
@@ -65,10 +65,9 @@ def pack_doubles(
     world, i = wp.tid()
     k = world * n + i
     o = world * SCALARS + ORIGIN
-    a = x[k] + wp.float64(scalars[o])
-    b = y[k] + wp.float64(scalars[o + 1])
-    c = z[k] + wp.float64(scalars[o + 2])
-    out[world, i] = wp.vec3(float(a), float(b), float(c))
+    out[world, i] = wp.vec3(
+        to_float(x[k] + scalars[o]), to_float(y[k] + scalars[o + 1]), to_float(z[k] + scalars[o + 2])
+    )
 
 
 @wp.kernel(enable_backward=False, module="nuno.state.pack_doubles")
@@ -84,14 +83,13 @@ def pack_doubles_lanes(
     group, i = wp.tid()
     k = group * n + i
     o = group * SCALARS + ORIGIN
-    lanes = int(16)
-    for j in range(lanes):
+    a = to_float(at(x, k) + scalars[o])
+    b = to_float(at(y, k) + scalars[o + 1])
+    c = to_float(at(z, k) + scalars[o + 2])
+    for j in range(16):
         world = group * 16 + j
         if world < out.shape[0]:
-            a = x[k][j] + wp.float64(scalars[o][j])
-            b = y[k][j] + wp.float64(scalars[o + 1][j])
-            c = z[k][j] + wp.float64(scalars[o + 2][j])
-            out[world, i] = wp.vec3(float(a), float(b), float(c))
+            out[world, i] = wp.vec3(a[j], b[j], c[j])
 
 
 @wp.kernel(enable_backward=False)
