@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from nuno.numbers.doubles import double_lane, fine
-from nuno.numbers.lanes import LANES, add, div, lane, mul, rough, sub  # noqa: F401
+from nuno.numbers.doubles import double_lane, float64
+from nuno.numbers.lanes import LANES, add, div, lane, mul, sub, to_float  # noqa: F401
 from nuno.numbers.vec3 import cross, dot, less_product, mat3, offset, transposed_mul, vec3
 
 
@@ -32,7 +32,7 @@ def _compute(x: Any, s: Any, out: Any):
     _write(out, 1, m * a)
     _write(out, 2, transposed_mul(m, a))
     _write(out, 3, less_product(a, m, b))
-    _write(out, 4, rough(a) + 2.0 * offset(b, a))
+    _write(out, 4, to_float(a) + 2.0 * offset(b, a))
     out[15] = dot(a, b)
 
 
@@ -52,14 +52,14 @@ def _move(x: Any, way: Any, out: Any, moved: Any):
     b = _vector(x, 1)
     _write(out, 0, a - b)
     _write(out, 1, offset(a, b))
-    _write(out, 2, rough(a))
+    _write(out, 2, to_float(a))
     _write(moved, 0, a + _vector(way, 0))
     _write(moved, 1, a - _vector(way, 0))
 
 
 @wp.kernel(enable_backward=False)
 def _doubles(
-    x: wp.array(dtype=fine), way: wp.array(dtype=float), out: wp.array(dtype=float), moved: wp.array(dtype=fine)
+    x: wp.array(dtype=float64), way: wp.array(dtype=float), out: wp.array(dtype=float), moved: wp.array(dtype=float64)
 ):
     _move(x, way, out, moved)
 
@@ -100,7 +100,7 @@ def test_vectors_have_the_bits_of_their_coordinates(kernel, number, lanes):
 
 
 @pytest.mark.parametrize(
-    ("kernel", "number", "place", "lanes"), [(_doubles, float, fine, 1), (_double_lanes, lane, double_lane, LANES)]
+    ("kernel", "number", "place", "lanes"), [(_doubles, float, float64, 1), (_double_lanes, lane, double_lane, LANES)]
 )
 def test_places_in_doubles_lose_no_digits(kernel, number, place, lanes):
     """A difference of places is rounded once, to floats, and a move by floats is added in doubles."""
