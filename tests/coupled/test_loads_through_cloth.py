@@ -112,6 +112,19 @@ def test_what_stands_does_not_creep(where, mass, shape, yaw):
     assert np.abs(body.rotation @ turn.T - np.eye(3)).max() * 0.07 < 0.25 * 1e-4 / 60
 
 
+def test_a_ball_on_a_level_towel_does_not_roll_off():
+    """Friction does not hold a ball, so that nothing may start it: 0.2 kg, beside a vertex of the cloth."""
+    world = nuno.World(device="cpu")
+    table(world)
+    towel(world)
+    ball = load(world, 0.2, nuno.sphere(0.04))
+    ball.translate((0.003, 0.004, 0.0))
+    start = ball.position
+    world.run(1.2)
+    assert np.linalg.norm((ball.position - start)[:2]) < 1e-5
+    assert np.linalg.norm(ball.velocity) < 1e-4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", [0.01, 0.02])
 @pytest.mark.parametrize(("mass", "shape"), [(0.1, "cup"), (0.3, "cup"), (0.05, "box"), (5.0, "box")])
