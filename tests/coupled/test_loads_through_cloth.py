@@ -329,7 +329,19 @@ def test_a_book_on_a_folded_towel(layers):
     assert borne(world, cloth, "table")[2] == pytest.approx((1 + 0.2 * side * side * layers) * G, rel=0.02)
 
 
-@pytest.mark.parametrize("seconds", [1.5, pytest.param(60.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "seconds",
+    [
+        1.5,
+        pytest.param(
+            60.0,
+            marks=[
+                pytest.mark.slow,
+                pytest.mark.xfail(strict=True, reason="creeps: see docs/contact.md"),
+            ],
+        ),
+    ],
+)
 def test_plates_with_napkins_between(seconds):
     """A pile of plates of 0.3 kg with napkins between stands, each a napkin above the other."""
     world = nuno.World(device="cpu")
