@@ -11,7 +11,8 @@ from nuno.kernels.kernel_modules import kernel_modules
 
 ARCHITECTURE = 90
 MODULES = {module.name: module for module in kernel_modules() if "cuda" in module.devices}
-SAME = {"run_blocks_shared", "run_double_blocks_partly", "run_grid", "run_soft_blocks_shared_sharp"} | {
+WHOLE = {
+    "run_blocks_shared", "run_double_blocks_partly", "run_grid", "run_soft_blocks_shared_sharp",
     "run_soft_double_blocks_partly_sharp", "run_soft_grid",
 }  # fmt: skip
 """Of the modules that go through the substeps of cloth and soft bodies, those that between them have all functions. The
@@ -21,7 +22,7 @@ others have the same functions over other memory; `.ci/run` leaves them, named "
 def _again(name):
     """Return whether a module has the functions of others."""
     last = name.rpartition(".")[2]
-    return name.startswith("nuno.plans.run_") and last not in SAME
+    return name.startswith("nuno.plans.run_") and last not in WHOLE
 
 
 @pytest.mark.slow

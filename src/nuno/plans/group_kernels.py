@@ -1,4 +1,4 @@
-"""A cloth's frame by a block group of blocks, for `nuno.plans.group_plan.GridPlan`.
+"""A cloth's frame by a block group, for `nuno.plans.group_plan.GridPlan`.
 
 The phases are those of `nuno.plans.cloth_substep`, so that colours come in the same order and give the same bits;
 blocks wait for each other inside of the launch. Every block keeps the figures that all threads read in shared memory,
@@ -223,7 +223,7 @@ def run_grid(
     blocks: int,
     block_size: int,
 ):  # fmt: skip
-    """A frame, or some of one, of every world by a block group of blocks; nothing where not all are there."""
+    """A frame, or some of one, of every world by a block group; nothing where not all are there."""
     first, block_group = block_group_of(wp.tid(), barrier_counts, call, block_groups, blocks, block_size)
     if blocks == 1 or all_resident(barrier_counts, call, block_groups, block_groups * blocks):
         begin_grid_barrier(block_group)

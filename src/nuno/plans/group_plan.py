@@ -1,6 +1,6 @@
 """The CUDA plan for bodies that take the whole device: all its blocks go through a frame together, in one launch.
 
-Each world has a block group of blocks, which takes more worlds in turn where there are many. Blocks wait for each other
+Each world has a block group, which takes more worlds in turn where there are many. Blocks wait for each other
 inside of the launch (`nuno.numbers.block_group`), which takes half as long as beginning another. Where the device has
 no room for all blocks at once, each world has a single block, which waits for nobody.
 """
@@ -29,11 +29,11 @@ class GridPlan:
         kernels: For coordinates as floats, and as doubles.
         state: The state of all worlds, coordinates as floats.
         before: What the kernels take between states and settings.
-        after: Gives, for the blocks of a block group, what they take behind these; then come the launch's counts, its
-            number, substeps, block groups, and the blocks and threads of each.
+        after: Gives, for the number of blocks in a group, what they take behind these; then come the launch's counts,
+            its number, substeps, block groups, and the blocks and threads of each.
         device: "cuda:0" ..., or "cpu", where one thread does everything.
         worlds: How many there are.
-        block_groups: How many of them are gone through at once, each by a block group of blocks.
+        block_groups: How many of them are gone through at once, each by a block group.
         blocks: Of a block group.
         threads: Of a block.
         parts: Does parts of a substep where the kernels cannot. It takes the settings, the substeps and the state with

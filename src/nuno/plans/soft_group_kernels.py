@@ -1,4 +1,4 @@
-"""A soft body's frame by a block group of blocks, for `nuno.plans.group_plan.GridPlan`.
+"""A soft body's frame by a block group, for `nuno.plans.group_plan.GridPlan`.
 
 The phases are those of `nuno.plans.soft_substep`, with the same bits: what one colour's clusters, or particles, do does
 not hang on who does it. Every block keeps the figures that all threads read in shared memory, its own copy.
@@ -148,7 +148,7 @@ def run_soft_grid(
     block_groups: int, blocks: int,
     block_size: int,
 ):  # fmt: skip
-    """A frame, or the beginning of one, of every world by a block group of blocks; nothing where not all are there."""
+    """A frame, or the beginning of one, of every world by a block group; nothing where not all are there."""
     first, block_group = block_group_of(wp.tid(), barrier_counts, call, block_groups, blocks, block_size)
     if blocks == 1 or all_resident(barrier_counts, call, block_groups, block_groups * blocks):
         begin_grid_barrier(block_group)

@@ -1,7 +1,7 @@
 """A substep of rigid bodies as a list of phases, and the kernels that walk through it.
 
 ``thread`` and ``threads`` say which share of a phase's work is whose: on the CPU a thread has a world to itself, on
-CUDA a block of threads or a block group of blocks. ``those`` wait for each other between the phases.
+CUDA a block of threads or a block group. ``those`` wait for each other between the phases.
 """
 
 from typing import Any
@@ -148,7 +148,7 @@ def run_rigid_group(
     barrier_counts: wp.array(dtype=int),
     worlds: int, blocks: int, block_size: int,
 ):  # fmt: skip
-    """`go_through` every world by a block group of blocks; nothing where not all are there."""
+    """`go_through` every world by a block group; nothing where not all are there."""
     world, block_group = block_group_of(wp.tid(), barrier_counts, 0, worlds, blocks, block_size)
     if all_resident(barrier_counts, 0, worlds, worlds * blocks):
         begin_grid_barrier(block_group)

@@ -124,7 +124,7 @@ class ClothSolver(ParticleSolver):
         self_contact: bool = True,
         plan: str = "auto",
     ) -> None:
-        # block groups of blocks have one world after the other, also where that is tried out on the CPU
+        # block groups have one world after the other, also where that is tried out on the CPU
         self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
         self.topology, self._cell_size = topology, topology.cell_size
         self._launches = RecordedLaunches(self.device, 1)
@@ -145,8 +145,7 @@ class ClothSolver(ParticleSolver):
         self.self_contact = self_contact
         self.passes = PASSES  # over contacts of the cloth with itself, in a substep
         self._all_edges = False  # whether a sheet's diagonals collide with all edges
-        # see `nuno.world.impacts`: frames for which the cloth is guarded, and how often it was tried in vain to take it
-        # apart
+        # see `nuno.world.impacts`: frames for which the cloth is guarded, and vain attempts to take it apart
         self.guarded, self.tangled = np.zeros((2, self.world_count), dtype=np.int32)
         self.shared_memory = True
         if plan == "auto":
@@ -483,22 +482,15 @@ class ClothSolver(ParticleSolver):
             block_groups, blocks = block_groups_of(self.world_count, cores_of(self.device), SHARED_OUT)
         if self._lists is None:
             self._lists = make_lists(self._topology, self.world_count, self.device)
-        before, speeds = (self._topology, self._size), wp.zeros(2 * self.world_count, dtype=float, device=self.device)
+        speeds = wp.zeros(2 * self.world_count, dtype=float, device=self.device)
 
         def after(blocks: int) -> tuple[Any, ...]:
             return self._shapes, self._work(blocks), self._lists, speeds
 
         return GridPlan(
-            (run_grid, run_double_grid),
-            self._state,
-            before,
-            after,
-            self.device,
-            self.world_count,
-            block_groups,
-            blocks,
-            THREADS,
-        )
+            (run_grid, run_double_grid), self._state, (self._topology, self._size), after, self.device,
+            self.world_count, block_groups, blocks, THREADS,
+        )  # fmt: skip
 
     def _work(self, blocks: int) -> Any:
         """The elements in the shares of so many blocks, kept for the next launch."""

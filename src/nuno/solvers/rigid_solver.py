@@ -33,7 +33,7 @@ with 4 it comes to rest."""
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which runs one world."""
 GROUP_PARTS = 160
-"""Parts from which on a block group of blocks takes less time than one (an H200; 105 take more, 205 less)."""
+"""Parts from which on a block group takes less time than one (an H200; 105 take more, 205 less)."""
 
 DYNAMIC, MOVED = 1, 2
 PHASES = {"all": 0, "predict": 1, "contacts": 2, "finish": 3}
@@ -327,7 +327,7 @@ class RigidSolver(RigidArrays):
         return blocks if self._cuda and parts > GROUP_PARTS and blocks > 1 and not self._crowded else 1
 
     def _launch_block_groups(self, inputs: list[Any]) -> bool:
-        """Launch a block group of blocks for each world; return whether one did the work, else nothing has changed."""
+        """Launch a block group for each world; return whether one did the work, else nothing has changed."""
         blocks = self._blocks_of_group()
         if blocks == 1:
             return False
