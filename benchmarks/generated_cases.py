@@ -1,7 +1,7 @@
 """Picked cloths made with Nuno's own engine, at a resolution and step that no estimator uses.
 
 A scene is one cloth on one table before one camera; each of its picks has a material of its own. Ranges are those of
-the benchmark's description in docs/performance.md. Masks only: their edges are displaced by smooth noise.
+the benchmark's description in docs/reports/performance.md. Masks only: their edges are displaced by smooth noise.
 """
 
 from __future__ import annotations

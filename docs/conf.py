@@ -1,5 +1,7 @@
 """Sphinx: ``sphinx-build -W docs out/docs``."""
 
+from typing import Any
+
 import nuno
 
 project = "Nuno"
@@ -7,16 +9,40 @@ author = "The Nuno authors"
 copyright = f"2026, {author}"
 release = nuno.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
 exclude_patterns = ["out"]
-myst_enable_extensions = ["dollarmath"]
-myst_heading_anchors = 3
-html_theme = "alabaster"
-html_theme_options = {"description": "A simulator of deformable objects that lives inside a robot's own program"}
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 4
+html_theme = "furo"
+html_title = f"Nuno {release}"
+default_role = "code"
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"
-default_role = "code"
+autodoc_typehints = "description"  # types beside what the docstring says of an argument, signatures without them
+autodoc_typehints_description_target = "documented_params"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+# A reference that leads nowhere is an error. Pages are built without a network, so other packages' are not looked up.
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(np|numpy|warp|collections|concurrent|contextlib|os|pathlib|matplotlib|trimesh|PIL|pinocchio)\..*"),
+]
+
+
+def setup(app: Any) -> None:
+    """Keep Napoleon from taking the words before a colon in a property's first line for its type."""
+    app.connect("autodoc-process-docstring", begin_with_a_blank, priority=400)
+
+
+def begin_with_a_blank(_app: Any, kind: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+    """Put an empty word before the docstring of a property or an attribute."""
+    if kind in ("property", "attribute", "data"):
+        lines.insert(0, "\\ ")

@@ -12,7 +12,7 @@ import pytest
 import nuno
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCKS = {
     f"{page.stem}-{number}": text
     for page in PAGES
@@ -80,6 +80,17 @@ def test_links_lead_somewhere():
     for page in PAGES:
         for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "reports").glob("[!i]*.md")), ids=lambda page: page.stem)
+def test_measurements_name_their_command_and_data(page):
+    """Each section of a report that has a table says what makes it and which data that needs; its scripts are there."""
+    text = page.read_text(encoding="utf-8")
+    for section in re.split(r"^(?=#)", text, flags=re.M)[1:]:
+        if re.search(r"^\|", section, re.M):
+            assert re.search(r"^Made by: .*\nData: ", section, re.M | re.S), section.splitlines()[0]
+    for script in re.findall(r"benchmarks/\w+\.py", text):
+        assert (ROOT / script).exists(), script
 
 
 def test_every_example_is_told_of():

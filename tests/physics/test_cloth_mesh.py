@@ -59,7 +59,7 @@ def rigidities(kind, cells, across=2):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_strip_of_any_triangles_has_its_nominal_rigidity_at_default_substeps(kind):
     """Elastica within 10 %, what Nuno promises for G from 1 to 30."""
-    # squares cut both ways come out up to 11 % too stiff (docs/performance.md)
+    # squares cut both ways come out up to 11 % too stiff (docs/reports/performance.md)
     np.testing.assert_allclose(rigidities(kind, 10), 1.0, atol=0.12 if kind == "crossed" else 0.10)
 
 

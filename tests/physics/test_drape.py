@@ -1,4 +1,4 @@
-"""The drape of a cloth over a disc: from limp to stiff, and of measured fabrics (more of them: docs/performance.md)."""
+"""The drape of a cloth over a disc: limp, stiff and measured fabrics (more: docs/reports/performance.md)."""
 
 import numpy as np
 import pytest

@@ -49,7 +49,8 @@ def test_a_clamped_square_sags_as_a_plate(kind):
     assert w == pytest.approx(expected, rel=0.05)  # mesh and pass, as in test_bending
 
 
-# squares cut both ways are left out: free to turn at the rim, their twist is 15 to 20 % too soft (docs/performance.md)
+# squares cut both ways are left out: free to turn at the rim, their twist is 15 to 20 % too soft
+# (docs/reports/performance.md)
 @pytest.mark.parametrize("kind", ["sheet", "right-angled", "jittered"])
 def test_a_simply_supported_square_sags_as_a_plate(kind):
     """Closed form w = .00406 q a^4 / D."""

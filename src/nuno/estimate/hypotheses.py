@@ -78,7 +78,7 @@ LOOSE = spread(150.0, 15.0, LIMP)
 """Guesses at a cloth that gives in its plane, for a coarse mesh.
 
 A coarse mesh that hardly stretches cannot fold in two directions at once and holds a lifted cloth open. One that gives
-falls into pleats, as a limp cloth on a finer mesh does (docs/accuracy.md).
+falls into pleats, as a limp cloth on a finer mesh does (docs/reports/accuracy.md).
 """
 SHEARING = spread(1000.0, 10.0, LIMP)
 """Guesses at a cloth that gives on the bias alone, for a coarse mesh."""
@@ -100,7 +100,7 @@ DISCRETISATIONS = (
 Four guesses that differ as far as they may, firm and loose, limp and stiff, slippery and not, look at every candidate;
 the others of both kinds at the best, and a finer and stiffer weave and one that shears at the best of these. How a
 lifted cloth buckles depends on how it stretches and shears and on the mesh: those that differ in all three had more
-right answers than any one (docs/accuracy.md).
+right answers than any one (docs/reports/accuracy.md).
 """
 
 

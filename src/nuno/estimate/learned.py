@@ -5,7 +5,7 @@ and which tell of another pick. A network (`nuno.estimate.outline_net`) does to 
 silhouettes of Nuno's own engine alone, one picked cloth seen and others imagined on other meshes, with other steps
 and materials, to give the true candidate the most probability. What it says of a pair, r, is added to the hand-made
 log likelihood h of a guess (`nuno.estimate.ranking`): 0.7 h + r. Both shares were chosen on scenes that it was not
-trained on (docs/accuracy.md).
+trained on (docs/reports/accuracy.md).
 
 It sees the two silhouettes and is told which guess the imagined one is of, not where the cloth lay nor where the hand
 went: picks of all candidates were equally likely when it was trained.

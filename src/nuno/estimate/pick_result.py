@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 WORST = -1.0e9
 
 LOW_CONFIDENCE = 0.8
-"""Below this an answer carries a warning: above it about 1 of 100 was wrong, below 1 of 3 (docs/accuracy.md)."""
+"""Below this an answer carries a warning. About 1 answer of 100 above it was wrong, 1 of 3 below.
+
+The counts are in docs/reports/accuracy.md."""
 
 
 @dataclass(eq=False)

@@ -7,7 +7,7 @@ likelihood = 5 ln(1 + chamfer / 1 px) + 10 (1 - IoU) + 25 pattern up to a consta
 heavy-tailed error in pixels: being off by twice as much costs about the same anywhere. The last is that of some 25
 independent patches of cloth with normal errors of unknown size (`nuno.estimate.pattern`); it is 0 where there are
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
-(docs/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
+(docs/reports/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
 (`nuno.estimate.learned`). How far sideways the hand would have gone from a candidate is its prior
 (`nuno.estimate.lift_prior`), by which its evidence is multiplied.
 """
@@ -29,7 +29,7 @@ EVIDENCE = ("evidence", "silhouette")
 """The rankings that average over guesses and turns."""
 SURE = 0.98
 """A candidate as likely as this after some of the guesses stayed the best one after all, in all cases made for choosing
-(docs/accuracy.md)."""
+(docs/reports/accuracy.md)."""
 SHARE = 0.97
 """Further guesses look at the candidates that together hold so much of the probability."""
 
