@@ -34,6 +34,10 @@ napoleon_use_ivar = True
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(np|numpy|warp|collections|concurrent|contextlib|os|pathlib|matplotlib|trimesh|PIL|pinocchio)\..*"),
+    ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
+    ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
+    # What a result holds for other functions to take
+    ("py:class", r"(.*\.)?(ArmPlan|CarryPlan|FoldComparison|Futures|Scene|SoftTopology)"),
 ]
 
 

@@ -2,6 +2,8 @@
 
 import ast
 import builtins
+import importlib
+import inspect
 import re
 import subprocess
 import sys
@@ -30,6 +32,8 @@ CALLED = {
     "viewer": (nuno.Viewer,),
     "path": (nuno.Path,),
 }
+
+NEVER_RAISE = {"boundary_faces", "box_tetrahedra"}
 
 
 def test_there_are_blocks():
@@ -80,6 +84,36 @@ def test_links_lead_somewhere():
     for page in PAGES:
         for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_every_public_name_is_on_an_api_page():
+    """Each name of ``nuno.__all__`` is documented in docs/api, once, and whatever is documented there exists."""
+    pages = "\n".join(page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "api").glob("*.md")))
+    documented = re.findall(r"^\.\. auto(?:class|function|exception|data):: ([\w.]+)$", pages, re.M)
+    assert len(documented) == len(set(documented))
+    public = {name for name in nuno.__all__ if not is_error(getattr(nuno, name))}
+    assert public - {name.removeprefix("nuno.") for name in documented} == set()
+    assert ".. automodule:: nuno.errors" in pages  # with all its members
+    for name in documented:
+        owner, _, last = name.rpartition(".")
+        assert hasattr(importlib.import_module(owner), last), name
+
+
+def test_every_public_function_says_what_it_takes():
+    """Each public name has a docstring; a function's has all its arguments, and the errors where it raises some."""
+    for name in nuno.__all__:
+        found = getattr(nuno, name)
+        text = inspect.getdoc(found)
+        assert text, name
+        if inspect.isfunction(found):
+            for argument in inspect.signature(found).parameters:
+                assert re.search(rf"^ +{argument}: ", text, re.M), f"{name}: {argument}"
+            assert "Raises:" in text or name in NEVER_RAISE, name
+
+
+def is_error(found):
+    """Return whether a public name is an error's class."""
+    return isinstance(found, type) and issubclass(found, Exception)
 
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs" / "reports").glob("[!i]*.md")), ids=lambda page: page.stem)

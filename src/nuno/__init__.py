@@ -83,6 +83,9 @@ if TYPE_CHECKING:
     from nuno.estimate.pick import estimate_pick
     from nuno.estimate.pick_result import PickResult
     from nuno.estimate.similarity import similarity
+    from nuno.mesh.fitted import fitted_tetrahedra
+    from nuno.mesh.lattice import lattice_tetrahedra
+    from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra
     from nuno.robot.footsteps import Footstep
     from nuno.robot.goal import Goal, Tolerances
     from nuno.robot.hands import Hand
@@ -218,6 +221,7 @@ __all__ = [
     "SweepResult",
     "Table",
     "TaughtFold",
+    "Tetrahedra",
     "Tolerances",
     "TowelPicker",
     "Trial",
@@ -232,7 +236,9 @@ __all__ = [
     "WorkerLostError",
     "World",
     "ball_joint",
+    "boundary_faces",
     "box",
+    "box_tetrahedra",
     "capsule",
     "carry_mat",
     "cloth_mesh",
@@ -246,9 +252,11 @@ __all__ = [
     "export_body",
     "find_layers",
     "fit_material",
+    "fitted_tetrahedra",
     "fixed_joint",
     "hinge",
     "improve_fold",
+    "lattice_tetrahedra",
     "lift_soft_cube",
     "locate_marker",
     "mesh",
@@ -360,6 +368,11 @@ _LAZY = {
     "TowelPicker": "nuno.tasks.pick_towel",
     "Hull": "nuno.shapes.shape",
     "ArmTracks": "nuno.tasks.arm_tracks",
+    "Tetrahedra": "nuno.mesh.tetrahedra",
+    "boundary_faces": "nuno.mesh.tetrahedra",
+    "box_tetrahedra": "nuno.mesh.tetrahedra",
+    "lattice_tetrahedra": "nuno.mesh.lattice",
+    "fitted_tetrahedra": "nuno.mesh.fitted",
 }
 
 

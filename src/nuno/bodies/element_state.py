@@ -39,6 +39,9 @@ class ElementState:
 def elements(body: Body) -> ElementState:
     """Return what the tetrahedra of a soft body are doing now.
 
+    Args:
+        body: A soft body, attached or not.
+
     Raises:
         InvalidInputError: the body has no tetrahedra.
     """

@@ -17,32 +17,73 @@ from nuno.validation import number
 
 
 def box(size: ArrayLike, **options: Unpack[BodyOptions]) -> Body:
-    """Return a box with edges ``size`` (3,) [m]; the options are those of ``Body``."""
+    """Return a box.
+
+    Args:
+        size: Edges along x, y and z (3,) [m].
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(Box(size), **options)  # type: ignore[arg-type]
 
 
 def sphere(radius: float, **options: Unpack[BodyOptions]) -> Body:
-    """Return a sphere of ``radius`` [m]; the options are those of ``Body``."""
+    """Return a sphere.
+
+    Args:
+        radius: [m].
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(Sphere(radius), **options)
 
 
 def cylinder(radius: float, height: float, **options: Unpack[BodyOptions]) -> Body:
-    """Return a cylinder along z of ``radius`` and ``height`` [m]; the options are those of ``Body``."""
+    """Return a cylinder along z.
+
+    Args:
+        radius: [m].
+        height: Along z [m].
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(Cylinder(radius, height), **options)
 
 
 def capsule(radius: float, height: float, **options: Unpack[BodyOptions]) -> Body:
-    """Return a capsule along z, ``height`` [m] between its half spheres; options as for ``Body``."""
+    """Return a capsule along z.
+
+    Args:
+        radius: [m].
+        height: Between the centres of its half spheres [m].
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(Capsule(radius, height), **options)
 
 
 def plane(**options: Unpack[BodyOptions]) -> Body:
-    """Return the endless plane z = 0 of its own frame, solid below; the options are those of ``Body``."""
+    """Return the endless plane z = 0 of its own frame, solid below.
+
+    Args:
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: an option of a wrong shape.
+    """
     return Body(Plane(), **options)
 
 
 def compound(parts: Sequence[Any], **options: Unpack[BodyOptions]) -> Body:
-    """Return several shapes fixed to each other; options as for ``Body``.
+    """Return several shapes fixed to each other.
 
     Args:
         parts: A shape such as ``Box(...)``, or (shape, position (3,) [m]) or (shape, position, quaternion (w, x, y,
@@ -56,7 +97,11 @@ def compound(parts: Sequence[Any], **options: Unpack[BodyOptions]) -> Body:
 
 
 def mesh(source: MeshSource, **options: Unpack[BodyOptions]) -> Body:
-    """Return a rigid surface from a path, a trimesh or (vertices, faces) [m]; options as for ``Body``.
+    """Return a rigid surface.
+
+    Args:
+        source: A path, a trimesh, or vertices (n, 3) [m] and faces (m, 3) int.
+        options: Those of ``Body``.
 
     Raises:
         MeshError: nothing to read, or not a usable mesh.
@@ -65,7 +110,16 @@ def mesh(source: MeshSource, **options: Unpack[BodyOptions]) -> Body:
 
 
 def sheet(size: ArrayLike, cells: tuple[int, int], **options: Unpack[BodyOptions]) -> Body:
-    """Return a flat cloth of ``size`` (2,) [m] along x, y in ``cells`` (nx, ny); options as for ``Body``."""
+    """Return a flat cloth.
+
+    Args:
+        size: Sides along x and y (2,) [m].
+        cells: (nx, ny), of which each has a vertex at every corner.
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a size or a count of cells that is not positive, or an option of a wrong shape.
+    """
     return Body(Sheet(size, cells), **options)  # type: ignore[arg-type]
 
 
@@ -95,12 +149,20 @@ def cloth_mesh(
 def soft_box(
     size: ArrayLike, cells: tuple[int, int, int], *, mean_strain: bool = False, **options: Unpack[BodyOptions]
 ) -> Body:
-    """Return a soft box with edges ``size`` (3,) [m] in ``cells`` (nx, ny, nz) voxels; options as for ``Body``.
+    """Return a soft box of voxels.
 
-    Each voxel is five tetrahedra, alternating so that their faces match; ``vertices`` are the corners of the voxels,
-    those inside the box included, vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i. With few voxels across, tetrahedra
-    are too stiff in bending and torsion; with ``mean_strain`` the five of a voxel share their mean deformation, and
-    are not (docs/soft-bodies.md).
+    Each voxel is five tetrahedra, alternating so that their faces match. ``vertices`` are the corners of the voxels,
+    those inside the box included, vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i.
+
+    Args:
+        size: Edges along x, y and z (3,) [m].
+        cells: Voxels along x, y and z (nx, ny, nz).
+        mean_strain: Whether the five tetrahedra of a voxel share their mean deformation. Without it few voxels across
+            are too stiff in bending and torsion (docs/soft-bodies.md).
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a size or a count of cells that is not positive, or an option of a wrong shape.
     """
     return Body(SoftBox(size, cells, mean_strain), **options)  # type: ignore[arg-type]
 
@@ -109,10 +171,19 @@ def soft_sphere(
     radius: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
     mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
-    """Return a soft sphere of ``radius`` [m], from voxels of at most ``cell`` [m].
+    """Return a soft sphere.
 
-    ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``. The tetrahedra are made as
-    by ``soft_mesh``, and so are those of ``soft_cylinder`` and ``soft_capsule``; options as for ``Body``.
+    ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``.
+
+    Args:
+        radius: [m].
+        cell: Longest edge of a voxel [m].
+        tetrahedraliser: "fitted" or "lattice", as for ``soft_mesh``.
+        mean_strain: Whether whole voxels share their mean deformation, as in ``soft_box``.
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
     """
     return Body(SoftSphere(radius, cell, tetrahedraliser, mean_strain), **options)
 
@@ -121,7 +192,21 @@ def soft_cylinder(
     radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
     mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
-    """Return a soft cylinder of ``radius`` and ``height`` [m] along z; otherwise as ``soft_sphere``."""
+    """Return a soft cylinder along z.
+
+    ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``.
+
+    Args:
+        radius: [m].
+        height: Along z [m].
+        cell: Longest edge of a voxel [m].
+        tetrahedraliser: "fitted" or "lattice", as for ``soft_mesh``.
+        mean_strain: Whether whole voxels share their mean deformation, as in ``soft_box``.
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(SoftCylinder(radius, height, cell, tetrahedraliser, mean_strain), **options)
 
 
@@ -129,7 +214,21 @@ def soft_capsule(
     radius: float, height: float, cell: float, *, tetrahedraliser: Literal["fitted", "lattice"] = "fitted",
     mean_strain: bool = False, **options: Unpack[BodyOptions],
 ) -> Body:  # fmt: skip
-    """Return a soft capsule along z, ``height`` [m] between its half spheres; otherwise as ``soft_sphere``."""
+    """Return a soft capsule along z.
+
+    ``vertices`` are the tetrahedra's; the round surface that is drawn is ``Body.skin()``.
+
+    Args:
+        radius: [m].
+        height: Between the centres of its half spheres [m].
+        cell: Longest edge of a voxel [m].
+        tetrahedraliser: "fitted" or "lattice", as for ``soft_mesh``.
+        mean_strain: Whether whole voxels share their mean deformation, as in ``soft_box``.
+        options: Those of ``Body``.
+
+    Raises:
+        InvalidInputError: a length that is not positive and finite, or an option of a wrong shape.
+    """
     return Body(SoftCapsule(radius, height, cell, tetrahedraliser, mean_strain), **options)
 
 

@@ -60,6 +60,9 @@ class PickCase:
 def read_case(folder: str | os.PathLike[str]) -> PickCase:
     """Read input.json of a folder and the two images that it names; nothing else there is opened.
 
+    Args:
+        folder: Of the case; docs/picks.md describes its input.json.
+
     Raises:
         InvalidInputError: the folder or an entry is missing or not usable.
         FileFormatError: input.json is not JSON.

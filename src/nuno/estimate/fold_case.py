@@ -67,6 +67,9 @@ class FoldCase:
 def read_fold_case(folder: str | os.PathLike[str]) -> FoldCase:
     """Read input.json of a folder and the images that its frames name; nothing else there is opened.
 
+    Args:
+        folder: Of the case; docs/folds.md describes its input.json.
+
     Raises:
         InvalidInputError: the folder or an entry is missing or not usable.
         FileFormatError: input.json is not JSON.

@@ -349,13 +349,20 @@ def similarity(
     *,
     ignore: ArrayLike | None = None,
 ) -> Any:
-    """Return how alike masks are to a real mask; see :func:`score_masks` for the scores.
+    """Return how alike masks are to a real mask.
+
+    With S the simulated and R the real mask, N the number of pixels that are not ignored, and d the distance
+    [px] to the nearest pixel of the other contour:
+
+    - "eq1" = (``|S and R|`` + ``|not S and not R|``) / N, the paper's eq. (1); 0 to 1, higher is better;
+    - "iou" = ``|S and R|`` / ``|S or R|``; 1 if both are empty;
+    - "chamfer" = (mean of d over S's contour + mean of d over R's contour) / 2 [px], lower is better.
 
     Args:
         masks: (worlds, h, w), or one mask (h, w): a NumPy array of bool or numbers of which the non-zero are
-            the mask, or a Warp array of bool or uint8 (for key images see :func:`score_masks`).
-        real_mask: (h, w) likewise, or a prepared :class:`Silhouette`.
-        score: "eq1" (the paper's eq. (1)), "iou", "chamfer" (a distance [px]: lower is better), or "all".
+            the mask, or a Warp array of bool or uint8.
+        real_mask: (h, w) likewise, or a prepared `Silhouette`.
+        score: "eq1", "iou", "chamfer", or "all".
         ignore: (h, w) pixels that do not count; not together with a Silhouette, which has its own.
 
     Returns:

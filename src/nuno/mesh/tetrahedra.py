@@ -79,7 +79,14 @@ def voxel_tetrahedra(voxels: np.ndarray, cells: tuple[int, int, int]) -> np.ndar
 
 
 def boundary_faces(tets: np.ndarray) -> np.ndarray:
-    """Return (f, 3) int32, the faces that belong to one tetrahedron only, counterclockwise from outside."""
+    """Return the faces of the boundary: those that belong to one tetrahedron only.
+
+    Args:
+        tets: (m, 4) int.
+
+    Returns:
+        (f, 3) int32, counterclockwise from outside.
+    """
     return boundary_by_element(tets)[0]
 
 

@@ -191,6 +191,9 @@ def locate_marker(
         marker: The marker's number.
         dictionary: OpenCV's number of the markers' dictionary.
         noise: Standard deviation of a corner [px].
+
+    Raises:
+        ImageError: an image is not (h, w, 3) uint8 of its camera's size.
     """
     rules = cv2.aruco.DetectorParameters()
     rules.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX

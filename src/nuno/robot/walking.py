@@ -93,12 +93,22 @@ def plan_walk_footsteps(
     robot: Humanoid, footsteps: Sequence[Footstep], *, stride: Stride | None = None, arms: Arms = None,
     load: tuple[float, ArrayLike] | None = None, margin: float = 0.02, check_collisions: bool = True,
 ) -> Walk:  # fmt: skip
-    """Plan a walk over given footsteps, in the world; see ``plan_walk``.
+    """Plan a walk over given footsteps, in the world.
 
-    The feet may end in any stance; only the times and the lift of the stride count.
+    The feet may end in any stance.
+
+    Args:
+        robot: Left as it was.
+        footsteps: In the order in which they are taken.
+        stride: Of which only the times and the lift count.
+        arms: As for ``plan_walk``, as are ``load``, ``margin`` and ``check_collisions``.
+        load: Likewise.
+        margin: Likewise [m].
+        check_collisions: Likewise.
 
     Raises:
         InvalidInputError: something else than footsteps; and as ``plan_walk``.
+        WalkError: as ``plan_walk``.
     """
     steps = tuple(footsteps)
     if any(not isinstance(step, Footstep) for step in steps):

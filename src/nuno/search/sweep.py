@@ -179,6 +179,9 @@ def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
 
     A torn last line is left out. Where trials are missing, the others have other places than in the sweep.
 
+    Args:
+        path: Of the file that ``sweep`` or ``minimise`` was given as ``results``.
+
     Raises:
         FileFormatError: it is no results file, or damaged.
     """

@@ -59,9 +59,10 @@ def carry_mat(
     """Let a humanoid walk with a mat on its arms, in all ways of holding it, and say how steadily it did.
 
     The mat lies across both arms, touched by them and nothing else, with Coulomb friction; in each trial the robot
-    stands for ``settle`` seconds and then walks. F = integral of |mean of the mat's vertices - humanoid's base - D0|
-    over the ``seconds`` from the start of the walk, D0 being the difference then (eq. (2) and (3) of the paper;
-    docs/carrying.md says how they are read). A trial whose state stops being finite has failed, and says so.
+    stands for ``settle`` seconds and then walks. F is the integral over the ``seconds`` from the start of the walk of
+    ``|D - D0|``, where D is the mean of the mat's vertices less the humanoid's base and D0 is D as the walk starts (eq.
+    (2) and (3) of the paper; docs/carrying.md says how they are read). A trial whose state stops being finite has
+    failed, and says so.
 
     Args:
         robot: A humanoid, which is left as it was, or its name; or the tracks of one's arms, planned before (the plan
