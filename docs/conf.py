@@ -1,8 +1,13 @@
 """Sphinx: ``sphinx-build -W docs out/docs``."""
 
+import sys
+from pathlib import Path
 from typing import Any
 
-import nuno
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS), str(DOCS.parent / "src")]  # gallery.py, and this checkout's Nuno
+
+import nuno  # noqa: E402
 
 project = "Nuno"
 author = "The Nuno authors"
@@ -15,6 +20,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
+    "gallery",
 ]
 exclude_patterns = ["out"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
@@ -24,8 +30,8 @@ html_title = f"Nuno {release}"
 default_role = "code"
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "description"  # types beside what the docstring says of an argument, signatures without them
-autodoc_typehints_description_target = "documented_params"
+autodoc_typehints = "description"  # types are listed with the arguments, not in signatures
+autodoc_typehints_description_target = "all"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
@@ -37,7 +43,7 @@ nitpick_ignore_regex = [
     ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
     ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
     # What a result holds for other functions to take
-    ("py:class", r"(.*\.)?(ArmPlan|CarryPlan|FoldComparison|Futures|Scene|SoftTopology)"),
+    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout|Scene|SoftTopology)"),
 ]
 
 

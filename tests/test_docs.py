@@ -127,12 +127,14 @@ def test_measurements_name_their_command_and_data(page):
         assert (ROOT / script).exists(), script
 
 
-def test_every_example_is_told_of():
-    """The table of docs/getting-started.md has a row for each program in examples/, and no other."""
-    page = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
-    assert sorted(re.findall(r"^\| `(\w+\.py)`", page, re.M)) == sorted(
-        p.name for p in (ROOT / "examples").glob("*.py")
-    )
+def test_every_example_is_in_the_gallery():
+    """docs/examples.md has a card and a section for each program in examples/, and no other."""
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    programs = sorted(p.stem for p in (ROOT / "examples").glob("*.py"))
+    cards = re.search(r"```{example-cards}\n(.*?)```", page, re.S).group(1)
+    assert sorted(cards.split()) == programs
+    assert sorted(re.findall(r"^```{example} (\w+)$", page, re.M)) == programs
+    assert sorted(re.findall(r"^\((\w+)\)=$", page, re.M)) == programs  # where the cards lead
 
 
 def test_the_first_program_runs(tmp_path):
