@@ -43,7 +43,8 @@ nitpick_ignore_regex = [
     ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
     ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
     # What a result holds for other functions to take
-    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout|Scene|SoftTopology)"),
+    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
+    ("py:class", r"(.*\.)?(Scene|SoftTopology)"),
 ]
 
 

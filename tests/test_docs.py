@@ -28,7 +28,7 @@ CALLED = {
     "table": (nuno.Body,),
     "grip": (nuno.Grip,),
     "recording": (nuno.Recording,),
-    "robot": (nuno.SimulatedRobot, nuno.Humanoid),
+    "robot": (nuno.SimulatedRobot, nuno.Humanoid, nuno.WireRobot),
     "viewer": (nuno.Viewer,),
     "path": (nuno.Path,),
 }

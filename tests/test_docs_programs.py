@@ -1,0 +1,85 @@
+"""The programs that README and docs show run as they stand, page by page, in one namespace."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = {
+    page.stem: page
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if re.search(r"^```python", page.read_text(encoding="utf-8"), re.M)
+}
+# pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
+LONG = {"README", "carrying", "closed-loop", "folds", "picks", "robot-interface", "sweeps", "teaching"}
+
+
+def blocks(page):
+    """Return the blocks of a page, without those before which a comment says that they are not run, and why."""
+    text = re.sub(r"^<!-- not run: [^\n]+ -->\n```python\n.*?^```", "", page.read_text("utf-8"), flags=re.M | re.S)
+    return re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in sorted(PAGES)]
+)
+def test_a_page_runs(name, tmp_path):
+    """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    source = ""
+    for block in blocks(PAGES[name]):
+        file = re.match(r"# (\w+\.py)\n", block)
+        if file:  # a block that names its file is that file
+            (tmp_path / file.group(1)).write_text(block, encoding="utf-8")
+        else:
+            source += block
+    done = subprocess.run(  # with -c, as at a prompt: processes that a pool starts do not run it again
+        [sys.executable, "-c", source], cwd=tmp_path, capture_output=True, text=True, timeout=1800,
+        env=os.environ | {"MPLBACKEND": "agg", "BROWSER": "true"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_few_blocks_are_not_run():
+    """What is left out says why: it needs a machine that is not here, or is an outline of an example, which is run."""
+    reasons = [
+        reason
+        for page in PAGES.values()
+        for reason in re.findall(r"^<!-- not run: (.*) -->$", page.read_text("utf-8"), re.M)
+    ]
+    assert len(reasons) <= 5
+    assert all(re.search(r"needs|examples/|first program", reason) for reason in reasons), reasons
+
+
+COMMANDS = sorted(
+    {
+        command
+        for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+        for block in re.findall(r"^```(?:sh|bash|dockerfile)\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
+        for command in re.findall(r"(?:python -m |RUN |^)(nuno [a-z][^&|\n]*)", block, re.M)
+    }
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_is_known(command):
+    """What a page tells to type is a command, and its --help has the options that are typed."""
+    words = command.split()
+    done = subprocess.run([sys.executable, "-m", *words[:2], "--help"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    for option in (word.partition("=")[0] for word in words if word.startswith("--")):
+        assert option in done.stdout, f"{command}: {option}"
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", "CONTRIBUTING.md", *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
+)
+def test_scripts_are_there(page):
+    """Every program of examples/, benchmarks/ and tests/ that a page names exists."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for name in re.findall(r"\b((?:examples|benchmarks|tests)/[\w/.-]+\.(?:py|html|npz))", text):
+        assert (ROOT / name).exists(), name
