@@ -15,7 +15,7 @@ PAGES = {
     if re.search(r"^```python", page.read_text(encoding="utf-8"), re.M)
 }
 # pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
-LONG = {"README", "carrying", "closed-loop", "folds", "picks", "robot-interface", "sweeps", "teaching"}
+LONG = {"README", "carrying", "closed-loop", "folds", "picks", "robot-interface", "sweeps", "teaching", "tutorial"}
 
 
 def blocks(page):
