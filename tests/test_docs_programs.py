@@ -15,7 +15,7 @@ PAGES = {
     if re.search(r"^```python", page.read_text(encoding="utf-8"), re.M)
 }
 # pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
-LONG = {"README", "carrying", "closed-loop", "folds", "picks", "robot-interface", "sweeps", "teaching", "tutorial"}
+LONG = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
 
 
 def blocks(page):
