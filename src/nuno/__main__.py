@@ -119,7 +119,7 @@ def _fold(options: argparse.Namespace) -> int:
     told = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
     sys.stdout.write(
         f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
-        f"see {Path(options.out) / 'result.json'}, strip.png, layers.png and replay.glb\n"
+        f"see {Path(options.out) / 'result.json'}, strip.png, layers.png, hands.png and replay.glb\n"
     )
     return ANSWERED
 
