@@ -1,9 +1,10 @@
 """Cloth, a soft cube and rigid bodies touch each other: a towel carries two things, a napkin falls over a stack.
 
-Run: python examples/all_kinds.py [--picture FILE.png] [--film FILE.webp]
+Run: python examples/all_kinds.py [--out FOLDER [--film]]
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -15,9 +16,9 @@ RATE = 15  # [1/s] of the film
 LAMP = nuno.Lamp(position=(-0.8, -1.2, 3.0), strength=0.75, sky=0.4, radius=0.35)
 
 options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-options.add_argument("--picture", help="write how it ends")
-options.add_argument("--film", help="write how it goes")
-options = options.parse_args()
+options.add_argument("--out", type=Path, help="a folder for a picture")
+options.add_argument("--film", action="store_true", help="write a film, too")
+asked = options.parse_args()
 
 world = nuno.World(device="cpu")
 world.add(nuno.box((1.2, 0.8, 0.02), name="table", position=(0.2, 0, -0.01), color="#b08050"))
@@ -30,7 +31,7 @@ for k, each in enumerate(stack):
     each.rotate(0.25 * k, "z").color = "#8070b0"
 napkin = world.add(nuno.sheet((0.36, 0.36), cells=(20, 20), position=(0.43, 0.02, 0.42), color="#f0f0f0"))
 
-camera, film, frames = look_at_camera((0.0, -1.5, 0.85), (0.18, 0.0, 0.19), 640, 360, 730.0), [], 0
+camera, film = look_at_camera((0.0, -1.5, 0.85), (0.18, 0.0, 0.19), 640, 360, 730.0), []
 
 
 def look(scale=1.5, samples=3):
@@ -42,7 +43,7 @@ def run(seconds):
     """Let time pass, a film's frame after another where one is asked for."""
     for _ in range(round(seconds * RATE)):
         world.run(1 / RATE)
-        if options.film:
+        if asked.film:
             film.append(look(1, 2).color.numpy())
 
 
@@ -65,8 +66,10 @@ assert min(box.position[2], cube.position[2]) > 0.15, "the towel carries them"
 assert all(abs(each.position[2] - 0.055 - 0.11 * k) < 1e-3 for k, each in enumerate(stack)), "the stack stands"
 assert 0.33 < napkin.vertices[:, 2].max() < 0.345, "the napkin lies on it"
 
-if options.picture:
-    look().save(options.picture)
-if options.film:
+if asked.out:
+    asked.out.mkdir(parents=True, exist_ok=True)
+    look().save(asked.out / "all_kinds.png")
+if asked.out and asked.film:
     first, *others = [Image.fromarray(image) for image in film]
-    first.save(options.film, save_all=True, append_images=others, duration=1000 // RATE, loop=0, quality=60, method=6)
+    more = {"duration": 1000 // RATE, "loop": 0, "quality": 60, "method": 6}
+    first.save(asked.out / "all_kinds.webp", save_all=True, append_images=others, **more)
