@@ -13,7 +13,7 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-LONG = {"carry_mat", "closed_loop", "talos_fold"}  # more than 20 s each: with the slow tests, and in .ci/run
+LONG = {"carry_mat", "closed_loop", "talos_fold"}  # more than 20 s each
 
 
 def _pictures_of():
@@ -29,7 +29,7 @@ pictures_of = _pictures_of()
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LONG else []) for path in EXAMPLES],
+    [pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem in LONG else []) for path in EXAMPLES],
 )
 def test_example(path, tmp_path):
     """In a process of its own, without a display: its check holds, and a picture is all that it leaves."""
