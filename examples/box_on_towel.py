@@ -1,16 +1,24 @@
 """Four hands hold a towel by its corners; a box is set on it and carried; the hands feel what both weigh.
 
-Run: python examples/box_on_towel.py
+Run: python examples/box_on_towel.py [--out FOLDER]
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 LIFT = np.array([0.0, 0.0, 0.15])  # [m]
 BOX_MASS = 0.15  # [kg]
 TOWEL = nuno.Cloth(area_density=0.3, air_drag=3.0)
 WEIGHT = 9.81 * (BOX_MASS + 0.3 * 0.4 * 0.4)  # [N]
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
 
 world = nuno.World(device="cpu")
 world.add(nuno.plane(name="floor"))
@@ -43,3 +51,8 @@ print(f"the hands bear {load:.3f} N; box and towel weigh {WEIGHT:.3f} N")
 assert set(contacts.others) == {"towel"}
 assert box.position[2] > 0.5, "it went up with the hands"
 assert abs(load - WEIGHT) < 0.03 * WEIGHT, "the mean over some swings"
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    camera = look_at_camera((0.55, 0.7, 0.95), (0, 0, 0.58), 640, 480, 900.0)
+    nuno.take_picture(world, camera, samples=3).save(out / "box_on_towel.png")

@@ -1,13 +1,15 @@
 """Talos finds a towel on a table, picks it at a point, and tells from its own images alone at which one it holds it.
 
-Run: python examples/closed_loop.py [i j [picture.png]]
+Run: python examples/closed_loop.py [--point I J] [--out FOLDER]
 
 Two worlds: that in the robot's head, and the one that it moves and looks in, whose towel is of another cloth.
 """
 
-import sys
+import argparse
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import nuno
 from nuno.estimate.hypotheses import SPREAD, Discretisation
@@ -15,7 +17,11 @@ from nuno.tasks.look_at_camera import look_at_camera
 from nuno.tasks.pick_towel import TowelPicker
 from nuno.tasks.towel_room import TABLE, make_room
 
-POINT = (int(sys.argv[1]), int(sys.argv[2])) if len(sys.argv) > 2 else (0, 5)
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--point", type=int, nargs=2, default=(0, 5), metavar=("I", "J"), help="of the grid, 0 to 5")
+options.add_argument("--out", type=Path, help="a folder for a picture")
+asked = options.parse_args()
+POINT, out = tuple(asked.point), asked.out
 QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]  # without it: two finer meshes, a minute
 
 room = make_room(nuno.Cloth.preset("denim"), device="cpu")  # what is real
@@ -40,14 +46,14 @@ print(
 assert answer.pick == POINT == tuple(np.rint(true).astype(int))
 assert miss < 0.01 and apart.mean() < 0.03, "half of a step of the grid"
 
-if len(sys.argv) > 3:
-    import matplotlib.pyplot as plt
-
+if out:
+    out.mkdir(parents=True, exist_ok=True)
     camera = look_at_camera((1.75, 1.0, 1.5), (0.45, 0.0, 0.95), 640, 480, 640.0)
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), layout="constrained")
+    figure = Figure(figsize=(11, 8.6), layout="constrained")
+    axes = figure.subplots(2, 2)
     imagined = talos.world.masks(talos.cameras.camera("head_left"), towel).numpy()
     for ax, title, image in (
-        (axes[0, 0], "real", room.cameras.look_from(camera).color.numpy()),
+        (axes[0, 0], "the room that it moves in, also simulated", room.cameras.look_from(camera).color.numpy()),
         (axes[0, 1], "in the robot's head", talos.cameras.look_from(camera).color.numpy()),
         (axes[1, 0], "its left eye before", answer.before.images["head_left"]),
         (
@@ -60,4 +66,4 @@ if len(sys.argv) > 3:
         ax.set_title(title)
         ax.axis("off")
     axes[1, 1].contour(imagined, [0.5], colors="red")
-    figure.savefig(sys.argv[3], dpi=90)
+    figure.savefig(out / "closed_loop.png", dpi=90)

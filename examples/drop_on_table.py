@@ -1,16 +1,24 @@
 """A napkin falls onto a table, a third of it beyond the edge: friction holds it, and the free end hangs down.
 
-Run: python examples/drop_on_table.py
+Run: python examples/drop_on_table.py [--out FOLDER]
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 TABLE = (0.6, 0.6, 0.02)  # [m]
 TOP = 0.7  # [m] height of the table top
 SIZE = (0.3, 0.2)  # [m]
 OVERHANG = 0.1  # [m]
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
 
 world = nuno.World(device="cpu")
 world.add(nuno.plane(name="floor"))
@@ -41,3 +49,8 @@ assert 0.55 < on_table.mean() < 0.72, "friction holds it: about two thirds stay 
 assert 0.6 * OVERHANG < drop < 1.15 * OVERHANG, "a limp end hangs down"
 assert crept.mean() < 2e-3, "nearly at rest"
 assert not napkin.is_dynamic and napkin.is_deformed
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    camera = look_at_camera((0.85, 0.65, 1.05), (0.24, 0, 0.66), 640, 480, 900.0)
+    nuno.take_picture(world, camera, samples=3).save(out / "drop_on_table.png")

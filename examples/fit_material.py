@@ -2,14 +2,18 @@
 
 What is seen is made here by a world with a finer mesh and step than the guesses have.
 
-Run: python examples/fit_material.py
+Run: python examples/fit_material.py [--out FOLDER]
 """
 
+import argparse
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.3, 0.2)  # [m]
 REST = 0.0025  # [m] height of the cloth's middle surface above the table
@@ -17,11 +21,11 @@ TIMES = np.arange(0.2, 2.1, 0.2)  # [s] of the images
 TRUE = {"bending_rigidity": 8e-5, "friction": 0.4}  # [N m], 1
 KNOWN = nuno.Cloth(area_density=0.2, thickness=2 * REST)  # the cloth was put on a balance
 
-down = np.deg2rad(12.0)  # the camera looks along y, 0.75 m away
-pose = np.eye(4)
-pose[:3, :3] = [[1, 0, 0], [0, -np.sin(down), np.cos(down)], [0, -np.cos(down), -np.sin(down)]]
-pose[:3, 3] = (0.0, -0.75, 0.25)
-camera = nuno.Camera(320, 240, 340.0, 340.0, 159.5, 119.5, pose)
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
+
+camera = look_at_camera((0, -0.75, 0.25), (0, 0, 0.09), 320, 240, 340.0)
 
 
 def room(cells: tuple[int, int], substeps: int) -> nuno.World:
@@ -45,6 +49,7 @@ def lift_and_draw(world: nuno.World) -> None:
 
 
 real = room((27, 18), 40)
+begin = real.save()
 real.attach("cloth", replace(KNOWN, **TRUE))
 lift_and_draw(real)
 masks = []
@@ -62,3 +67,16 @@ for name, value in fit.params.items():
 print(f"like {fit.name}; outlines {fit.distance:.2f} px off, overlap {fit.overlap:.3f}")
 assert abs(fit.params["bending_rigidity"] / TRUE["bending_rigidity"] - 1.0) < 0.15
 assert abs(fit.params["friction"] / TRUE["friction"] - 1.0) < 0.15
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    real.restore(begin)  # the cloth that was found, with the outline of what was seen
+    real.attach("cloth", fit.material)
+    lift_and_draw(real)
+    pictures = []
+    for k in (2, 5, 8):
+        real.run(TIMES[k] - real.time)
+        pictures.append(nuno.take_picture(real, camera, samples=3).color.numpy()[..., ::-1].copy())
+        outline, _ = cv2.findContours(masks[k].astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(pictures[-1], outline, -1, (0, 128, 255), 1)
+    cv2.imwrite(str(out / "fit_material.png"), np.hstack(pictures))

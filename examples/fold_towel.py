@@ -1,19 +1,27 @@
 """Two hands take a towel by the corners of one side, carry them over to the other side, and let go: a fold in half.
 
-Run: python examples/fold_towel.py
+Run: python examples/fold_towel.py [--out FOLDER]
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.4, 0.3)  # [m]
 THICKNESS = 0.004  # [m]
 RISE = 0.15  # [m] of the hands over the table half way
 CARRY, REST = 2.0, 1.5  # [s]
 
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
+
 world = nuno.World(device="cpu")
-world.add(nuno.box((0.8, 0.8, 0.02), name="table", position=(0, 0, -0.01)))
+world.add(nuno.box((0.8, 0.8, 0.02), name="table", position=(0, 0, -0.01), color="#b08050"))
 towel = world.add(nuno.sheet(SIZE, cells=(20, 15), name="towel", position=(0, 0, THICKNESS / 2)))
 world.attach(towel, nuno.Cloth(area_density=0.25, thickness=THICKNESS, friction=0.6, air_drag=1.0))
 
@@ -42,3 +50,8 @@ print(f"its layers are {1000 * apart.mean():.1f} mm apart")
 assert miss < SIZE[0] / 20, "the corners lie within a cell of where they were to go"
 assert abs(length - SIZE[0] / 2) < 0.01 and height < 0.03, "it is folded in half, and lies flat but for its bend"
 assert apart.min() > 0.8 * THICKNESS, "two layers, one on the other: cloth touches itself"
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    camera = look_at_camera((0.35, 0.6, 0.45), (-0.08, 0, 0.0), 640, 480, 900.0)
+    nuno.take_picture(world, camera, samples=3).save(out / "fold_towel.png")

@@ -1,17 +1,25 @@
 """A towel is held by two corners of one side and swings down until it hangs between them.
 
-Run: python examples/hang_cloth.py
+Run: python examples/hang_cloth.py [--out FOLDER]
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.4, 0.3)  # [m]
 CELLS = (12, 9)
 HEIGHT = 1.0  # [m]
 SPAN = 0.3  # [m] between the held corners, less than the side's length: the side sags
 SUBSTEPS = 40  # a frame; the default leaves the two corner cells, which carry all the weight, more stretch
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
 
 world = nuno.World(device="cpu", substeps=SUBSTEPS)
 towel = world.add(nuno.sheet(SIZE, cells=CELLS, name="towel", color="#4080c0", position=(0, 0, HEIGHT)))
@@ -37,3 +45,8 @@ assert SIZE[1] < lowest < SIZE[1] + SIZE[0] / 2, "it hangs by its width and at m
 # Half the weight, 0.15 N, on half a cell of 1000 N/m x 17 mm: 1.8 %, and at most as much again from the steps
 assert max(warp.max(), weft.max()) < 0.04, "cloth hardly stretches under its own weight"
 assert speed < 0.1, "after 4 s it is nearly at rest"
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    camera = look_at_camera((0.5, 1.0, 1.15), (0, 0.15, 0.85), 640, 480, 900.0)
+    nuno.take_picture(world, camera, samples=3).save(out / "hang_cloth.png")

@@ -3,12 +3,17 @@
 What is seen is made here by a world with another mesh, another step and another towel than the one imagined. One
 guess at the towel tells picks at its rim; ``nuno.estimate_pick`` takes many, for they tell more.
 
-Run: python examples/imagine_futures.py
+Run: python examples/imagine_futures.py [--out FOLDER]
 """
 
+import argparse
+from pathlib import Path
+
+import cv2
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.5, 0.35)  # [m]
 TOP = 0.7  # [m] height of the table top
@@ -17,11 +22,11 @@ TRUE = (5, 2)  # the grid point that is really picked
 HAND = (0.15, 0.1, TOP + 0.4)  # [m] where the hand takes it
 LIFT, SETTLE = 1.5, 1.5  # [s]
 
-eye = np.eye(4)  # 1 m before the table and 0.5 m above it, looking 25 degrees down
-down = np.deg2rad(25.0)
-eye[:3, :3] = np.array([[0, -np.sin(down), np.cos(down)], [-1, 0, 0], [0, -np.cos(down), -np.sin(down)]])
-eye[:3, 3] = (-1.0, 0.0, TOP + 0.5)
-camera = nuno.Camera(320, 240, 250.0, 250.0, 159.5, 119.5, eye)
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
+
+camera = look_at_camera((-1.0, 0.0, TOP + 0.5), (0.0, 0.0, TOP + 0.034), 320, 240, 250.0)
 
 
 def towel_on_table(cells: tuple[int, int], substeps: int) -> tuple[nuno.World, nuno.Body]:
@@ -58,9 +63,15 @@ distance = nuno.similarity(masks, seen, "chamfer")  # [px] between the outlines:
 best = int(distance.argmin())
 world.adopt(futures, best)  # the best future becomes now
 
-order = np.argsort(distance)[:3]
-for k in order:
+for k in np.argsort(distance)[:3]:
     print(f"picked at {tuple(ij[k].tolist())}: outline {distance[k]:.2f} px off, eq. (1) {eq1[k]:.4f}")
 assert tuple(ij[best]) == TRUE, f"the camera saw {TRUE}"
 np.testing.assert_array_equal(towel.vertices, futures.find("towel").vertices[best])
 assert towel.is_dynamic and world.time == LIFT + SETTLE
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    each = nuno.take_picture(futures, camera.scaled(0.5), samples=2).color.numpy()  # (36, 120, 160, 3)
+    cv2.rectangle(each[best], (1, 1), (158, 118), (192, 32, 32), 3)  # what the camera saw
+    rows = each.reshape(GRID, GRID, 120, 160, 3).swapaxes(1, 2).reshape(GRID * 120, GRID * 160, 3)
+    cv2.imwrite(str(out / "imagine_futures.png"), rows[..., ::-1])

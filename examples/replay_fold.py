@@ -1,16 +1,20 @@
 """How does a cloth lie that two hands have folded? The bundled case: a video, the hands' paths, and one camera.
 
-Run: python examples/replay_fold.py [folder for result.json, masks, pictures and the replay]
+Run: python examples/replay_fold.py [--out FOLDER]
 
 Two materials answer in a second or two; without ``materials`` more are tried, as ``python -m nuno fold`` does.
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import nuno
 
 CASE = Path(__file__).parent / "fold-case"
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for result.json, masks, pictures and the replay")
+out = options.parse_args().out
 
 case = nuno.read_fold_case(CASE)
 result = case.replay(materials=["towel", "canvas"], device="cpu", progress=False)
@@ -23,8 +27,8 @@ print(f"in {result.seconds['total']:.1f} s, {result.seconds['imagine']:.1f} s of
 layers = result.layers  # what the camera does not see
 under = layers.over(0.25, 0.5)
 print(f"{layers.area[1] * 1e4:.0f} cm2 lie under a second layer; over the point (0.25, 0.50) lies", under)
-if len(sys.argv) > 1:
-    result.save(sys.argv[1], names=case.names)
+if out:
+    result.save(out, names=case.names)
 
 world = result.adopt()  # the world in which the cloth lies folded, to go on from
 cloth = world.find("cloth")

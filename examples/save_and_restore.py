@@ -1,25 +1,32 @@
 """A world is saved while a napkin falls over a ball, goes on, and is taken back: twice the same, to the bit.
 
-Run: python examples/save_and_restore.py [room.npz]
+Run: python examples/save_and_restore.py [--out FOLDER]
 """
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for the file and a picture")
+out = options.parse_args().out
+if out:
+    out.mkdir(parents=True, exist_ok=True)
 
 world = nuno.World(device="cpu")
 world.add(nuno.plane(name="floor"))
 world.add(nuno.sphere(0.08, name="ball", position=(0, 0, 0.08)))
-napkin = world.add(nuno.sheet((0.3, 0.3), cells=(15, 15), name="napkin", position=(0.02, 0, 0.2)))
+napkin = world.add(nuno.sheet((0.3, 0.3), cells=(24, 24), name="napkin", position=(0.02, 0, 0.2)))
 world.attach(napkin, nuno.Cloth.preset("napkin"))
 world.run(0.3)  # it lies on the ball, and its corners are falling
 
 with tempfile.TemporaryDirectory() as folder:
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(folder) / "room.npz"
+    path = (out or Path(folder)) / "room.npz"
     saved = world.save(path)
     world.run(0.5)
     first = napkin.vertices
@@ -46,3 +53,7 @@ assert abs(when - 0.3) < 1e-9 and speed > 0.1, "in the middle of a motion"
 np.testing.assert_array_equal(again, first)
 np.testing.assert_array_equal(read, first)
 assert again[:, 2].max() > 0.16 and lower > 0.05, "it lies on the ball, and falls where there is none"
+
+if out:
+    camera = look_at_camera((0.5, 0.6, 0.45), (0, 0, 0.08), 640, 480, 1000.0)
+    nuno.take_picture(other, camera, samples=3).save(out / "save_and_restore.png")

@@ -1,18 +1,23 @@
 """A napkin is lifted off a table beside a soft cube, looked at in a browser and filmed as one HTML file.
 
-Run: python examples/show_world.py [film.html]
+Run: python examples/show_world.py [--out FOLDER]
 """
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 TOP = 0.4  # [m] height of the table top
 LIFT = 0.2  # [m]
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for the film and a picture")
+out = options.parse_args().out
 
 world = nuno.World(device="cpu")
 world.add(nuno.plane(name="floor", color="#d8d4cc"))
@@ -38,7 +43,8 @@ with nuno.Viewer(world) as viewer:
     print(f"{viewer.url} showed {len(film)} frames of {film.duration:.2f} s")
 
 with tempfile.TemporaryDirectory() as folder:
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(folder) / "film.html"
+    path = (out or Path(folder)) / "film.html"
+    path.parent.mkdir(parents=True, exist_ok=True)
     film.save(path)
     size = path.stat().st_size / 1e6
     print(f"the film is one file of {size:.2f} MB")
@@ -47,3 +53,7 @@ assert len(film) == 46, "30 frames a second, the first and the last"
 assert np.allclose(np.diff(film.times), 1 / 30, atol=1e-9), "at even times, however fast the world ran"
 assert size < 2.0, "meshcat's page is 0.9 MB"
 assert napkin.vertices[:, 2].max() > TOP + 0.9 * LIFT, "the napkin hangs from its corner"
+
+if out:
+    camera = look_at_camera((0.9, -1.0, 0.95), (0, 0, 0.47), 640, 480, 800.0)
+    nuno.take_picture(world, camera, samples=3).save(out / "show_world.png")

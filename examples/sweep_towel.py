@@ -1,17 +1,18 @@
 """How limp and how slippery must a towel be to slide off a ball? The same sweep in a batch and over processes.
 
-Run: python examples/sweep_towel.py [results.jsonl]
+Run: python examples/sweep_towel.py [--results FILE] [--out FOLDER]
 
 With a results file, a run that is killed goes on where it stopped; a run that has ended is only read.
 """
 
+import argparse
 import multiprocessing
-import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import nuno
 
@@ -40,8 +41,12 @@ def drop(world: nuno.World, params: dict) -> dict:
 
 def main() -> None:
     """Sweep in one batch, then over two processes, and compare."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--results", help="a file for the results")
+    options.add_argument("--out", type=Path, help="a folder for a plot")
+    asked = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        results = sys.argv[1] if len(sys.argv) > 1 else Path(folder) / "results.jsonl"
+        results = asked.results or Path(folder) / "results.jsonl"
         found = nuno.sweep(drop, GRID, world=room, results=results)
         for k in range(len(found)):
             row = found.row(k)
@@ -57,6 +62,15 @@ def main() -> None:
         np.testing.assert_array_equal(found.values("height"), other.values("height"))
     slid = found.values("slid").reshape(4, 3)
     assert (slid[:, 0] > slid[:, 2]).all(), "less friction lets a towel slide farther"
+    if asked.out:
+        asked.out.mkdir(parents=True, exist_ok=True)
+        figure = Figure(figsize=(5.2, 3.6), layout="constrained")
+        axes = figure.subplots()
+        for friction, values in zip(GRID["friction"], slid.T, strict=True):
+            axes.semilogx(GRID["bending_rigidity"], 100 * values, "o-", label=f"friction {friction}")
+        axes.set(xlabel="bending rigidity [N m]", ylabel="slid [cm]")
+        axes.legend()
+        figure.savefig(asked.out / "sweep_towel.png", dpi=100)
 
 
 if __name__ == "__main__":  # processes import this file

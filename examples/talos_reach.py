@@ -1,11 +1,15 @@
 """Talos takes a towel on a table by two corners, inverse kinematics tick by tick, and lifts it.
 
-Run: python examples/talos_reach.py
+Run: python examples/talos_reach.py [--out FOLDER]
 """
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 
 import nuno
+from nuno.tasks.look_at_camera import look_at_camera
 
 TABLE = 0.72  # [m] height of its top
 CORNERS = {"left": np.array((0.45, 0.2, TABLE)), "right": np.array((0.45, -0.2, TABLE))}
@@ -13,6 +17,10 @@ ABOVE = 0.04  # [m] of the middle of the fingertips above the corners: the finge
 LIFT = 0.25  # [m]
 DOWN = nuno.Coordinates(quaternion=(0, 1, 0, 0))  # of a hand: z down, x ahead
 TICK = 1 / 60  # [s]
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
 
 world = nuno.World(device="cpu")
 world.add(nuno.box((0.7, 1.2, 0.02), name="table", position=(0.75, 0, TABLE - 0.01)))
@@ -60,3 +68,8 @@ for side in CORNERS:
     gap = np.linalg.norm(towel.vertices - robot.frame_pose(f"{side}_hand").position, axis=1).min()
     assert gap < ABOVE + 0.005, "a corner is at each hand"
 assert robot.self_collisions() == []
+
+if out:
+    out.mkdir(parents=True, exist_ok=True)
+    camera = look_at_camera((1.9, -1.5, 1.6), (0.35, 0, 0.8), 640, 480, 640.0)
+    nuno.HeadCameras(links, samples=2).look_from(camera).save(out / "talos_reach.png")

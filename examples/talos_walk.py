@@ -1,14 +1,20 @@
 """Talos walks a metre, turns on the spot, and stops in the middle of a third walk.
 
-Run: python examples/talos_walk.py [picture.png]
+Run: python examples/talos_walk.py [--out FOLDER]
 """
 
-import sys
+import argparse
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import nuno
 from nuno.robot.walking import plan_walk, stop_walk
+
+options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+options.add_argument("--out", type=Path, help="a folder for a picture")
+out = options.parse_args().out
 
 robot = nuno.Humanoid("talos")
 sole = robot.description.frames["left_foot"].size
@@ -37,9 +43,8 @@ stopped = walk_it(stop_walk(third, 3.3))
 assert stopped.times[-1] < 3.3 + 2.0 + 1.8, "two steps at most, and coming to rest"
 assert robot.self_collisions() == []
 
-if len(sys.argv) > 1:
-    from matplotlib.figure import Figure
-
+if out:
+    out.mkdir(parents=True, exist_ok=True)
     figure = Figure((10, 3.2), layout="constrained")
     for axes, walk in zip(figure.subplots(1, 3, width_ratios=(2.6, 1, 1)), (ahead, turn, stopped), strict=True):
         for foot, colour in ((0, "tab:blue"), (1, "tab:red")):
@@ -51,4 +56,4 @@ if len(sys.argv) > 1:
         axes.plot(*walk.centre[:, :2].T, color="tab:green", label="centre of mass")
         axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    figure.savefig(sys.argv[1], dpi=100)
+    figure.savefig(out / "talos_walk.png", dpi=100)

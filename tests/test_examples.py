@@ -1,25 +1,77 @@
 """Every example runs headless and passes its own check."""
 
+import importlib.util
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
+LONG = {"carry_mat", "closed_loop", "talos_fold"}  # more than 20 s each
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def _pictures_of():
+    """Load docs/make_pictures.py, which is in no package."""
+    spec = importlib.util.spec_from_file_location("make_pictures", IMAGES.parent / "make_pictures.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+pictures_of = _pictures_of()
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem in LONG else []) for path in EXAMPLES],
+)
 def test_example(path, tmp_path):
-    """In a process of its own, in an empty folder, without a display."""
+    """In a process of its own, without a display: its check holds, and a picture is all that it leaves."""
     headless = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
-    command = [sys.executable, str(path)]
-    done = subprocess.run(command, cwd=tmp_path, env=headless, capture_output=True, text=True, timeout=500)
+    out = tmp_path / "out"
+    command = [sys.executable, str(path), "--out", str(out)]
+    done = subprocess.run(command, cwd=tmp_path, env=headless, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert not list(tmp_path.iterdir()), "an example leaves nothing behind that was not asked for"
+    assert list(tmp_path.iterdir()) == [out], "it leaves nothing behind that was not asked for"
+    pictures = [cv2.imread(str(picture)) for picture in out.glob("*.png")]
+    assert any(min(picture.shape[:2]) >= 240 and picture.std() > 10.0 for picture in pictures), "something is seen"
+    for name, file in pictures_of.PICTURES.get(path.stem, ([], {}))[1].items():
+        if (out / file).exists():  # films are made on demand only
+            off = pictures_of.difference(out / file, IMAGES / name)
+            assert off < 2.0, f"docs/images/{name} is stale: python docs/make_pictures.py {path.stem}"
+    if path.stem == "pick_estimate":
+        assert "log evidence" in done.stdout and "px" not in done.stdout, "each number under its own name"
 
 
 def test_there_are_examples():
     """The folder was found."""
-    assert len(EXAMPLES) >= 4
+    assert len(EXAMPLES) >= 19
+
+
+def test_the_film_ends_as_the_picture():
+    """The README's film is made by the same run as a picture that is compared anew, and is short."""
+    with Image.open(IMAGES / "film.webp") as film:
+        assert film.n_frames > 40 and film.size == (640, 360)
+        film.seek(film.n_frames - 1)
+        last = np.asarray(film.convert("RGB"), dtype=float)
+    picture = cv2.imread(str(IMAGES / "kinds.png"))[..., ::-1]
+    same = cv2.resize(picture, (640, 360), interpolation=cv2.INTER_AREA)
+    assert np.abs(last - same).mean() < 4.0, "WebP is lossy"
+    assert (IMAGES / "film.webp").stat().st_size < 1.5e6
+
+
+def test_a_change_of_the_picture_is_seen(tmp_path):
+    """Another size, another scene, and a body that lies elsewhere are far off; the same picture is not."""
+    kinds = IMAGES / "kinds.png"
+    image = cv2.imread(str(kinds))
+    cv2.imwrite(str(tmp_path / "moved.png"), np.roll(image, 40, axis=1))
+    cv2.imwrite(str(tmp_path / "small.png"), image[::2, ::2])
+    assert pictures_of.difference(kinds, kinds) == 0.0
+    assert pictures_of.difference(kinds, tmp_path / "moved.png") > 4.0
+    assert pictures_of.difference(kinds, tmp_path / "small.png") == 255.0

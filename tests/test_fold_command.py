@@ -53,7 +53,7 @@ def test_the_bundled_case_end_to_end(tmp_path):
     replay = nuno.Recording.load(out / "replay.npz")
     assert len(replay) == 113 and {body.name for body in replay.bodies} == {"cloth", "hands", "table"}
     np.testing.assert_array_equal(replay["cloth"].vertices[-1], final["vertices"])
-    for name in ("replay.glb", "strip.png", "layers.png"):
+    for name in ("replay.glb", "strip.png", "layers.png", "hands.png"):
         assert (out / name).stat().st_size > 1000
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
 from nuno.estimate.lift_prior import SIDEWAYS
 
@@ -21,6 +22,7 @@ ANSWERED, FAILED, BAD_INPUT = 0, 1, 2
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns 0 with an answer, 2 for bad input, 1 where valid input fails."""
     parser = argparse.ArgumentParser(prog="nuno", description="A simulator of deformable objects for robots.")
+    parser.add_argument("--version", action="version", version=f"nuno {__version__}")
     commands = parser.add_subparsers(dest="command", required=True)
     pick = commands.add_parser("pick", help="at which point was a cloth picked up? from two images")
     pick.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the two images that it names")
@@ -117,7 +119,7 @@ def _fold(options: argparse.Namespace) -> int:
     told = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
     sys.stdout.write(
         f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
-        f"see {Path(options.out) / 'result.json'}, strip.png, layers.png and replay.glb\n"
+        f"see {Path(options.out) / 'result.json'}, strip.png, layers.png, hands.png and replay.glb\n"
     )
     return ANSWERED
 

@@ -50,11 +50,16 @@ class MissingPackageError(NunoError, ImportError):
         package: Its name.
         extra: The extra of nuno-sim that brings it.
         purpose: What needs it.
+
+    The command in the message is for a clone, as nuno-sim is on no package index yet.
     """
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         self.package, self.extra = package, extra
-        super().__init__(f"{purpose} needs {package}, which is not installed: pip install 'nuno-sim[{extra}]'")
+        super().__init__(
+            f"{purpose} needs {package}, which is not installed; in a clone of Nuno: "
+            f"pip install -c constraints.txt '.[{extra}]'"
+        )
 
 
 class FileFormatError(NunoError, ValueError):

@@ -6,6 +6,7 @@ import trimesh
 
 import nuno
 from nuno import InvalidInputError, MeshError, SurfacePoints
+from nuno.shapes.color import rgb
 
 EXACT = 1e-12  # a few roundings of float64 at lengths of about 1
 TRIANGLE = ([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
@@ -158,3 +159,15 @@ def test_import_is_light():
     code = f"import sys, nuno; print([m for m in {heavy} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
     assert nuno.__all__ == sorted(nuno.__all__)
+
+
+def test_default_colours_tell_kinds_apart():
+    """A towel on a table, a cube on a floor and a cloth on a cube are seen; a given colour is taken as it is."""
+    kinds = [
+        nuno.plane(), nuno.box((1, 1, 1)), nuno.sheet((1, 1), cells=(2, 2)), nuno.soft_box((1, 1, 1), cells=(1, 1, 1))
+    ]  # fmt: skip
+    light = np.array([rgb(body.color) for body in kinds])
+    apart = np.linalg.norm(light[:, None] - light, axis=-1) + 9.0 * np.eye(4)
+    assert apart.min() > 0.25, "of 1.73 between black and white"
+    assert nuno.sphere(1.0).color == nuno.box((1, 1, 1)).color == "gray"
+    assert nuno.sheet((1, 1), cells=(2, 2), color="red").color == "red"

@@ -107,6 +107,41 @@ def test_a_shadow_falls_where_the_lamp_does_not_reach():
     assert (light_of(without.color.numpy()) > 0.5).all()
 
 
+def test_a_lamp_that_is_no_point_throws_half_shadows():
+    """Under an edge half way up, light falls by the share of the disc that is seen past it: a circle's segment."""
+    radius, world = 0.2, nuno.World(device="cpu")
+    world.add(nuno.plane(color="white"))
+    plate = world.add(nuno.box((2.0, 2.0, 0.002), position=(-1.0, 0.0, 1.0)))
+    lamp = Lamp(position=(0.0, 0.0, 2.0), strength=0.8, sky=0.0, radius=radius)
+    camera = above(height=0.9, focal=80.0)
+    open_sky = Lamp(lamp.position, 0.8, 0.0, shadows=False)
+    lit = light_of(take_picture(world, camera, lamp=lamp).color.numpy()[31, :, 0])
+    free = light_of(take_picture(world, camera, lamp=open_sky, without=[plate]).color.numpy()[31, :, 0])
+    x = camera.back_project([(u, 31) for u in range(64)], 0.0)[:, 0]
+    d = np.clip(-x / radius, -1.0, 1.0)
+    seen = (np.arccos(d) - d * np.sqrt(1.0 - d**2)) / np.pi
+    # two points of 24 at the edge of what is seen, and a texel of each one's shadow map
+    np.testing.assert_allclose(lit / free, seen, atol=2 / 24)
+    assert (np.diff(lit / free) > -0.02).all() and np.diff(lit / free).max() < 0.15, "no large step"
+
+
+def test_a_picture_is_saved(tmp_path):
+    """As PNG to the level; a picture of several worlds and an unknown ending are refused, and nothing is left."""
+    import cv2
+
+    world = nuno.World(device="cpu")
+    world.add(nuno.box((0.2, 0.3, 0.1), color="red"))
+    picture = take_picture(world, above())
+    picture.save(tmp_path / "box.png")
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "box.png"))[..., ::-1], picture.color.numpy())
+    for name in ("box", "box.nonsense"):
+        with pytest.raises(InvalidInputError, match=r"ends in \.png"):
+            picture.save(tmp_path / name)
+    with pytest.raises(InvalidInputError, match="got those of 2"):
+        take_picture(world.imagine(2), above()).save(tmp_path / "two.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["box.png"]
+
+
 def test_a_chequered_cloth_keeps_its_fields_when_it_moves():
     """Fields belong to the cloth: a quarter turn of the cloth turns them along, and half of it is of either colour."""
     world = nuno.World(device="cpu")

@@ -7,7 +7,7 @@ import nuno
 
 G = 9.81  # [m/s2]
 THICK = 4e-3  # [m], of the default cloth
-DEVICES = ["cpu", "at once", pytest.param("cuda:0", marks=pytest.mark.cuda)]
+DEVICES = ["cpu", pytest.param("at once", marks=pytest.mark.long), pytest.param("cuda:0", marks=pytest.mark.cuda)]
 """All contacts at once, as on CUDA, is what one thread can do on the CPU, too."""
 
 
@@ -292,6 +292,7 @@ def test_a_sheet_is_pulled_from_between_boxes(cell):
     assert np.mean(pulls) == pytest.approx(2 * mu * mass * G, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layers", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_book_on_towels(layers):
     """A book of 1 kg on layers of towel on a table rests their thicknesses above it, and the table bears them all."""
@@ -329,6 +330,7 @@ def test_a_book_on_a_folded_towel(layers):
     assert borne(world, cloth, "table")[2] == pytest.approx((1 + 0.2 * side * side * layers) * G, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "seconds",
     [

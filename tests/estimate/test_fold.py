@@ -167,8 +167,21 @@ def test_what_is_saved(result, tmp_path):
     assert data["material"]["name"] == "true" and len(data["frames"]) == len(result.times)
     assert data["agreement"]["mean"] == pytest.approx(np.mean(list(result.agreement.values())))
     assert data["frames"][6]["compared_with"] == "mask" and data["frames"][7]["agreement"] is None
-    for name in ("strip.png", "layers.png"):
+    for name in ("strip.png", "layers.png", "hands.png"):
         assert min(cv2.imread(str(tmp_path / name)).shape[:2]) > 100
+
+
+def test_the_hands_paths_are_drawn(result):
+    """From above and over time, each path as it was given, and thick while the hand holds."""
+    above, beside = result.hands_figure().axes
+    for hand in range(result.hands_at.shape[1]):
+        whole = next(line for line in above.lines if line.get_label() == f"hand {hand}")
+        np.testing.assert_array_equal(whole.get_xydata(), result.hands_at[:, hand, :2])
+    thick = [line for line in beside.lines if line.get_linewidth() > 2]
+    assert len(thick) == sum(hold.touched for hold in result.fold.holds) > 0
+    for line, hold in zip(thick, result.fold.holds, strict=True):
+        times = line.get_xdata()
+        assert hold.begin <= times.min() and times.max() <= hold.end
 
 
 def test_one_hand_away_is_a_warning(folded):

@@ -79,6 +79,7 @@ def mean_log_probability(learned=LEARNED_SHARE, by_hand=HAND_MADE_SHARE, order=s
     return float(np.mean(found))
 
 
+@pytest.mark.long
 def test_silhouettes_of_scenes_held_out_are_explained_better():
     """One each of 17 scenes that it was not trained on and that chose nothing: four guesses at the eight best.
 

@@ -79,6 +79,7 @@ def result(seen):
     return nuno.estimate_pick(None, None, **options(seen, discretisations=[DOUBLES]))
 
 
+@pytest.mark.long
 def test_what_was_learned_is_asked_unless_left_out(result, seen):
     """The truth is found without it too, by other evidence: that of the hand-made likelihood alone."""
     without = nuno.estimate_pick(None, None, **options(seen, discretisations=[DOUBLES], learned=False))
@@ -105,6 +106,7 @@ def test_the_prior_of_the_lift_is_added_unless_left_out(seen):
         np.testing.assert_array_equal(one.scores, other.scores)
 
 
+@pytest.mark.long
 def test_a_lift_far_sideways_is_still_found():
     """A corner that was carried 0.4 m along the cloth's side and 0.35 m up: the silhouette tells.
 
@@ -178,6 +180,7 @@ def test_adopt_gives_the_best_future(small, seen):
     assert np.isfinite(cloth.vertices).all()
 
 
+@pytest.mark.long
 def test_a_cloth_that_turned_is_recognised(result, seen):
     """A cloth that turned by 20 degrees in the hand: the point and the turn are found, and adopted."""
     given = options(seen, after_mask=seen[4], discretisations=[DOUBLES], rectangle=result.rectangle)
@@ -218,6 +221,7 @@ def test_a_turned_future_is_drawn_as_its_turned_mesh(small, seen):
     assert np.count_nonzero(drawn != turned) <= len(worlds) and drawn.any(axis=(1, 2)).all()
 
 
+@pytest.mark.long
 def test_another_grid(seen):
     """6 x 11 candidates, the picked point among them: the answer is it or a neighbour at a step of 6 x 6."""
     result = nuno.estimate_pick(None, None, **options(seen, candidates=(6, 11)))

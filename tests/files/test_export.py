@@ -6,6 +6,7 @@ import trimesh
 
 import nuno
 from nuno import InvalidInputError
+from nuno.shapes.color import rgb
 
 
 def test_to_trimesh():
@@ -41,7 +42,7 @@ def test_round_trip(tmp_path, extension, make):
     area = trimesh.Trimesh(vertices, faces).area
     assert trimesh.Trimesh(again.vertices, again.faces).area == pytest.approx(area, rel=1e-5)
     read = trimesh.load(path, force="mesh")
-    assert (read.visual.vertex_colors[:, :3] == 128).all()  # gray
+    assert (read.visual.vertex_colors[:, :3] == np.round(255.0 * rgb(body.color))).all()
 
 
 def test_one_world_of_a_batch(tmp_path):

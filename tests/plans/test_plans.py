@@ -77,6 +77,7 @@ def test_scalar_vector_and_lanes_give_the_same_bits(kind, self_contact, substeps
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("worlds", "substeps"), [(1, COARSE), (3, COARSE), (3, DOUBLES)])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_the_grid_plan_gives_the_bits_of_the_fused_one(kind, worlds, substeps):
@@ -85,6 +86,7 @@ def test_the_grid_plan_gives_the_bits_of_the_fused_one(kind, worlds, substeps):
     np.testing.assert_array_equal(outcome(solver(kind, "grid", worlds, substeps=substeps)), expected)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stretch", [1000.0, 4000.0])  # with coordinates as floats and, on a sheet too, as doubles
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
@@ -97,6 +99,7 @@ def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_the_grid_plan_lists_the_pairs_of_the_fused_one(worlds, monkeypatch):
     """Invariant: the listing by many threads finds as many pairs of edges; none touches yet, so that all else is equal.
@@ -124,6 +127,7 @@ def test_pairs_of_blocks_that_were_not_noted_are_found(monkeypatch):
     np.testing.assert_array_equal(*counts)
 
 
+@pytest.mark.long
 def test_the_grid_plan_keeps_layers_apart():
     """A sheet folded onto itself rests as two layers, at most 10 % of the thickness nearer than in the fused plan.
 
@@ -146,7 +150,7 @@ def test_the_grid_plan_keeps_layers_apart():
     assert gaps[1] > gaps[0] - 0.0004
 
 
-@pytest.mark.parametrize("plan", ["fused", "grid"])
+@pytest.mark.parametrize("plan", ["fused", pytest.param("grid", marks=pytest.mark.long)])
 def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
     """Promise: same bits in any place of a batch, self-contact included; the cloth hangs from two corners and folds."""
     alone = solver("sheet", plan, self_contact=True)
@@ -158,14 +162,14 @@ def test_each_world_of_a_batch_touches_itself_as_it_does_alone(plan):
         np.testing.assert_array_equal(found, expected)
 
 
-def test_a_run_in_pieces_is_the_run_in_one():
+@pytest.mark.parametrize("plan", ["vector", pytest.param("grid", marks=pytest.mark.long)])
+def test_a_run_in_pieces_is_the_run_in_one(plan):
     """Invariant: whole frames one at a time, under settings made anew, change no bit in any plan."""
-    for plan in ("vector", "grid"):
-        whole, pieces = solver("sheet", plan), solver("sheet", plan)
-        whole.run(0.0, 0.1)
-        for k in range(6):
-            pieces.run(k / 60.0, 1.0 / 60.0)
-        np.testing.assert_array_equal(pieces.local_positions(), whole.local_positions())
+    whole, pieces = solver("sheet", plan), solver("sheet", plan)
+    whole.run(0.0, 0.1)
+    for k in range(6):
+        pieces.run(k / 60.0, 1.0 / 60.0)
+    np.testing.assert_array_equal(pieces.local_positions(), whole.local_positions())
 
 
 def test_more_rigid_and_finer_cloth_takes_more_substeps():

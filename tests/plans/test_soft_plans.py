@@ -56,6 +56,7 @@ def outcome(made, seconds=0.25):
     return made.local_positions()[0], made.velocities()[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("body", [BODY, HOLED], ids=["whole", "holed"])
 def test_all_plans_give_the_same_bits(body):
     """Promise: one source, four plans, no bit of difference, alone or beside others; some is inside out."""
@@ -69,7 +70,7 @@ def test_all_plans_give_the_same_bits(body):
         np.testing.assert_array_equal(outcome(solver("auto", worlds, different=True, body=body)), expected)
 
 
-@pytest.mark.parametrize("plan", ["fused", "vector", "grid"])
+@pytest.mark.parametrize("plan", ["fused", "vector", pytest.param("grid", marks=pytest.mark.long)])
 def test_steps_by_parts_are_the_run(plan):
     """Promise: who steps the parts of each substep of a frame from outside gets the bits of the run."""
     whole, parts = solver(plan), solver(plan)

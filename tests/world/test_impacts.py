@@ -129,6 +129,7 @@ def test_a_thrown_sheet_went_through_itself():
         assert not sheet.missed_contacts
 
 
+@pytest.mark.long
 def test_each_world_of_a_batch_takes_the_substeps_that_it_takes_alone():
     """Promise: whatever the other worlds' cloths are too fast for, a world is itself alone, bit for bit."""
     batch, alone = onto_a_rod(SPEEDS, len(SPEEDS)), [onto_a_rod(speed) for speed in SPEEDS]
@@ -145,6 +146,7 @@ def test_each_world_of_a_batch_takes_the_substeps_that_it_takes_alone():
     assert was_careful >= {1, 2}
 
 
+@pytest.mark.long
 def test_a_fast_run_is_the_same_in_pieces_and_told_frame_by_frame():
     """Promise: one run, steps, `each_frame`, `trace` and a restored snapshot come to the same bits."""
     whole, steps, looked, traced = (onto_a_rod(9.0) for _ in range(4))

@@ -66,6 +66,7 @@ def told(world, k=0):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_world_of_a_batch_is_itself_alone_bit_for_bit(device):
     """Promise: whoever is near whom in the other worlds, and however many substeps that takes."""

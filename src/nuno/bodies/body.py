@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Color = str | tuple[float, float, float]
 ALL_GROUPS = 0xFFFFFFFF
+CLOTH_COLOR, SOFT_COLOR, PLANE_COLOR = "#4a86c8", "#e0a33c", "#c8c4bc"
 
 
 class BodyOptions(TypedDict, total=False):
@@ -36,7 +37,7 @@ class BodyOptions(TypedDict, total=False):
     name: str | None
     position: ArrayLike | None
     quaternion: ArrayLike
-    color: Color
+    color: Color | None
     friction: Any
     group: int
     collides_with: int
@@ -50,7 +51,8 @@ class Body(Quantities, Coordinates):
         name: A name; the world numbers a name that is taken ("box", "box_1" ...). None is the shape's kind.
         position: (3,) or (worlds, 3) [m]; None leaves a mesh where its vertices are, others at the origin.
         quaternion: (4,) or (worlds, 4), (w, x, y, z).
-        color: A name ("gray", "#4080c0") or (r, g, b) in [0, 1].
+        color: A name ("gray", "#4080c0") or (r, g, b) in [0, 1]; None: blue for cloth, amber for soft bodies, light
+            gray for planes, gray for all else.
         friction: Coulomb's coefficient, a number or (worlds,); a pair takes the geometric mean.
         group: Bit mask of the collision groups that the body is in.
         collides_with: Bit mask of the groups that it touches; both bodies of a pair must agree.
@@ -61,7 +63,7 @@ class Body(Quantities, Coordinates):
 
     def __init__(
         self, shape: Shape, *, name: str | None = None, position: ArrayLike | None = None,
-        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0), color: Color = "gray", friction: Any = 0.5,
+        quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0), color: Color | None = None, friction: Any = 0.5,
         group: int = 1, collides_with: int = ALL_GROUPS,
     ) -> None:  # fmt: skip
         if not isinstance(shape, Shape):
@@ -81,7 +83,7 @@ class Body(Quantities, Coordinates):
         self._friction = _checked_friction(friction)
         self._thickness = float(Cloth.thickness) if shape.is_cloth else 0.0
         self._group, self._collides_with = _mask("group", group), _mask("collides_with", collides_with)
-        self.color = color
+        self.color = _default_color(shape) if color is None else color
 
     def __repr__(self) -> str:
         state = "dynamic" if self.is_dynamic else "static"
@@ -351,6 +353,15 @@ class Body(Quantities, Coordinates):
             return
         self._position = _centre(vertices)
         self._deformed = (vertices, (self._position, self._quaternion))
+
+
+def _default_color(shape: Shape) -> Color:
+    """Return a colour by kind: what lies on another kind of body is seen."""
+    if shape.is_cloth:
+        return CLOTH_COLOR
+    if shape.is_soft:
+        return SOFT_COLOR
+    return PLANE_COLOR if shape.kind == "plane" else "gray"
 
 
 def _centre(vertices: np.ndarray) -> np.ndarray:

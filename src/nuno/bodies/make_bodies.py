@@ -241,7 +241,7 @@ def soft_mesh(
     Its bounding box is divided into voxels of five tetrahedra, whose boundary is moved onto the surface; the surface is
     embedded in them (``Body.skin``). With ``tetrahedraliser="lattice"`` whole voxels around the surface move, whose
     flat faces make the contacts; parts thinner than a cell need it, and where there are some it is taken with a
-    warning. With "pytetwild" the tetrahedra are fTetWild's (pip install 'nuno-sim[tetrahedra]'), and their own boundary
+    warning. With "pytetwild" the tetrahedra are fTetWild's (the extra ``tetrahedra``), and their own boundary
     is the skin.
 
     Args:

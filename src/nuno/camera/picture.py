@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from os import PathLike
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _index, _split
 from nuno.errors import InvalidInputError
+from nuno.files.whole_file import replacing
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
 from nuno.validation import count, finite_array, number
@@ -22,6 +25,9 @@ from nuno.validation import count, finite_array, number
 SHADOW_PIXELS = 1024
 SHADOW_SLACK = 1e-3
 """[m] What keeps a surface from shading itself between the texels of the shadow map."""
+
+DISC_POINTS = 24
+"""Of a lamp that is no point; half shadows have so many steps, and pictures take so many times as long to shade."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +39,24 @@ class Lamp:
         strength: What the lamp gives to a surface that faces it; 1 makes a white one white.
         sky: What comes from everywhere besides.
         shadows: Whether bodies throw them.
+        radius: Of the level disc that shines [m]: the larger, the softer the shadows' edges. 0 is a point.
     """
 
     position: tuple[float, float, float] = (1.0, 1.5, 4.0)
     strength: float = 0.65
     sky: float = 0.35
     shadows: bool = True
+    radius: float = 0.0
+
+    def points(self) -> np.ndarray:
+        """Return the points (n, 3) [m] of the disc that stand for it, each for the same area (Vogel 1979)."""
+        place = finite_array("the lamp's position", self.position, (3,))
+        radius = number("the lamp's radius", self.radius, low=0.0)
+        if not (radius and self.shadows):
+            return place[None]
+        k = np.arange(DISC_POINTS)
+        away, angle = radius * np.sqrt((k + 0.5) / DISC_POINTS), np.pi * (3.0 - np.sqrt(5.0)) * k
+        return place + np.stack([away * np.cos(angle), away * np.sin(angle), 0.0 * away], axis=1)
 
 
 @dataclass(frozen=True)
@@ -77,6 +95,26 @@ class Picture:
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"
         return f"<Picture of {size} at t = {self.time:.3f} s, {len(self.bodies)} bodies>"
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the colours to a file, whose ending names the format (PNG loses nothing).
+
+        Raises:
+            InvalidInputError: the picture of a batch, or an ending that OpenCV cannot write.
+            OSError: the file cannot be written.
+        """
+        import cv2
+
+        colors = self.color.numpy()
+        if colors.ndim != 3:
+            raise InvalidInputError(f"one world's picture can be saved, got those of {len(colors)}")
+        ending = FilePath(path).suffix
+        try:
+            _, packed = cv2.imencode(ending, colors[..., ::-1])
+        except cv2.error as error:
+            raise InvalidInputError(f"a picture's file ends in .png, .jpg or the like, got {str(path)!r}") from error
+        with replacing(path) as partial:
+            partial.write_bytes(packed.tobytes())
 
     def mask(self, *bodies: Any) -> np.ndarray:
         """Return where any of the bodies, or of their names, is seen: bool (h, w), in a batch (worlds, h, w).
@@ -125,22 +163,28 @@ def take_picture(
     fine, fine_camera = (keys, camera) if samples == 1 else (None, camera.scaled(samples))
     if fine is None:
         fine = drawn.keys(fine_camera)
-    light, shadow = drawn.light(lamp, camera, keys, background)
     rays = _local_rays(*_lens(fine_camera))
     device = world.device
     turn = wp.mat33(*camera.camera_to_world[:3, :3].ravel().tolist())
     shaded: Any = wp.empty(fine.shape, dtype=wp.vec3, device=device)
-    wp.launch(
-        shading._shade, dim=fine.shape,
-        inputs=[
-            fine, shadow, wp.array(rays, dtype=wp.vec3, device=device), turn,
-            wp.vec3(*camera.camera_to_world[:3, 3].tolist()), drawn.positions, drawn.normals, drawn.local, drawn.faces,
-            drawn.owner, drawn.face_count, drawn.plane_normals, drawn.looks, light,
-        ],
-        outputs=[shaded], device=device,
-    )  # fmt: skip
+    points = lamp.points()
+    total = shaded if len(points) == 1 else wp.zeros(fine.shape, dtype=wp.vec3, device=device)
+    on_device: Any = wp.array(rays, dtype=wp.vec3, device=device)
+    for place in points:
+        light, shadow = drawn.light(lamp, place, camera, keys, background)
+        wp.launch(
+            shading._shade, dim=fine.shape,
+            inputs=[
+                fine, shadow, on_device, turn, wp.vec3(*camera.camera_to_world[:3, 3].tolist()), drawn.positions,
+                drawn.normals, drawn.local, drawn.faces, drawn.owner, drawn.face_count, drawn.plane_normals,
+                drawn.looks, light,
+            ],
+            outputs=[shaded], device=device,
+        )  # fmt: skip
+        if total is not shaded:
+            wp.launch(shading._add, dim=fine.shape, inputs=[shaded, 1.0 / len(points)], outputs=[total], device=device)
     color: Any = wp.empty((*shape, 3), dtype=wp.uint8, device=device)
-    wp.launch(shading._expose, dim=shape, inputs=[shaded, samples, float(noise), int(seed), color], device=device)
+    wp.launch(shading._expose, dim=shape, inputs=[total, samples, float(noise), int(seed), color], device=device)
     ids: Any = wp.empty(shape, dtype=wp.int32, device=device)
     wp.launch(shading._to_bodies, dim=shape, inputs=[keys, drawn.owner, drawn.looks.index, ids], device=device)
     depth: Any = raster.depths_of(keys)
@@ -206,10 +250,9 @@ class _Drawn:
                 raster.draw_depth(keys, _depth_of_plane(camera, vertices, faces), self.face_count + k)
         return keys
 
-    def light(self, lamp: Lamp, camera: Camera, keys: Any, background: Any) -> tuple[Any, Any]:
-        """Return the lamp as the kernels take it, and what it sees: the key images of its shadow map."""
+    def light(self, lamp: Lamp, place: np.ndarray, camera: Camera, keys: Any, background: Any) -> tuple[Any, Any]:
+        """Return the lamp as the kernels take it, at a place, and the key images of its shadow map."""
         light = shading.Light()
-        place = finite_array("the lamp's position", lamp.position, (3,))
         light.place = wp.vec3(*place.tolist())
         light.lamp = wp.vec3(*[number("strength", lamp.strength, low=0.0)] * 3)
         light.sky = wp.vec3(*[number("sky", lamp.sky, low=0.0)] * 3)

@@ -150,6 +150,13 @@ def _shade(
     color_out[world, row, column] = wp.cw_mul(color, facing * light.lamp + above * light.sky)
 
 
+@wp.kernel
+def _add(light: wp.array3d[wp.vec3], share: float, sum_out: wp.array3d[wp.vec3]):
+    """Add a share of the light that reaches each pixel."""
+    world, row, column = wp.tid()
+    sum_out[world, row, column] += share * light[world, row, column]
+
+
 @wp.func
 def _screen(x: float) -> float:
     """Return what a screen takes of an amount of light (IEC 61966-2-1)."""

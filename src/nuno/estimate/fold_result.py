@@ -164,13 +164,20 @@ class FoldResult:
 
         return fold_strip(self, count)
 
+    def hands_figure(self) -> Figure:
+        """The hands' paths, from above and in height over time (the paper's Fig. 11)."""
+        from nuno.estimate.hands_figure import hands_figure
+
+        return hands_figure(self)
+
     def save(
         self, folder: str | os.PathLike[str], *, names: Mapping[int, str] | None = None, pictures: bool = True
     ) -> None:
         """Write the answer into a folder that is made if need be.
 
         result.json; mask_NNN.png of every frame in ``names``; final.npz with vertices (n, 3) and faces (m, 3);
-        replay.npz (for ``nuno.Recording.load``) and replay.glb; where ``pictures`` is set, strip.png and layers.png.
+        replay.npz (for ``nuno.Recording.load``) and replay.glb; where ``pictures`` is set, strip.png, layers.png and
+        hands.png.
 
         Args:
             folder: Where.
@@ -192,6 +199,7 @@ class FoldResult:
         if pictures:
             self.figure().savefig(folder / "strip.png", dpi=110)
             self.layers.figure().savefig(folder / "layers.png", dpi=110)
+            self.hands_figure().savefig(folder / "hands.png", dpi=110)
         text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
         (folder / "result.json").write_text(text + "\n", encoding="utf-8")
 

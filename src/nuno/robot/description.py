@@ -14,7 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotModelError, UnknownNameError
+from nuno.errors import (
+    FileFormatError,
+    InvalidInputError,
+    MeshError,
+    MissingPackageError,
+    RobotModelError,
+    UnknownNameError,
+)
 from nuno.shapes import quaternion as quat
 from nuno.validation import count, finite_array, number
 
@@ -143,12 +150,12 @@ def robot_data() -> Path:
     """Return the folder that the package example-robot-data keeps its robots in.
 
     Raises:
-        RobotModelError: it is not installed.
+        MissingPackageError: it is not installed.
     """
     try:
         found = distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
     except PackageNotFoundError as error:
-        raise RobotModelError("the known robots need their data: pip install example-robot-data") from error
+        raise MissingPackageError("example-robot-data", "robot", "a known robot such as Talos") from error
     return Path(str(found))
 
 

@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
 from nuno.robot.description import FileName, find_description
+from nuno.robot.pinocchio import pin
 from nuno.robot.placement import pose_of
 from nuno.robot.support import convex_outline
 from nuno.shapes import quaternion as quat

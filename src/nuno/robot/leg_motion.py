@@ -12,9 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import RobotModelError, WalkError
+from nuno.robot.pinocchio import pin
 from nuno.robot.preview_control import TICK
 from nuno.robot.stride import two_feet
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import MeshError
+from nuno.robot.pinocchio import pin
 from nuno.robot.placement import quaternion_of
 from nuno.shapes.shape import Box, Capsule, Cylinder, Shape, Sphere, TriangleMesh
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose

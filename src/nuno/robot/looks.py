@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.robot.link_geometry import LinkShape
+from nuno.robot.pinocchio import pin
 from nuno.shapes.coordinates import Pose, compose, invert
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
+from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import InvalidInputError, MissingPackageError, RobotModelError
+from nuno.robot.pinocchio import pin
 from nuno.robot.support import distance_inside, edges_of
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import count, finite_array, number

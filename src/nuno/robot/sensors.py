@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.ground import Soles, lowest_corners, moment
 from nuno.robot.imu import InertialUnit
 from nuno.robot.loads import LinkLoads, Load
+from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import Channel, SensorModel
 from nuno.robot.spatial_arrays import placement_arrays, spatial_array

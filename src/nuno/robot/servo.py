@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgesv
 
 from nuno.errors import InvalidInputError
+from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.validation import finite_array
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.robot.humanoid import IDENTITY
+from nuno.robot.pinocchio import pin
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid

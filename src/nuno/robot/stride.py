@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import RobotModelError
+from nuno.robot.pinocchio import pin
 from nuno.validation import number
 
 if TYPE_CHECKING:

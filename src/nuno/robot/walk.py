@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.robot.footsteps import Footstep
+from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.validation import number
 

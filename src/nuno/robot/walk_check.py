@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import WalkError
 from nuno.robot.ground import Soles, moment
+from nuno.robot.pinocchio import pin
 from nuno.robot.stride import two_feet
 from nuno.robot.support import convex_outline, edges_of
 from nuno.robot.timeline import BOTH, LEFT_STANDS, Timeline

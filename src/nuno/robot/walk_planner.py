@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.footsteps import SOLE_GAP, Footstep, sole_gap
 from nuno.robot.leg_motion import LegMotion, Targets
+from nuno.robot.pinocchio import pin
 from nuno.robot.preview_control import TICK, PreviewControl
 from nuno.robot.stride import Stride, two_feet
 from nuno.robot.timeline import Schedule, Timeline, smooth, timeline

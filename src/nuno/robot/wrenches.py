@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
+
+from nuno.robot.pinocchio import pin
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.errors import InvalidInputError, RobotModelError
 from nuno.robot.link_geometry import LinkShape
+from nuno.robot.pinocchio import pin
 from nuno.robot.placement import quaternion_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates

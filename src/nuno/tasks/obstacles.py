@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
+from nuno.robot.pinocchio import coal, pin
 from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ class Obstacles:
     """
 
     def __init__(self, robot: Humanoid, bodies: Iterable[Body], carried_by: Iterable[int]) -> None:
-        import coal
-
         self._robot, joints = robot, set(carried_by)
         self._model = robot.geometry._read(pin.GeometryType.COLLISION)
         links = [

@@ -9,6 +9,8 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path as FilePath
 
+from nuno.errors import MissingPackageError
+
 HERE = FilePath(__file__).parent
 
 
@@ -48,5 +50,6 @@ def _page(title: str, library: str, data: str) -> str:
 def _meshcat() -> FilePath:
     # its Python part, which would be loaded with it, brings IPython and a server for all the network
     found = find_spec("meshcat")
-    assert found is not None and found.origin is not None, "meshcat comes with Nuno"
+    if found is None or found.origin is None:
+        raise MissingPackageError("meshcat", "viewer", "the viewer's page")
     return FilePath(found.origin).parent / "viewer"

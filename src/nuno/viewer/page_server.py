@@ -10,14 +10,17 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-import tornado.httpserver
-import tornado.iostream
-import tornado.netutil
-import tornado.web
-import tornado.websocket
-
-from nuno.errors import ViewerError
+from nuno.errors import MissingPackageError, ViewerError
 from nuno.viewer.page import live_page, mesh_viewer
+
+try:
+    import tornado.httpserver
+    import tornado.iostream
+    import tornado.netutil
+    import tornado.web
+    import tornado.websocket
+except ImportError as error:
+    raise MissingPackageError("tornado", "viewer", "the viewer") from error
 
 logger = logging.getLogger(__name__)
 
@@ -36,9 +39,11 @@ class Server:
 
     Raises:
         ViewerError: the port is taken, or the address is none of this machine's.
+        MissingPackageError: meshcat is not installed.
     """
 
     def __init__(self, host: str, port: int | None, everything: Callable[[], bytes]) -> None:
+        mesh_viewer()  # read now: a page that asks for it could not be told that it is missing
         self._everything = everything
         self._clients: set[_Socket] = set()
         self._sockets, self.port = _bound(host, port)

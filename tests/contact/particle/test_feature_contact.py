@@ -192,6 +192,7 @@ def test_a_world_of_a_batch_meets_edges_as_alone_on_cuda():
         np.testing.assert_array_equal(batch[k], shifted(count, k, "cuda:0"))
 
 
+@pytest.mark.long
 def test_all_plans_meet_edges_alike():
     """One source: sixteen particles at a time, one by one, and teams of blocks give the same bits."""
     world = crowded(1)

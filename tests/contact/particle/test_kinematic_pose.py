@@ -222,6 +222,7 @@ def test_a_world_of_a_batch_moves_as_alone(kind):
         np.testing.assert_array_equal(places[k], place)
 
 
+@pytest.mark.long
 def test_all_plans_see_a_shape_move_alike():
     """One source: sixteen particles at a time, one by one, and teams of blocks give the same bits."""
     world = nuno.World(device="cpu")

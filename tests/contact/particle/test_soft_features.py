@@ -230,6 +230,7 @@ def test_all_plans_meet_edges_alike(substeps):
     np.testing.assert_array_equal(ends[1], ends[0])
 
 
+@pytest.mark.long
 def test_the_kernels_of_cuda_take_turns():
     """One source: those without sharp shapes stop at the frame in which some are near, and the others do the rest."""
     substeps = 20  # at which coordinates are floats: the kernels for doubles ask for shared memory, CUDA's alone

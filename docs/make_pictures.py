@@ -1,0 +1,64 @@
+"""Make pictures of the README and the docs anew by running the examples that draw them.
+
+Run: python docs/make_pictures.py [EXAMPLE ...]    (those that are named; without names, all: some minutes)
+
+The tests run the examples too, and compare what they draw with what lies in docs/images: a picture that is no longer
+what its example draws fails them.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image
+
+ROOT = Path(__file__).parents[1]
+IMAGES = ROOT / "docs" / "images"
+# By example: what it is asked for beside --out, and its files by the picture's name.
+PICTURES = {
+    "all_kinds": (["--film"], {"kinds.png": "all_kinds.png", "film.webp": "all_kinds.webp"}),
+    "closed_loop": ([], {"closed-loop.png": "closed_loop.png"}),
+    "pick_estimate": ([], {"pick.png": "result.png"}),
+    "replay_fold": ([], {"fold.png": "strip.png", "layers.png": "layers.png", "hands.png": "hands.png"}),
+    "talos_fold": ([], {"talos-fold.png": "talos-fold.png", "talos-fold-layers.png": "talos-fold-layers.png"}),
+    "talos_walk": ([], {"walk.png": "talos_walk.png"}),
+}
+
+
+def difference(picture: Path, other: Path) -> float:
+    """Return how far two pictures are apart: the mean over fields of 8 x 8 pixels, of the last frames [levels of 255].
+
+    Fields leave out what edges and fonts do on another machine; another size is as far apart as can be.
+    """
+    fields = []
+    for path in (picture, other):
+        image = Image.open(path)
+        image.seek(getattr(image, "n_frames", 1) - 1)
+        pixels = np.asarray(image.convert("RGB"))
+        height, width = pixels.shape[:2]
+        fields.append(cv2.resize(pixels, (width // 8, height // 8), interpolation=cv2.INTER_AREA).astype(float))
+    return float(np.abs(fields[0] - fields[1]).mean()) if fields[0].shape == fields[1].shape else 255.0
+
+
+def main() -> None:
+    """Run the examples, and put what they draw into docs/images."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("examples", nargs="*", metavar="EXAMPLE", help=f"of {', '.join(PICTURES)}; default: all")
+    names = parser.parse_args().examples or list(PICTURES)
+    if unknown := set(names) - set(PICTURES):
+        parser.error(f"no pictures are made of {sorted(unknown)[0]}; of these are: {', '.join(PICTURES)}")
+    for name in names:
+        more, files = PICTURES[name]
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([sys.executable, str(ROOT / f"examples/{name}.py"), "--out", folder, *more], check=True)
+            for picture, file in files.items():
+                shutil.copyfile(Path(folder) / file, IMAGES / picture)
+
+
+if __name__ == "__main__":
+    main()
