@@ -53,6 +53,19 @@ class RobotInterface(JointInterface):
             stop: Whether it rests there.
         """
 
+    def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
+        """Let the robot keep a velocity until another comes, as from a joystick, and return the goal at once.
+
+        Args:
+            x: Forward [m/s].
+            y: To the left [m/s].
+            yaw: Counterclockwise [rad/s].
+            hold: How long it counts [s] where no other comes; then the robot comes to rest.
+        """
+        x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
+        span = number("hold", hold, above=0.0)
+        return self.send_base(x * span, y * span, yaw * span, span, True)
+
     @abstractmethod
     def cancel_base(self) -> None:
         """Let the robot stop going, as soon as it safely can; its goal ends as preempted."""

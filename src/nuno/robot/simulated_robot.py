@@ -254,6 +254,16 @@ class SimulatedRobot(RobotInterface):
                 self.gait.begin(walk, goal)
         return goal
 
+    def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
+        """Let the robot keep a velocity until another comes; see ``RobotInterface``.
+
+        The newest is taken at every landing of a foot, once a second with the usual stride; one that the robot cannot
+        keep ends the goal as aborted, and the robot comes to rest.
+        """
+        with self.world.lock:
+            x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
+            return self.gait.drive(x, y, yaw, number("hold", hold, above=0.0))
+
     def cancel_base(self) -> None:
         """Let the robot come to rest as soon as that is safe."""
         with self.world.lock:

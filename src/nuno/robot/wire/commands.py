@@ -36,7 +36,7 @@ TOLD = {
 FEEDBACK_INTERVAL = 0.05
 """[s] Between two feedbacks of a goal."""
 DRIVE = 1.0
-"""[s] A velocity holds so long, unless another comes; the same again prolongs it."""
+"""[s] A velocity holds so long, unless another comes."""
 
 
 @dataclass(eq=False)
@@ -81,7 +81,7 @@ class Commands:
     ) -> None:  # fmt: skip
         self.robot, self.broadcast, self.names = robot, broadcast, names
         self._running: list[Running] = []
-        self._drive: tuple[Client, tuple[float, float, float], Goal, float] | None = None
+        self._drive: tuple[Client, Goal] | None = None
         self._actions: dict[str, Callable[[Fields], Started]] = {
             names.full(names.navigate): self._navigate,
             GO_VELOCITY: self._go_velocity,
@@ -248,22 +248,17 @@ class Commands:
         topic = message["topic"]
         if topic != self.names.full(self.names.velocity):
             raise MessageError(f"nobody listens to {topic!r}, only to {self.names.full(self.names.velocity)!r}")
-        velocity, now = ros.read_twist(message["msg"]), self.robot.now()
+        velocity = ros.read_twist(message["msg"])
         if not any(velocity):
             self._stop_driving()
             return
-        if self._drive is not None:
-            _, present, goal, end = self._drive
-            if velocity == present and not goal.is_done and end - now > 0.5 * DRIVE:
-                return
-        x, y, yaw = (DRIVE * value for value in velocity)
-        goal = self.robot.send_base(x, y, yaw, DRIVE, True)
-        self._drive = (client, velocity, goal, now + DRIVE)
+        goal = self.robot.send_velocity(*velocity, DRIVE)
+        self._drive = (client, goal)
         if goal.is_done and not goal.succeeded:
             raise MessageError(f"the robot cannot go so: {goal.text}")
 
     def _stop_driving(self) -> None:
-        if self._drive is not None and not self._drive[2].is_done:
+        if self._drive is not None and not self._drive[1].is_done:
             self.robot.cancel_base()
         self._drive = None
 
