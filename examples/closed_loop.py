@@ -19,7 +19,7 @@ POINT = (int(sys.argv[1]), int(sys.argv[2])) if len(sys.argv) > 2 else (0, 5)
 QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]  # without it: two finer meshes, a minute
 
 room = make_room(nuno.Cloth.preset("denim"), device="cpu")  # what is real
-talos = TowelPicker(room.driver, room.look, table=TABLE, device="cpu")  # and who knows nothing else of it
+talos = TowelPicker(room.driver, table=TABLE, device="cpu")  # and who knows nothing else of it
 
 talos.look_down()
 towel = talos.find_towel()

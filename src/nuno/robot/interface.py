@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.camera_interface import CameraInterface
 from nuno.robot.goal import Goal
-from nuno.robot.joint_interface import JointInterface
 from nuno.robot.readings import ImuReading
 from nuno.robot.support import standing_place, zero_moment_point
 from nuno.shapes import quaternion as quat
@@ -29,8 +29,8 @@ LOADED = 1.0
 """[N] Weight that the feet must bear, so that they have a zero moment point."""
 
 
-class RobotInterface(JointInterface):
-    """A robot: what ``JointInterface`` says of its joints, and the rest of it.
+class RobotInterface(CameraInterface):
+    """A robot: what ``JointInterface`` says of its joints and ``CameraInterface`` of its eyes, and the rest of it.
 
     Arms are "larm", "rarm" or "arms"; limbs "larm", "rarm", "lleg" and "rleg".
     """

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from nuno.camera.camera import Camera
 from nuno.errors import RefusedError, RobotTimeoutError
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.humanoid import Humanoid
 from nuno.robot.interface import BASE, RobotInterface
 from nuno.robot.joint_interface import Controller
-from nuno.robot.readings import ImuReading, JointState
+from nuno.robot.readings import ImageReading, ImuReading, JointState
 from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.wire import image_messages as images
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.clock import WireClock
 from nuno.robot.wire.connection import Connection
@@ -70,6 +72,7 @@ class WireRobot(RobotInterface):
         self._status: dict[str, bool] = {}  # by controller
         self._stream: VelocityStream | None = None
         self._has_odometry: bool | None = None
+        self._pixels: dict[str, Fields | None] = {}  # by camera, what is published of it
         model = Humanoid(robot) if isinstance(robot, str) else robot
         self.connection = Connection(url, timeout=timeout, alive=alive)
         self._newest = Newest(self.connection)
@@ -294,6 +297,38 @@ class WireRobot(RobotInterface):
         """
         reading: ImuReading = self._newest.read(self.names.full(self.names.imu), ros.IMU, ros.read_imu)
         return reading
+
+    @property
+    def shown_cameras(self) -> tuple[str, ...]:
+        """The cameras that the robot publishes images of; all where it does not tell."""
+        topics = {name: self.names.full(self.names.compressed, camera=name) for name in self.camera_names}
+        return tuple(name for name, topic in topics.items() if self._newest.is_there("topics", topic))
+
+    def read_image(self, camera: str) -> ImageReading:
+        """Return the first image of a camera that comes from now on; see ``CameraInterface``.
+
+        It is asked for compressed; nothing comes of a camera that nobody looks through. The camera's pixels are those
+        that the robot publishes, where it does; where it is, the model tells.
+        """
+        topic = self.names.full(self.names.compressed, camera=self._known_camera(camera))
+        time, image = self._newest.take(topic, images.COMPRESSED_IMAGE, images.read_compressed)
+        return ImageReading(time, self.camera_info(camera), image)
+
+    def read_depth(self, camera: str) -> ImageReading:
+        """Return the first depth image of a camera that comes from now on; see ``CameraInterface``."""
+        topic = self.names.full(self.names.depth, camera=self._known_camera(camera))
+        time, image = self._newest.take(topic, images.IMAGE, images.read_image)
+        return ImageReading(time, self.camera_info(camera), image)
+
+    def camera_info(self, camera: str = "head") -> Camera:
+        """Return a camera: its pixels as the robot publishes them, else by the description, where it is now."""
+        own = super().camera_info(camera)
+        topic = self.names.full(self.names.camera_info, camera=camera)
+        if camera not in self._pixels:  # they do not change
+            known = topic in (self._newest.listed("topics", topic) or ())
+            self._pixels[camera] = self._newest.take(topic, images.CAMERA_INFO, dict) if known else None
+        told = self._pixels[camera]
+        return own if told is None else images.read_camera_info(told, own)
 
     # Inside
 

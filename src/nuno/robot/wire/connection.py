@@ -149,6 +149,17 @@ class Connection:
             # One message in the queue: a state that is out of date is of no use
             self.send({"op": "subscribe", "topic": topic, "type": kind, "queue_length": 1})
 
+    def unsubscribe(self, topic: str, call: Callable[[Fields], None]) -> None:
+        """Let ``call`` have no more of a topic."""
+        with self._lock:
+            calls = self._heard.get(topic, [])
+            if call not in calls:
+                return
+            calls.remove(call)
+            is_last = not calls
+        if is_last:
+            self.send({"op": "unsubscribe", "topic": topic})
+
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
         """Publish a message on a topic."""
         if topic not in self._advertised:

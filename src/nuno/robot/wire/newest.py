@@ -90,6 +90,29 @@ class Newest:
                 raise RobotTimeoutError(f"nothing came on {topic} within {self.connection.timeout:g} s")
         return self.peek(topic, kind, read)
 
+    def take(self, topic: str, kind: str, read: Callable[[Fields], Any]) -> Any:
+        """Return the first that comes on a topic from now on; nothing more is heard of it after that.
+
+        Raises:
+            RobotModelError: there is no such topic.
+            RobotTimeoutError: nothing came.
+        """
+        if not self.is_there("topics", topic):
+            raise RobotModelError(f"{self.connection.url} has no topic {topic!r}")
+        came: list[Any] = []
+
+        def hear(fields: Fields) -> None:
+            came.append(read(fields))
+            self.tell()
+
+        self.connection.subscribe(topic, kind, hear)
+        try:
+            if not self.wait(lambda: bool(came), self.connection.timeout):
+                raise RobotTimeoutError(f"nothing came on {topic} within {self.connection.timeout:g} s")
+        finally:
+            self.connection.unsubscribe(topic, hear)
+        return came[0]
+
     def is_there(self, what: str, name: str) -> bool:
         """Return whether the robot has one of its "topics" or "action_servers"; true where it does not tell."""
         known = self.listed(what, name)

@@ -67,6 +67,7 @@ class RobotServer:
         tick: Between two looks at the robot [s]; None takes the frames of the robot's world, else 0.01 s.
         origins: Web pages that may connect, as browsers name them ("http://localhost:8080"); by default none, for any
             page that somebody looks at on this machine could.
+        image_rate: Images a second of the robot's time, of every camera that a client looks through.
 
     Raises:
         MissingPackageError: websockets is not installed.
@@ -77,7 +78,7 @@ class RobotServer:
     def __init__(
         self, robot: RobotInterface, host: str = "127.0.0.1", port: int = 9090, *,
         real_time_factor: float | None = 1.0, names: Names | None = None, max_message: int = 2**23,
-        alive: float = 20.0, tick: float | None = None, origins: tuple[str, ...] = (),
+        alive: float = 20.0, tick: float | None = None, origins: tuple[str, ...] = (), image_rate: float = 10.0,
     ) -> None:  # fmt: skip
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
             raise InvalidInputError(f"port must be a whole number in [0, 65535], got {port!r}")
@@ -91,7 +92,7 @@ class RobotServer:
         self._waiting: list[tuple[Client, Message, float]] = []
         alive = number("alive", alive, above=0.0)
         self._bridge = Bridge(self._deal, self._left, host, port, max_message, alive, origins)
-        self._begin(names or Names())
+        self._begin(names or Names(), number("image_rate", image_rate, above=0.0))
 
     def __enter__(self) -> RobotServer:
         return self
@@ -136,9 +137,9 @@ class RobotServer:
             raise self.error
         return not self._thread.is_alive()
 
-    def _begin(self, names: Names) -> None:
+    def _begin(self, names: Names, image_rate: float) -> None:
         controllers = [client.controller for client in self.robot.controller_actions]
-        self._broadcast = Broadcast(self.robot, self._bridge, names, controllers)
+        self._broadcast = Broadcast(self.robot, self._bridge, names, controllers, image_rate)
         is_stepped = self._factor is None
         self._next_tick = time.perf_counter()
         self._published = self._next_tick, self.robot.now()
