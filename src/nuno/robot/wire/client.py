@@ -11,9 +11,10 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.errors import RefusedError, RobotTimeoutError
+from nuno.robot.base_interface import BASE
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.humanoid import Humanoid
-from nuno.robot.interface import BASE, RobotInterface
+from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.readings import ImageReading, ImuReading, JointState
 from nuno.robot.trajectory import JointTrajectory

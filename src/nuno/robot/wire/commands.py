@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import MessageError, NunoError
+from nuno.robot.base_interface import BASE
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
-from nuno.robot.interface import BASE, RobotInterface
+from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge_client import Client, told
