@@ -25,7 +25,7 @@ POINT, out = tuple(asked.point), asked.out
 QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]  # without it: two finer meshes, a minute
 
 room = make_room(nuno.Cloth.preset("denim"), device="cpu")  # what is real
-talos = TowelPicker(room.driver, room.look, table=TABLE, device="cpu")  # and who knows nothing else of it
+talos = TowelPicker(room.driver, table=TABLE, device="cpu")  # and who knows nothing else of it
 
 talos.look_down()
 towel = talos.find_towel()

@@ -41,6 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     serve.add_argument("robot", nargs="?", default="talos", help="talos (default), g1, or the path of a URDF file")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
     serve.add_argument("--port", type=int, default=9090, help="0 takes a free one (default 9090)")
+    serve.add_argument(
+        "--origins", nargs="+", default=(), metavar="ORIGIN",
+        help="web pages that may connect, as browsers name them: http://localhost:8080 (default: none)",
+    )  # fmt: skip
     pace = serve.add_mutually_exclusive_group()
     pace.add_argument(
         "--factor", type=float, default=1.0, help="simulated over real time (default 1; inf: at full speed)"
@@ -133,7 +137,8 @@ def _serve(options: argparse.Namespace) -> int:
     _start_warp()
     robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))
     factor = None if options.stepped else options.factor
-    with RobotServer(robot, options.host, options.port, real_time_factor=factor) as server:
+    origins = tuple(options.origins)
+    with RobotServer(robot, options.host, options.port, real_time_factor=factor, origins=origins) as server:
         gc.freeze()  # else one message in many thousands waits until all that was loaded is looked through for garbage
         sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
         sys.stdout.flush()

@@ -31,7 +31,7 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
         if array.dtype.kind in "SU":
             raise ValueError("text is no number")
         array = array.astype(np.float64)
-    except (TypeError, ValueError) as problem:
+    except (TypeError, ValueError, OverflowError) as problem:
         raise error(f"{name} must be numbers of shape {_listed(shapes)}, got {_short(value)}") from problem
     if not any(_fits(array.shape, shape) for shape in shapes):
         raise error(f"{name} must have shape {_listed(shapes)}, got {array.shape}")

@@ -16,13 +16,17 @@ SOURCES = {
     "base.py": "ROSRobotInterfaceBase",
     "move_base.py": "ROSRobotMoveBaseInterface",
     "pr2.py": "PR2ROSRobotInterface",
+    "ros2": "ROS2RobotInterfaceBase",
 }
 JOINTS = (
-    "add_controller", "angle_vector", "angle_vector_duration", "angle_vector_sequence", "cancel_angle_vector",
+    "add_controller", "angle_vector", "angle_vector_duration", "angle_vector_sequence",
     "default_controller", "is_interpolating", "is_moving", "potentio_vector", "sub_angle_vector", "update_robot_state",
     "wait_interpolation",
 )  # fmt: skip
-BASE = ("go_pos", "go_stop", "go_velocity", "move_to")
+BASE = (
+    "go_pos", "go_pos_unsafe", "go_stop", "go_velocity", "move_to", "move_to_send", "move_to_wait", "move_trajectory",
+)  # fmt: skip
+NAMED = ("angle_vector_from_names", "cancel_angle_vector")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +37,7 @@ def signatures():
     folder = Path(find_spec("skrobot").origin).parent / "interfaces" / "ros"
     found = {}
     for file, kind in SOURCES.items():
-        tree = ast.parse((folder / file).read_text())
+        tree = ast.parse((folder.parent / "ros2" / "base.py" if file == "ros2" else folder / file).read_text())
         body = next(node.body for node in tree.body if isinstance(node, ast.ClassDef) and node.name == kind)
         found[file] = {item.name: _arguments(item) for item in body if isinstance(item, ast.FunctionDef)}
     return found
@@ -61,6 +65,12 @@ def test_joints(signatures, name):
 def test_base(signatures, name):
     """Names, order and defaults of what moves the base."""
     assert _own(name) == signatures["move_base.py"][name]
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_what_ros_2_adds(signatures, name):
+    """Names, order and defaults of what only its interface for ROS 2 has."""
+    assert _own(name) == signatures["ros2"][name]
 
 
 def test_grippers(signatures):

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.errors import NunoError
+from nuno.robot.footsteps import steps_of_velocity
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
+from nuno.robot.preview_control import TICK
 from nuno.robot.robot_state import RobotState
+from nuno.robot.running_walk import RunningWalk, landing_after, run_on, set_off
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.support import standing_place
+from nuno.robot.walk import Walk
+from nuno.robot.walk_planner import MARGIN, WalkPlanner
+from nuno.robot.walking import continue_walk, plan_walk, plan_walk_velocity, stop_walk
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
-    from nuno.robot.walk import Walk
+
+logger = logging.getLogger(__name__)
 
 WALKING = ("lleg_controller", "rleg_controller")
 """The controllers whose joints a walk moves; the others go on as they are asked."""
@@ -26,11 +35,31 @@ Place = tuple[float, float, float]
 """x, y [m] and yaw [rad] in the world."""
 
 
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A velocity that a robot is to keep, as from a joystick.
+
+    Attributes:
+        velocity: (3,) ahead, to the left [m/s], counterclockwise [rad/s].
+        until: When it has been kept for long enough [s].
+        at: The next landing (tick), at which it is taken; None after the last.
+    """
+
+    velocity: np.ndarray
+    until: float
+    at: int | None = None
+
+    def now(self, clock: float) -> np.ndarray:
+        """Return the velocity (3,) at a time [s]."""
+        return self.velocity if clock < self.until - SOON else np.zeros(3)
+
+
 class Gait:
     """A walk, its goal, and how far it is. Times are of the joints' clock.
 
     A velocity that comes while the robot walks changes the walk under way; a place lets it come to rest first, and go
-    from there. A walk always ends with both feet on the floor.
+    from there. Of velocities that come again and again (``drive``) the newest is taken at each landing. A walk always
+    ends with both feet on the floor.
 
     Args:
         robot: The robot that walks.
@@ -42,8 +71,9 @@ class Gait:
         self._names = tuple(name for name in WALKING if name in joints.rows)
         self.rows = np.concatenate([np.zeros(0, dtype=int), *(joints.rows[name] for name in self._names)])
         self.goal: Goal | None = None
-        self.walk: Walk | None = None
-        self._before: Walk | None = None  # what holds until a changed walk begins
+        self.walk: Walk | RunningWalk | None = None
+        self._before: Walk | RunningWalk | None = None  # what holds until a changed walk begins
+        self._drive: Drive | None = None
         self._start = 0.0  # when the walk's own time was 0
         self._waiting: tuple[Goal, Place] | None = None  # the next goal, for when the robot stands
 
@@ -66,8 +96,6 @@ class Gait:
             yaw: Counterclockwise [rad].
             seconds: In which it covers that [s]; None as it walks by itself.
         """
-        from nuno.robot.walking import plan_walk, plan_walk_velocity
-
         try:
             if seconds is None:
                 return plan_walk(robot, x, y, yaw)
@@ -75,23 +103,20 @@ class Gait:
         except NunoError as error:
             return str(error)
 
-    def begin(self, walk: Walk | str, goal: Goal) -> None:
+    def begin(self, walk: Walk | RunningWalk | str, goal: Goal) -> None:
         """Set off on a walk that was planned, or reject the goal where there is none."""
         if isinstance(walk, str):
             goal.finish(GoalStatus.REJECTED, text=walk)
             return
         for name in self._names:
             self._joints.take_over(name)
-        self.walk, self._before, self.goal = walk, None, goal
+        self.walk, self._before, self.goal, self._drive = walk, None, goal, None
         self._start = self._joints.clock - float(walk.times[0])
         goal.status = GoalStatus.ACTIVE
 
     def change(self, goal: Goal, x: float, y: float, yaw: float, seconds: float | None) -> None:
         """Go on otherwise from here, while the robot walks; see ``plan``."""
-        from nuno.robot.walking import continue_walk
-
-        assert self.walk is not None
-        if seconds is None:
+        if seconds is None or not isinstance(self.walk, Walk):
             place = self._seen_from_here(x, y, yaw)
             self.cancel()
             self._waiting = (goal, place)
@@ -105,6 +130,60 @@ class Gait:
         self._before, self.walk, self.goal = self.walk, changed, goal
         goal.status = GoalStatus.ACTIVE
 
+    def drive(self, x: float, y: float, yaw: float, hold: float) -> Goal:
+        """Keep a velocity [m/s, rad/s] for ``hold`` [s], in place of what the robot does, and return the goal.
+
+        A robot that stands sets off at once. One that walks takes the velocity at its next landing, or, where it has
+        made its last step, when it stands.
+        """
+        velocity, goal = np.array([x, y, yaw]), Goal((x, y, yaw))
+        until = self._joints.clock + hold
+        if self.walk is None:
+            if not velocity.any():
+                goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
+                return goal
+            self._set_off(goal, velocity, until)
+            return goal
+        try:
+            steps_of_velocity(velocity, self.walk.planner.stride.step_time, self.walk.planner.stride)
+        except NunoError as error:
+            goal.finish(GoalStatus.REJECTED, text=str(error))
+            return goal
+        if self._drive is not None and self.goal is not None and self.goal.status == GoalStatus.ACTIVE:
+            self._drive = replace(self._drive, velocity=velocity, until=until)
+            return self.goal
+        self._drop("another goal took its place")
+        self._drive = Drive(velocity, until, landing_after(self.walk, self._next_tick() / TICK - 0.5))
+        self.goal = goal
+        goal.status = GoalStatus.ACTIVE
+        return goal
+
+    def _set_off(self, goal: Goal, velocity: np.ndarray, until: float) -> None:
+        try:
+            walk: RunningWalk | str = set_off(WalkPlanner(self._robot, None, None, None, MARGIN, True), velocity)
+        except NunoError as error:
+            walk = str(error)
+        self.begin(walk, goal)
+        if isinstance(walk, RunningWalk):
+            self._drive = Drive(velocity, until, landing_after(walk, 0))
+
+    def _decide(self, t: float) -> None:
+        """Take the newest velocity at every landing that is passed by a time [s] of the walk."""
+        while self._drive is not None and self._drive.at is not None and t >= self._drive.at * TICK - SOON:
+            walk, at = self.walk, self._drive.at
+            assert walk is not None and self.goal is not None
+            velocity = self._drive.now(self._start + at * TICK)
+            try:
+                if velocity.any() or not (isinstance(walk, RunningWalk) and walk.is_closing):
+                    walk = run_on(walk, at, velocity)
+            except NunoError as error:  # the walk as it is has its end in it, too
+                if velocity.any():
+                    logger.warning("the robot comes to rest, as it cannot walk on so: %s", error)
+                    self.goal.finish(GoalStatus.ABORTED, text=str(error))
+                    self._drive = replace(self._drive, velocity=np.zeros(3))
+            self.walk, self._before = walk, None
+            self._drive = replace(self._drive, at=landing_after(walk, at))
+
     def cancel(self) -> None:
         """Come to rest as soon as that is safe."""
         if self._waiting is not None:
@@ -112,15 +191,20 @@ class Gait:
             self._waiting = None
         if self.walk is None or self.goal is None or self.goal.status == GoalStatus.PREEMPTING:
             return
-        from nuno.robot.walking import stop_walk
-
+        if not self.goal.is_done:  # as that of a velocity is that the robot could not keep
+            self.goal.status = GoalStatus.PREEMPTING
+        if isinstance(self.walk, RunningWalk):
+            if self._drive is not None:
+                self._drive = replace(self._drive, velocity=np.zeros(3))
+            return
+        self._drive = None
         self._before, self.walk = self.walk, stop_walk(self.walk, self._next_tick())
-        self.goal.status = GoalStatus.PREEMPTING
 
     def at(self, clock: float) -> RobotState:
         """Return configuration, velocity and acceleration at a time [s]."""
         assert self.walk is not None
         t = clock - self._start
+        self._decide(t)
         if self._before is not None and t < self.walk.times[0]:
             return self._before.state_at(t)
         return self.walk.state_at(t)
@@ -129,10 +213,14 @@ class Gait:
         """End the goal where the walk is over; the joints hold then."""
         if self.walk is None or self._joints.clock - self._start < float(self.walk.times[-1]) - SOON:
             return
-        self.walk = self._before = None
+        drive, self.walk = self._drive, None
+        self._before = self._drive = None
         for name in self._names:
             self._joints.take_over(name)
         assert self.goal is not None
+        if drive is not None and self.goal.status == GoalStatus.ACTIVE and drive.now(self._joints.clock).any():
+            self._set_off(self.goal, drive.velocity, drive.until)
+            return
         if self.goal.status == GoalStatus.PREEMPTING:
             self.goal.finish(GoalStatus.PREEMPTED, text="it was cancelled")
         self.goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
@@ -148,11 +236,11 @@ class Gait:
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        return self.goal, status, self.walk, self._before, self._start, self._waiting
+        return self.goal, status, self.walk, self._before, self._start, self._waiting, self._drive
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; a goal that came since is given up."""
-        goal, status, self.walk, self._before, self._start, waiting = saved
+        goal, status, self.walk, self._before, self._start, waiting, self._drive = saved
         if self.goal is not goal:
             self._drop("the world was restored")
         self.goal, self._waiting = goal, waiting

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.base_interface import BaseInterface
 from nuno.robot.goal import Goal
-from nuno.robot.joint_interface import JointInterface
 from nuno.robot.readings import ImuReading
-from nuno.robot.support import standing_place, zero_moment_point
+from nuno.robot.support import zero_moment_point
 from nuno.shapes import quaternion as quat
-from nuno.shapes.coordinates import Coordinates, compose, invert
+from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
 
 logger = logging.getLogger(__name__)
@@ -22,40 +22,17 @@ logger = logging.getLogger(__name__)
 ARMS = {"larm": ("left_hand",), "rarm": ("right_hand",), "arms": ("left_hand", "right_hand")}
 WRENCHES = {"larm": "left_wrist", "rarm": "right_wrist", "lleg": "left_ankle", "rleg": "right_ankle"}
 """Limbs, and the role of the frame that forces are measured in."""
-BASE = "base_footprint"
-"""The frame that a robot moves in: the point between its soles on the floor, x forward."""
-WORLDS = ("world", "map", "odom")
 LOADED = 1.0
 """[N] Weight that the feet must bear, so that they have a zero moment point."""
 
 
-class RobotInterface(JointInterface):
-    """A robot: what ``JointInterface`` says of its joints, and the rest of it.
+class RobotInterface(BaseInterface):
+    """A robot: joints (``JointInterface``), eyes (``CameraInterface``), base (``BaseInterface``), hands and sensors.
 
     Arms are "larm", "rarm" or "arms"; limbs "larm", "rarm", "lleg" and "rleg".
     """
 
     # What a robot must bring
-
-    @abstractmethod
-    def read_base(self) -> Coordinates:
-        """Return where the base link is in the world, as odometry tells."""
-
-    @abstractmethod
-    def send_base(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool) -> Goal:
-        """Let the robot go to a place seen from where it is, and return the goal at once.
-
-        Args:
-            x: Forward [m].
-            y: To the left [m].
-            yaw: Counterclockwise [rad].
-            seconds: How long it takes [s]; None leaves that to the robot.
-            stop: Whether it rests there.
-        """
-
-    @abstractmethod
-    def cancel_base(self) -> None:
-        """Let the robot stop going, as soon as it safely can; its goal ends as preempted."""
 
     @abstractmethod
     def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
@@ -88,78 +65,6 @@ class RobotInterface(JointInterface):
         Raises:
             RobotModelError: the robot has none.
         """
-
-    # Going
-
-    @property
-    def odom(self) -> Coordinates:
-        """Return where the base link is in the world, as odometry tells."""
-        return self.read_base()
-
-    def go_pos(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, wait: bool = True) -> bool:
-        """Go to a place seen from where the robot is now.
-
-        Args:
-            x: Forward [m].
-            y: To the left [m].
-            yaw: Counterclockwise [rad].
-            wait: Return when it is there.
-
-        Returns:
-            Whether it got there; without ``wait``, whether it has set off.
-        """
-        return self._go(x, y, yaw, None, True, wait)
-
-    def go_velocity(
-        self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, sec: float = 1.0, stop: bool = True, wait: bool = False
-    ) -> bool:
-        """Go at a velocity for a while.
-
-        Args:
-            x: Forward [m/s].
-            y: To the left [m/s].
-            yaw: Counterclockwise [rad/s].
-            sec: For how long [s].
-            stop: Rest after that.
-            wait: Return when it is over.
-
-        Returns:
-            As ``go_pos``.
-        """
-        span = number("sec", sec, above=0.0)
-        x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
-        return self._go(x * span, y * span, yaw * span, span, stop, wait)
-
-    def go_stop(self, force_stop: bool = True) -> bool:
-        """Stop going, as soon as the robot safely can.
-
-        Args:
-            force_stop: Also wait until it stands.
-        """
-        self.cancel_base()
-        goal = self._base_goal
-        if force_stop and goal is not None:
-            self.wait_until(lambda: goal.is_done)
-        return True
-
-    def move_to(self, coords: str | Coordinates, wait: bool = True, frame_id: str | None = None) -> bool:
-        """Go to a place: only its x, y and the turn about z count.
-
-        Args:
-            coords: The place, or the name of one of the robot's frames.
-            wait: Return when it is there.
-            frame_id: What ``coords`` is given in: "base_footprint" (None), "world", "map", "odom", or one of the
-                robot's frames.
-
-        Returns:
-            As ``go_pos``.
-
-        Raises:
-            UnknownNameError: there is no such frame.
-        """
-        goal = self._to_base(*self._frame(coords)) if isinstance(coords, str) else self._in_base(coords, frame_id)
-        forward = quat.rotate(goal[1], np.array([1.0, 0.0, 0.0]))
-        return self.go_pos(float(goal[0][0]), float(goal[0][1]), float(np.arctan2(forward[1], forward[0])), wait)
 
     # Hands
 
@@ -257,53 +162,7 @@ class RobotInterface(JointInterface):
         point = np.append(zero_moment_point(force, moment, place[2]), place[2])
         return point if wrt == "world" else quat.rotate(quat.inverse(turn), point - place)
 
-    # State
-
-    def update_robot_state(self, wait_until_update: bool | float = False) -> bool:
-        """Bring ``robot`` to the newest joint state, its base to where odometry has it; see ``JointInterface``."""
-        if not super().update_robot_state(wait_until_update):
-            return False
-        self.robot._place(*self.read_base()._pose())
-        return True
-
-    def footprint(self) -> Coordinates:
-        """Return where the robot stands: the point between its soles, x forward, z up."""
-        self.update_robot_state()
-        robot = self.robot
-        x, y, yaw = standing_place(robot)
-        floor = [robot.frame_pose(foot).position[2] for foot in robot.description.feet]
-        height = float(np.mean(floor)) if floor else robot.position[2]
-        return Coordinates((x, y, height)).rotate(yaw, "z")
-
     # Inside
-
-    _base_goal: Goal | None = None
-
-    def _go(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool, wait: bool) -> bool:
-        x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
-        goal = self._base_goal = self.send_base(x, y, yaw, seconds, stop)
-        if wait:
-            self.wait_until(lambda: goal.is_done)
-        if goal.is_done and not goal.succeeded:
-            logger.warning("the robot did not go there: %s", goal.text or goal.status.name.lower())
-            return False
-        return True
-
-    def _frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        self.update_robot_state()
-        return self.robot.frame_pose(name)._pose()
-
-    def _to_base(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return compose(invert(self.footprint()._pose()), (position, quaternion))
-
-    def _in_base(self, coords: Coordinates, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
-        if not isinstance(coords, Coordinates):
-            raise InvalidInputError(f"coords must be Coordinates or a frame's name, got {type(coords).__name__}")
-        if frame is None or frame == BASE:
-            return coords._pose()
-        if frame in WORLDS:
-            return self._to_base(*coords._pose())
-        return self._to_base(*compose(self._frame(frame), coords._pose()))
 
     def _beyond(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return what bears the foot beyond a sensor (3,) [N], at rest, and the foot's centre of mass (3,) [m]."""

@@ -20,6 +20,7 @@ from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.known_joints import KnownJoints
+from nuno.robot.limb_controllers import LimbControllers
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes.path import minimum_jerk
 from nuno.validation import finite_array, number
@@ -36,11 +37,12 @@ MOST_POINTS = 100_000
 """That an interpolation makes; a minute at 1 kHz has 60,000."""
 
 
-class JointInterface(KnownJoints):
+class JointInterface(LimbControllers, KnownJoints):
     """The joints of a robot and the controllers that move them.
 
     Angle vectors are (n,) [rad; m for slides] in the order of ``robot.joint_names``; where one is sent, a mapping from
-    joint names does as well, other joints staying where they are.
+    joint names does as well, other joints staying where they are, and so does a scikit-robot model, whose own order is
+    another. A bare vector that is beyond the limits is refused.
 
     Args:
         robot: The model; the interface keeps a copy, ``robot``, that shows what was last known of the real one.
@@ -160,7 +162,7 @@ class JointInterface(KnownJoints):
         if av is None:
             self._refresh()
             return self.robot.angle_vector()
-        wanted = self._checked_vector("av", av)
+        wanted = self._checked_goal("av", av)
         clients = self._clients_of(controller_type)
         if clients is None:
             return False
@@ -201,7 +203,7 @@ class JointInterface(KnownJoints):
             InvalidInputError: no angles; other values than ``angle_vector`` takes; another number of times.
         """
         clients = self._clients_of(controller_type)
-        wanted = [self._checked_vector(f"avs[{k}]", av) for k, av in enumerate(avs)]
+        wanted = [self._checked_goal(f"avs[{k}]", av) for k, av in enumerate(avs)]
         if not wanted:
             raise InvalidInputError("avs must hold at least one vector of angles")
         each: list[Any] = list(times) if isinstance(times, Sequence | np.ndarray) else [times] * len(wanted)
@@ -258,9 +260,16 @@ class JointInterface(KnownJoints):
         """
         return any(self.is_busy(client.controller) for client in self._known_clients(controller_type))
 
-    def cancel_angle_vector(self) -> None:
-        """Let all controllers give up what they do; the joints hold where they are."""
-        for client in self.controller_actions:
+    def cancel_angle_vector(self, controller_type: str | None = None) -> None:
+        """Let controllers give up what they do; the joints hold where they are.
+
+        Args:
+            controller_type: Which; None for all.
+
+        Raises:
+            UnknownNameError: there is no such controller.
+        """
+        for client in self.controller_actions if controller_type is None else self._known_clients(controller_type):
             client.cancel_all_goals()
 
     def stop_motion(self, stop_time: float = 0.0, wait: bool = True) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -9,15 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import RobotTimeoutError
+from nuno.errors import InvalidInputError, RobotTimeoutError
+from nuno.robot.other_models import angles_of_model, is_model, show_on_model
 from nuno.robot.readings import JointState
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
+logger = logging.getLogger(__name__)
+
 TICK = 0.01
 """[s] Between two looks at what is waited for."""
+BEYOND = 0.02
+"""[rad; m] What encoders may tell beyond a limit, so that a robot can be sent to where it is."""
 STATE_TIMEOUT = 3.0
 """[s] How long a fresh joint state is waited for."""
 
@@ -38,6 +45,7 @@ class KnownJoints(ABC):
     def __init__(self, robot: Humanoid) -> None:
         self.robot = robot.copy()
         self.joint_state: JointState | None = None
+        self._order_told = False
         self._joints = frozenset(self.robot.joint_names)
         self._velocities = np.zeros(len(self.robot.joint_names))
         self._efforts = np.zeros(len(self.robot.joint_names))
@@ -100,6 +108,26 @@ class KnownJoints(ABC):
         self._velocities[of_robot] = state.velocities[of_state]
         self._efforts[of_robot] = state.efforts[of_state]
         return True
+
+    def angle_vector_from_names(self, angles: Mapping[str, float]) -> np.ndarray:
+        """Return the angles (n,) that were last known, with some replaced by name.
+
+        Raises:
+            UnknownNameError: no joint of a name.
+            InvalidInputError: an angle that is not finite.
+        """
+        return self._checked_vector("angles", dict(angles))
+
+    def show_on(self, model: Any) -> None:
+        """Set a scikit-robot model's joints as they were last known, by name: its own order is another.
+
+        Raises:
+            InvalidInputError: something else than such a model.
+        """
+        if not is_model(model):
+            raise InvalidInputError(f"model must have a joint_list, as scikit-robot's have, got {type(model).__name__}")
+        self.update_robot_state()
+        show_on_model(model, dict(zip(self.robot.joint_names, self.robot.angle_vector().tolist(), strict=True)))
 
     def potentio_vector(self) -> np.ndarray:
         """Return the angles (n,) that were last known or sent, without asking the robot."""
@@ -166,9 +194,39 @@ class KnownJoints(ABC):
         self.robot.angle_vector(np.clip(angles, lower, upper))
 
     def _checked_vector(self, what: str, av: Any) -> np.ndarray:
+        if is_model(av):
+            av = angles_of_model(av)
         if not isinstance(av, Mapping):
-            return finite_array(what, av, (len(self.robot.joint_names),))
+            names = self.robot.joint_names
+            if np.ndim(av) == 1 and len(av) != len(names):
+                raise InvalidInputError(
+                    f"{what} has {len(av)} angles, {self.robot.name!r} has {len(names)} joints: {', '.join(names)}; "
+                    "a mapping from names to angles, or a scikit-robot model, does as well"
+                )
+            return finite_array(what, av, (len(names),))
         angles = self._present()
         for joint, angle in av.items():
             angles[self.robot.joint_index(joint)] = number(f"the angle of {joint!r}", angle)
         return angles
+
+    def _checked_goal(self, what: str, av: Any) -> np.ndarray:
+        """Return angles (n,) to go to; a bare vector beyond the limits is most likely in another model's order."""
+        wanted = self._checked_vector(what, av)
+        if isinstance(av, Mapping) or is_model(av):
+            return wanted
+        lower, upper = self.robot.joint_limits
+        beyond = np.maximum(lower - wanted, wanted - upper)
+        if (beyond > BEYOND).any():
+            k = int(beyond.argmax())
+            raise InvalidInputError(
+                f"{what}[{k}] is {wanted[k]:.4f}, and {self.robot.joint_names[k]!r} goes from {lower[k]:.4f} to "
+                f"{upper[k]:.4f}: is the vector in another model's order? The order here is that of joint_names; a "
+                "scikit-robot model itself, or a mapping from names, is taken by names"
+            )
+        if not self._order_told and "skrobot" in sys.modules:
+            self._order_told = True
+            logger.warning(
+                "a vector without names is taken in the order of joint_names, %s first; scikit-robot's models have "
+                "another: pass the model itself, or a mapping", self.robot.joint_names[0],
+            )  # fmt: skip
+        return wanted

@@ -101,22 +101,13 @@ class LegMotion:
         Raises:
             WalkError: a leg cannot reach.
         """
-        n = len(targets.centre)
-        model, found = self.model, np.empty((n, self.model.nq))
-        ahead = before = np.zeros(model.nv)  # how guesses for a tick and the one before it differ from the base of them
-        for k in range(n):
-            origin = q if k == 0 else found[k - 1] if near is None else near[k]
-            guess = pin.integrate(model, origin, 2.0 * ahead - before if k > 2 else ahead)  # to second order
-            guess[self.others] = targets.others[k]
-            found[k] = self._solve(targets, k, guess, begin)
-            before = ahead
-            if near is not None:
-                ahead = pin.difference(model, near[k], found[k])
-            elif k > 0:
-                ahead = pin.difference(model, found[k - 1], found[k])
-        return found
+        follower = LegFollower(self, targets, q, near, begin)
+        for _ in range(len(targets.centre)):
+            follower.step()
+        return follower.found
 
-    def _solve(self, targets: Targets, k: int, q: np.ndarray, begin: float) -> np.ndarray:
+    def solve(self, targets: Targets, k: int, q: np.ndarray, begin: float) -> np.ndarray:
+        """Return the configuration (nq,) of tick ``k``, from a guess; raises as ``follow``."""
         error = np.inf
         for _ in range(NEWTON_STEPS):
             error = self._linearise(targets, k, q)
@@ -154,3 +145,46 @@ class LegMotion:
         error[15:] = targets.centre[k] - data.com[0]
         jacobian[15:] = of_centre[:, self._columns]
         return float(np.abs(error).max())
+
+
+class LegFollower:
+    """The configurations that keep targets, tick after tick; each guess continues the motion before it.
+
+    Args:
+        legs: The legs.
+        targets: What is wanted; ticks that are not reached yet may still be changed.
+        q: (nq,) near the first.
+        near: (n, nq), solutions for targets that differ by little; None guesses from the ticks before.
+        begin: Time of the first tick [s], for the error.
+
+    Attributes:
+        found: (n, nq) float, of which the first ``count`` are known.
+        count: How many ticks are known.
+    """
+
+    def __init__(
+        self, legs: LegMotion, targets: Targets, q: np.ndarray, near: np.ndarray | None = None, begin: float = 0.0
+    ) -> None:
+        self._legs, self._targets, self._near, self._begin, self._first = legs, targets, near, begin, q
+        self.found = np.empty((len(targets.centre), legs.model.nq))
+        self.count = 0
+        # how guesses for a tick and the one before it differ from the base of them
+        self._ahead = self._before = np.zeros(legs.model.nv)
+
+    def step(self) -> None:
+        """Find the next tick.
+
+        Raises:
+            WalkError: a leg cannot reach.
+        """
+        k, model, near, found = self.count, self._legs.model, self._near, self.found
+        origin = self._first if k == 0 else found[k - 1] if near is None else near[k]
+        guess = pin.integrate(model, origin, 2.0 * self._ahead - self._before if k > 2 else self._ahead)  # second order
+        guess[self._legs.others] = self._targets.others[k]
+        found[k] = self._legs.solve(self._targets, k, guess, self._begin)
+        self._before = self._ahead
+        if near is not None:
+            self._ahead = pin.difference(model, near[k], found[k])
+        elif k > 0:
+            self._ahead = pin.difference(model, found[k - 1], found[k])
+        self.count = k + 1

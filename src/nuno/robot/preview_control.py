@@ -108,8 +108,20 @@ class PreviewControl:
         states, sums = np.empty((n, 3, 2)), np.empty((n, 2))
         states[0], sums[0] = state, 0.0 if error_sum is None else error_sum
         for k in range(n - 1):
-            now = states[k]
-            sums[k + 1] = sums[k] + self.output @ now - reference[k]
-            jerk = -self.error_gain * sums[k + 1] - self.state_gains @ now - preview[k]
-            states[k + 1] = self.transition @ now + self.entry[:, None] * jerk
+            states[k + 1], sums[k + 1] = self.step(states[k], sums[k], reference[k], preview[k])
         return states, sums
+
+    def step(
+        self, state: np.ndarray, error_sum: np.ndarray, reference: np.ndarray, preview: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the state of the next tick, and the sum of errors before it.
+
+        Args:
+            state: (3, 2) float, of this tick.
+            error_sum: (2,) float [m], of the ticks before this one.
+            reference: (2,) float [m], of this tick.
+            preview: (2,) float, the later references weighed by ``preview_gains``.
+        """
+        error_sum = error_sum + self.output @ state - reference
+        jerk = -self.error_gain * error_sum - self.state_gains @ state - preview
+        return self.transition @ state + self.entry[:, None] * jerk, error_sum

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.camera.camera import Camera
+
 
 @dataclass(frozen=True, eq=False)
 class JointState:
@@ -41,3 +43,18 @@ class ImuReading:
     quaternion: np.ndarray
     angular_velocity: np.ndarray
     linear_acceleration: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ImageReading:
+    """An image of one of the robot's cameras.
+
+    Attributes:
+        time: When it was taken [s] of the robot's clock.
+        camera: The camera: its pixels, and where it was as far as the robot's joints tell.
+        image: (h, w, 3) uint8, red, green and blue; of depths (h, w) float32 [m], inf where nothing is.
+    """
+
+    time: float
+    camera: Camera
+    image: np.ndarray

@@ -167,3 +167,13 @@ def _with(motion: Motion, rows: np.ndarray, given: Motion) -> Motion:
     for part, own in zip((positions, velocities, accelerations), given, strict=True):
         part[rows] = own
     return positions, velocities, accelerations
+
+
+def joined(
+    rows: np.ndarray | None, given: Motion | None, more_rows: np.ndarray, more: Motion
+) -> tuple[np.ndarray, Motion]:
+    """Return the joints of two givers and their motions; the second has those that both give."""
+    if rows is None or given is None:
+        return more_rows, more
+    a, b, c = (np.concatenate(pair) for pair in zip(given, more, strict=True))
+    return np.concatenate([rows, more_rows]), (a, b, c)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as wall_clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,20 +15,23 @@ from nuno.robot.hands import hands_of
 from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
-from nuno.robot.readings import ImuReading, JointState
+from nuno.robot.readings import ImageReading, ImuReading, JointState
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
 from nuno.robot.sensors import Readings, Sensors
 from nuno.robot.servo import Servo, ServoCommand, external_forces
+from nuno.robot.simulated_cameras import SimulatedCameras
 from nuno.robot.simulated_gripper import SimulatedGripper
-from nuno.robot.simulated_joints import SimulatedJoints
+from nuno.robot.simulated_joints import SimulatedJoints, joined
 from nuno.robot.stance import Stance
-from nuno.robot.trajectory import JointTrajectory, Motion
+from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
 from nuno.world.background import LATE
 
 if TYPE_CHECKING:
+    from nuno.camera.camera import Camera
+    from nuno.robot.head_cameras import HeadCameras
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.world.world import World
@@ -46,6 +49,8 @@ class SimulatedRobot(RobotInterface):
         links: Links that are in the world already; the simulated robot is theirs then. None lets it enter.
         real_time_factor: Simulated over real time while waiting; None is as fast as possible.
         sensors: By channel, how its sensors depart from the truth; see ``nuno.robot.sensors.Sensors``.
+        cameras: How its cameras see: light, looks, noise, rate; None sees each as the description has it, without
+            noise. Cameras that are not among these see so, too.
         seed: Of the sensors' noise.
         default_controller: The name of all controllers together.
         namespace: What the names of actions and topics begin with.
@@ -63,11 +68,13 @@ class SimulatedRobot(RobotInterface):
 
     def __init__(
         self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
-        sensors: Mapping[str, SensorModel] | None = None, seed: int = 0,
+        sensors: Mapping[str, SensorModel] | None = None, cameras: HeadCameras | None = None, seed: int = 0,
         default_controller: str = "default_controller", namespace: str | None = None,
     ) -> None:  # fmt: skip
         if links is not None and links.world is not world:
             raise InvalidInputError("the links are in another world than the robot is to be in")
+        if cameras is not None and cameras.links is not links:
+            raise InvalidInputError("the cameras must be of the links that are given")
         if any(isinstance(other, SimulatedRobot) and other.links is links for other in world.drivers):
             raise BodyStateError(f"another robot moves the links of {robot.name!r} already")
         self.pace = None if real_time_factor is None else number("real_time_factor", real_time_factor, above=0.0)
@@ -83,6 +90,7 @@ class SimulatedRobot(RobotInterface):
         self.gait, self.stance = Gait(self.actual, self.joints), Stance(self.actual)
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
+        self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
         self._servo: Servo | None = None
         self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
@@ -254,6 +262,12 @@ class SimulatedRobot(RobotInterface):
                 self.gait.begin(walk, goal)
         return goal
 
+    def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
+        """Let the robot keep a velocity, the newest from each landing of a foot; see ``RobotInterface``."""
+        with self.world.lock:
+            x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
+            return self.gait.drive(x, y, yaw, number("hold", hold, above=0.0))
+
     def cancel_base(self) -> None:
         """Let the robot come to rest as soon as that is safe."""
         with self.world.lock:
@@ -292,6 +306,29 @@ class SimulatedRobot(RobotInterface):
         told = self.read()
         return ImuReading(told.sampled["orientation"], told.orientation, told.angular_velocity, told.specific_force)
 
+    @property
+    def shown_cameras(self) -> tuple[str, ...]:
+        """The cameras that images come of: all."""
+        return self.camera_names
+
+    def read_image(self, camera: str) -> ImageReading:
+        """Return what a camera sees now, or saw last where its cameras have a rate; see ``CameraInterface``."""
+        return self.read_images((camera,))[camera]
+
+    def read_images(self, cameras: Sequence[str]) -> dict[str, ImageReading]:
+        """Return what several cameras see at one time."""
+        pictures = self._cameras.look([self._known_camera(name) for name in cameras])
+        return {name: ImageReading(own.time, own.camera, own.color.numpy()) for name, own in pictures.items()}
+
+    def read_depth(self, camera: str) -> ImageReading:
+        """Return how far what a camera sees is; see ``CameraInterface``."""
+        picture = self._cameras.look((self._known_camera(camera),))[camera]
+        return ImageReading(picture.time, picture.camera, picture.depth.numpy())
+
+    def camera_info(self, camera: str = "head") -> Camera:
+        """Return a camera, with the pixels that its images have; see ``CameraInterface``."""
+        return self._cameras.pixels(super().camera_info(camera), camera)
+
     # What the world asks of it
 
     def begin_frame(self, start: float, end: float) -> None:
@@ -311,7 +348,7 @@ class SimulatedRobot(RobotInterface):
         if self._servo is not None:
             others = self.joints.step(span, rows, given)
             own = self._servo.step(before, others, base, span, self._external())
-            rows, given = _joined(rows, given, self._servo.rows, own)
+            rows, given = joined(rows, given, self._servo.rows, own)
         positions, velocities, accelerations = self.joints.step(span, rows, given)
         if positions is robot._angles and base is None:
             self._state = RobotState(end, before.q, before.v, before.a)
@@ -360,13 +397,3 @@ class SimulatedRobot(RobotInterface):
     def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
         self.actual._angles = angles
         self.actual._place(position, quaternion)
-
-
-def _joined(
-    rows: np.ndarray | None, given: Motion | None, more_rows: np.ndarray, more: Motion
-) -> tuple[np.ndarray, Motion]:
-    """Return the joints of two givers and their motions; the second has those that both give."""
-    if rows is None or given is None:
-        return more_rows, more
-    a, b, c = (np.concatenate(pair) for pair in zip(given, more, strict=True))
-    return np.concatenate([rows, more_rows]), (a, b, c)

@@ -47,8 +47,12 @@ class JointTrajectory:
             twice = next(name for name in names if names.count(name) > 1)
             raise InvalidInputError(f"a trajectory has each joint once; {twice!r} is in it twice")
         times = finite_array("times", self.times, ("k",))
-        if times[0] < 0.0 or (np.diff(times) <= 0.0).any():
-            raise InvalidInputError(f"times must be at least 0 and increase from point to point, got {times.tolist()}")
+        wrong = np.flatnonzero(np.diff(times) <= 0.0)
+        if times[0] < 0.0 or wrong.size:
+            what = f"the first is {times[0]:g} s"
+            if times[0] >= 0.0:
+                what = f"point {wrong[0] + 1} is at {times[wrong[0] + 1]:g} s, after {times[wrong[0]]:g} s"
+            raise InvalidInputError(f"times must be at least 0 and increase from point to point: {what}")
         if times[-1] > LONGEST:
             raise InvalidInputError(f"a trajectory takes at most {LONGEST:g} s, got {times[-1]:g} s")
         if self.velocities is None and self.accelerations is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +15,81 @@ from nuno.robot.robot_state import RobotState
 from nuno.validation import number
 
 if TYPE_CHECKING:
+    from nuno.robot.timeline import Schedule
     from nuno.robot.walk_check import WalkMeasures
+    from nuno.robot.walk_planner import States, WalkPlanner
+
+
+class TimedMotion(ABC):
+    """A motion of a whole robot, tick by tick.
+
+    Attributes:
+        dt: Between two ticks [s].
+        times: (n,) float [s].
+        configurations: (n, nq) float, Pinocchio's, the base with it, in the world.
+        velocities: (n, nv) float, of the base in its own frame [m/s, rad/s], then the joints' [rad/s].
+        accelerations: (n, nv) float, likewise.
+    """
+
+    dt: float
+    times: np.ndarray
+    configurations: np.ndarray
+    velocities: np.ndarray
+    accelerations: np.ndarray
+
+    @property
+    @abstractmethod
+    def planner(self) -> WalkPlanner:
+        """What it was planned by."""
+
+    @property
+    @abstractmethod
+    def schedule(self) -> Schedule:
+        """The footsteps and their times."""
+
+    @abstractmethod
+    def states_at(self, tick: int) -> States:
+        """Return the states of both passes of preview control at a tick, counted from the first."""
+
+    @property
+    def model(self) -> Any:
+        """Pinocchio's model of the robot, with what it carries."""
+        return self.planner.model
+
+    def ensure(self, tick: int) -> None:
+        """Make sure that a tick and the next one are known; here all are."""
+        return
+
+    def configuration_at(self, time: float) -> np.ndarray:
+        """Return the configuration (nq,) at a time [s]; before and after the walk that of its ends."""
+        k, share = self._tick(time)
+        self.ensure(k)
+        return self._configuration(k, share)
+
+    def state_at(self, time: float) -> RobotState:
+        """Return configuration, velocity and acceleration at a time [s]; before and after the walk at rest."""
+        k, share = self._tick(time)
+        self.ensure(k)
+        parts = []
+        for part in (self.velocities, self.accelerations):
+            parts.append(part[k].copy() if share == 0.0 else (1.0 - share) * part[k] + share * part[k + 1])
+        return RobotState(float(time), self._configuration(k, share), *parts)
+
+    def _configuration(self, k: int, share: float) -> np.ndarray:
+        if share == 0.0:
+            return self.configurations[k].copy()
+        return np.array(pin.interpolate(self.model, self.configurations[k], self.configurations[k + 1], share))
+
+    def _tick(self, time: float) -> tuple[int, float]:
+        at = (number("time", time) - float(self.times[0])) / self.dt
+        k = min(max(math.floor(at + 1e-9), 0), len(self.times) - 1)
+        if k == len(self.times) - 1 or at <= k + 1e-9:
+            return k, 0.0
+        return k, float(at - k)
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class Walk(TimedMotion):
     """A walk that begins and ends with both feet on the floor, at rest; see ``plan_walk``.
 
     One that continues another begins where that was left (``continue_walk``, ``stop_walk``): its times go on from
@@ -61,26 +132,19 @@ class Walk:
         """Return how long it takes [s]."""
         return float(self.times[-1] - self.times[0])
 
-    def configuration_at(self, time: float) -> np.ndarray:
-        """Return the configuration (nq,) at a time [s]; before and after the walk that of its ends."""
-        return self._configuration(*self._tick(time))
+    @property
+    def planner(self) -> WalkPlanner:
+        """What it was planned by."""
+        planner: WalkPlanner = self.plan.planner
+        return planner
 
-    def state_at(self, time: float) -> RobotState:
-        """Return configuration, velocity and acceleration at a time [s]; before and after the walk at rest."""
-        k, share = self._tick(time)
-        parts = []
-        for part in (self.velocities, self.accelerations):
-            parts.append(part[k].copy() if share == 0.0 else (1.0 - share) * part[k] + share * part[k + 1])
-        return RobotState(float(time), self._configuration(k, share), *parts)
+    @property
+    def schedule(self) -> Schedule:
+        """The footsteps and their times."""
+        schedule: Schedule = self.plan.schedule
+        return schedule
 
-    def _configuration(self, k: int, share: float) -> np.ndarray:
-        if share == 0.0:
-            return self.configurations[k].copy()
-        return np.array(pin.interpolate(self.plan.model, self.configurations[k], self.configurations[k + 1], share))
-
-    def _tick(self, time: float) -> tuple[int, float]:
-        at = (number("time", time) - float(self.times[0])) / self.dt
-        k = min(max(math.floor(at + 1e-9), 0), len(self.times) - 1)
-        if k == len(self.times) - 1 or at <= k + 1e-9:
-            return k, 0.0
-        return k, float(at - k)
+    def states_at(self, tick: int) -> States:
+        """Return the states of both passes of preview control at a tick, counted from the first."""
+        (first, sums), (second, more) = self.plan.states
+        return (first[tick], sums[tick]), (second[tick], more[tick])

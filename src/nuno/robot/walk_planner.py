@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -28,8 +28,12 @@ if TYPE_CHECKING:
 Arms = Mapping[str, float] | JointTrajectory | None
 LEVEL = 0.01
 """[rad] What a sole may be tilted when a walk begins."""
+States = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Of both passes of preview control: the state (3, 2) at a tick, and the sum of errors (2,) before it."""
 SAME_HEIGHT = 0.002
 """[m] By which soles may then differ in height."""
+MARGIN = 0.02
+"""[m] By which the zero moment point stays inside the soles that stand, unless asked otherwise."""
 TRIES = 3
 """Further steps that may be made as they were planned, when a walk is changed."""
 
@@ -41,11 +45,6 @@ class WalkPlan:
     planner: WalkPlanner
     schedule: Schedule
     states: tuple[tuple[np.ndarray, np.ndarray], ...]
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model of the robot, with what it carries."""
-        return self.planner.model
 
 
 class WalkPlanner:
@@ -107,11 +106,18 @@ class WalkPlanner:
 
     def first(self, steps: tuple[Footstep, ...]) -> Walk:
         """Return the walk over steps, from standing."""
-        schedule = Schedule(steps, self.feet, self.floor, self.centre[:2], 0, self.lead, self.stride)
+        return self._walk(self.standing(steps), 0, self.start, self.standing_states())
+
+    def standing(self, steps: tuple[Footstep, ...]) -> Schedule:
+        """Return the schedule of steps from where the robot stands."""
+        return Schedule(steps, self.feet, self.floor, self.centre[:2], 0, self.lead, self.stride)
+
+    def standing_states(self) -> States:
+        """Return the states of both passes of a robot that stands, and their sums of errors."""
         still = np.zeros((3, 2))
         moving = still.copy()
         moving[0] = self.centre[:2]
-        return self._walk(schedule, 0, self.start, ((moving, np.zeros(2)), (still, np.zeros(2))))
+        return (moving, np.zeros(2)), (still, np.zeros(2))
 
     def changed(self, walk: Walk, time: float, steps: Any, may_follow: bool) -> Walk:
         """Return how a walk goes on over other steps, of which ``steps(feet, next foot)`` tells.
@@ -167,20 +173,11 @@ class WalkPlanner:
             states: Of the controllers of both passes then, and their sums of errors.
             moving: Velocity and acceleration (nv,) then; None is at rest.
         """
-        self._check_gaps(schedule)
+        self.check_gaps(schedule)
         wanted = timeline(schedule).after(begin)
         wanted = replace(wanted, point=self.control.joined(wanted.point, states[0][0]))
         first = self.control.follow(wanted.point, *states[0])
-        others = self._others(wanted)
-        base, height = self._base_and_height(wanted)
-        middle = wanted.point[-1]
-        rest = smooth((np.arange(len(wanted.point)) - len(wanted.point) + 1 + self._settle) / self._settle)[:, None]
-
-        def targets(centre: np.ndarray) -> Targets:
-            # what is still missing when the robot comes to rest (1 to 3 mm) is made up for on the way
-            still = middle + (1.0 - rest) * (centre - middle)
-            return Targets(wanted.feet, np.column_stack([still, height]), base, others)
-
+        targets = self.targets(wanted)
         near = self.legs.follow(targets(first[0][:, 0]), q, None, begin * TICK)
         motion = (near, *motion_of(self.model, near, TICK))
         missed = wanted.point - zero_moments(self.model, self.legs.data, motion, self.floor)[0]
@@ -201,11 +198,21 @@ class WalkPlanner:
             WalkPlan(self, schedule, (first, second)),
         )  # fmt: skip
 
-    @property
-    def _settle(self) -> int:
-        return max(1, round(self.stride.settle / TICK))
+    def targets(self, wanted: Timeline) -> Callable[[np.ndarray], Targets]:
+        """Return what makes the legs' targets of a timeline from the centre of mass (n, 2) that a pass asks for [m]."""
+        others = self._others(wanted)
+        base, height = self._base_and_height(wanted)
+        middle, rest = wanted.point[-1], share_of_rest(len(wanted.point), self.stride)[:, None]
 
-    def _check_gaps(self, schedule: Schedule) -> None:
+        def made(centre: np.ndarray) -> Targets:
+            # what is still missing when the robot comes to rest (1 to 3 mm) is made up for on the way
+            still = middle + (1.0 - rest) * (centre - middle)
+            return Targets(wanted.feet, np.column_stack([still, height]), base, others)
+
+        return made
+
+    def check_gaps(self, schedule: Schedule) -> None:
+        """Raise a ``WalkError`` where soles come too near to each other."""
         feet = schedule.feet[:, [0, 1, 3]].copy()
         for k, step in enumerate(schedule.steps):
             feet[step.foot] = step.pose
@@ -272,6 +279,12 @@ class WalkPlanner:
         tilted = [self._base_walking if s == 1.0 else self._base @ pin.exp3(s * change) for s in share]
         yaw = wanted.feet[:, :, 3].mean(axis=1)
         return np.array([_about_z(angle) @ own for angle, own in zip(yaw, tilted, strict=True)]), height
+
+
+def share_of_rest(count: int, stride: Stride) -> np.ndarray:
+    """Return how far (count,) a robot has come to rest at each tick of a walk: 0 on the way, 1 at the end."""
+    settle = max(1, round(stride.settle / TICK))
+    return smooth((np.arange(count) - count + 1 + settle) / settle)
 
 
 def rest_of(walk: Walk, at: int) -> Walk:

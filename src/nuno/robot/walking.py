@@ -18,7 +18,7 @@ from nuno.robot.footsteps import Footstep, footsteps_along, footsteps_to, middle
 from nuno.robot.preview_control import TICK
 from nuno.robot.stride import Stride
 from nuno.robot.walk import Walk
-from nuno.robot.walk_planner import Arms, WalkPlanner, rest_of
+from nuno.robot.walk_planner import MARGIN, Arms, WalkPlanner, rest_of
 from nuno.validation import number
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def plan_walk(
     robot: Humanoid, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, *, stride: Stride | None = None,
-    arms: Arms = None, load: tuple[float, ArrayLike] | None = None, margin: float = 0.02,
+    arms: Arms = None, load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN,
     check_collisions: bool = True,
 ) -> Walk:  # fmt: skip
     """Plan a walk to a place seen from where the robot stands; the robot itself stays as it is.
@@ -59,8 +59,8 @@ def plan_walk(
 
 def plan_walk_velocity(
     robot: Humanoid, vx: float = 0.0, vy: float = 0.0, vyaw: float = 0.0, seconds: float = 1.0, *,
-    stride: Stride | None = None, arms: Arms = None, load: tuple[float, ArrayLike] | None = None, margin: float = 0.02,
-    check_collisions: bool = True,
+    stride: Stride | None = None, arms: Arms = None, load: tuple[float, ArrayLike] | None = None,
+    margin: float = MARGIN, check_collisions: bool = True,
 ) -> Walk:  # fmt: skip
     """Plan a walk at a velocity, which is kept for some seconds, from standing to standing.
 
@@ -91,7 +91,7 @@ def plan_walk_velocity(
 
 def plan_walk_footsteps(
     robot: Humanoid, footsteps: Sequence[Footstep], *, stride: Stride | None = None, arms: Arms = None,
-    load: tuple[float, ArrayLike] | None = None, margin: float = 0.02, check_collisions: bool = True,
+    load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN, check_collisions: bool = True,
 ) -> Walk:  # fmt: skip
     """Plan a walk over given footsteps, in the world.
 

@@ -6,7 +6,7 @@ cameras, and where the table is. What it thinks is in ``TowelPicker.world``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,8 +103,7 @@ class TowelPicker:
     """A program that finds a towel on a table, picks it up, and tells from images at which point it holds it.
 
     Args:
-        driver: The driver of a Talos, real or simulated.
-        see: Returns what the head cameras see now, RGB (h, w, 3) uint8 by name ("head_left", "head_right").
+        driver: The driver of a Talos, real or simulated, whose head cameras ("head_left", "head_right") show images.
         table: Where the table is.
         rest_height: Height of a cloth's middle surface above the table [m].
         device: Where to simulate, as of ``World``.
@@ -120,12 +119,11 @@ class TowelPicker:
     """
 
     def __init__(
-        self, driver: RobotInterface, see: Callable[[], Mapping[str, np.ndarray]], *, table: Table,
-        rest_height: float = 0.0025, device: str = "auto",
+        self, driver: RobotInterface, *, table: Table, rest_height: float = 0.0025, device: str = "auto",
     ) -> None:  # fmt: skip
         if table.half_extents is None or table.centre is None:
             raise InvalidInputError("the robot must know where its table ends")
-        self.driver, self._see, self.table, self.rest_height = driver, see, table, rest_height
+        self.driver, self.table, self.rest_height = driver, table, rest_height
         self.world = World(device=device)
         self.world.add(plane(name="floor", color="#b9b2a6"))
         size = (2.0 * table.half_extents[0], 2.0 * table.half_extents[1], table.thickness)
@@ -154,7 +152,7 @@ class TowelPicker:
         self.driver.angle_vector()
         self.robot.take_configuration(self.driver.robot.configuration())
         self.links.follow(0.0)
-        images = dict(self._see())
+        images = {name: seen.image for name, seen in self.driver.read_images(STEREO).items()}
         thought = self.cameras.look()
         return Look(
             images, {name: self.cameras.camera(name) for name in STEREO},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,9 +36,9 @@ class TowelRoom:
 
     Attributes:
         world: The world, in which nothing is known to the robot but what its driver and its cameras tell.
-        driver: The robot's driver.
+        driver: The robot's driver, whose cameras see the room.
         towel: The towel; it is cloth.
-        cameras: The robot's eyes.
+        cameras: The driver's eyes; for a judge, who may look from elsewhere with them.
         lay: (n, 3) [m], the towel's vertices when the room was made.
     """
 
@@ -48,10 +47,6 @@ class TowelRoom:
     towel: Body
     cameras: HeadCameras
     lay: np.ndarray
-
-    def look(self) -> Mapping[str, np.ndarray]:
-        """Return what the eyes see now: RGB images (h, w, 3) uint8 by camera, and nothing else."""
-        return {name: picture.color.numpy() for name, picture in self.cameras.look().items()}
 
     def held(self) -> np.ndarray:
         """Return where, on the towel as it lay, the hands truly hold it: (3,) [m]; for a judge, not for the robot.
@@ -109,4 +104,5 @@ def make_room(
     put_beads(links)
     patterns = {} if chequer is None else {towel: chequer}
     cameras = HeadCameras(links, STEREO, patterns=patterns, samples=2, noise=noise, seed=seed)
-    return TowelRoom(world, SimulatedRobot(robot, world, links=links), towel, cameras, towel.vertices)
+    driver = SimulatedRobot(robot, world, links=links, cameras=cameras)
+    return TowelRoom(world, driver, towel, cameras, towel.vertices)

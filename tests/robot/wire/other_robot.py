@@ -1,5 +1,6 @@
 """A robot behind another rosbridge, as real ones are: its own clock, no acknowledgements, no names of Nuno's."""
 
+import asyncio
 import queue
 import threading
 import time
@@ -19,25 +20,37 @@ class OtherRobot:
         self.inbox, self.velocities, self.moving, self.positions = queue.Queue(), [], [], {}
         self.robot, self.with_rosapi, self.silent = robot, with_rosapi, False
         self.positions = dict(zip(robot.joint_names, robot.angle_vector().tolist(), strict=True))
-        self.bridge = Bridge(
-            lambda client, message: self.inbox.put((client, message)),
-            lambda client: None,
-            "127.0.0.1",
-            0,
-            2**23,
-            20.0,
-            (),
-        )
+        self.bridge = Bridge(self.take_in, self.let_go, "127.0.0.1", 0, 2**23, 20.0, ())
+        self.closing, ready = threading.Event(), threading.Event()
+        self.threads = [
+            threading.Thread(target=lambda: asyncio.run(self.listen(ready)), daemon=True),
+            threading.Thread(target=self.run, daemon=True),
+        ]
+        for thread in self.threads:
+            thread.start()
+            ready.wait()
         self.url = f"ws://127.0.0.1:{self.bridge.port}"
-        self.closing = threading.Event()
-        self.thread = threading.Thread(target=self.run, daemon=True)
-        self.thread.start()
 
     def close(self):
         """End."""
         self.closing.set()
-        self.thread.join()
-        self.bridge.close()
+        for thread in self.threads:
+            thread.join()
+
+    async def listen(self, ready):
+        """Serve until the end."""
+        await self.bridge.open()
+        ready.set()
+        while not self.closing.is_set():
+            await asyncio.sleep(0.01)
+        await self.bridge.close()
+
+    async def take_in(self, client, message):
+        """Leave a message to the other thread."""
+        self.inbox.put((client, message))
+
+    async def let_go(self, client):
+        """Nothing ends with a client."""
 
     def run(self):
         """Answer, and publish every 20 ms."""
@@ -73,7 +86,6 @@ class OtherRobot:
     def answer(self, client, message):
         """Do what a message asks."""
         op = message["op"]
-        client.done()
         if op == "publish":
             self.velocities.append((time.monotonic(), message["msg"]))
         elif op == "call_service":

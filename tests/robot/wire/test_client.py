@@ -18,7 +18,7 @@ from nuno.robot.wire.names import Names
 
 def cut(robot):
     """End a connection as a cable that is cut does."""
-    robot.connection._link.abort()
+    robot.connection._socket.socket.shutdown(socket.SHUT_RDWR)
 
 
 @pytest.fixture

@@ -120,3 +120,37 @@ def test_places_both_ways():
     np.testing.assert_allclose(place.position, [0.5, -0.25, 0.0])
     np.testing.assert_allclose(place.quaternion, [np.cos(0.15), 0, 0, np.sin(0.15)], atol=1e-15)  # rounding of unit
     assert ros.read_twist(through(ros.twist_fields(0.1, 0.2, 0.3))) == (0.1, 0.2, 0.3)
+
+
+def test_points_are_read_at_once(monkeypatch):
+    """Of a goal of thousands of points none is looked at by itself; what is read is the same as one by one."""
+    points = [
+        {"positions": [0.001 * k, 1], "velocities": [0.1, -0.2], "accelerations": [],
+         "time_from_start": {"sec": k // 1000, "nanosec": 1_000_000 * (k % 1000) + 1}}
+        for k in range(5000)
+    ]  # fmt: skip
+    message = {"joint_names": ["a", "b"], "points": points}
+    slow = {"joint_names": ["a", "b"], "points": [*points[:-1], points[-1] | {"positions": [4.999, None]}]}
+    with pytest.raises(MessageError, match="positions"):
+        ros.read_trajectory(slow)
+    with monkeypatch.context() as patch:
+        patch.setattr(ros, "_tables", lambda points, width: None)
+        patch.setattr(ros, "_times", lambda points: None)
+        expected, _ = ros.read_trajectory(message)
+    monkeypatch.setattr(ros, "reals", None)
+    monkeypatch.setattr(ros, "seconds", lambda message, path, default=None: 0.0)  # of the header
+    found, _ = ros.read_trajectory(message)
+    for what in ("times", "positions", "velocities"):
+        np.testing.assert_array_equal(getattr(found, what), getattr(expected, what))
+    assert found.accelerations is None
+
+
+@pytest.mark.parametrize("value", ["1", None, [1.0], float("nan"), 10**400])
+def test_a_point_that_is_none(value):
+    """A value that is no number is named, in positions and in times."""
+    point = {"positions": [0.0], "time_from_start": {"sec": 1}}
+    for wrong in ({"positions": [value]}, {"time_from_start": {"sec": value}}):
+        if wrong.get("time_from_start") == {"sec": None}:
+            continue  # left out: it is zero, as in ROS
+        with pytest.raises((MessageError, InvalidInputError)):
+            ros.read_trajectory({"joint_names": ["a"], "points": [point | wrong]})

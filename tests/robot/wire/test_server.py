@@ -198,7 +198,7 @@ def test_loopback_by_default(serve):
     """Only programs of this machine can connect unless asked otherwise."""
     server = serve()
     assert server.url == f"ws://127.0.0.1:{server.port}"
-    assert {own.getsockname()[0] for own in server._bridge.listening} == {"127.0.0.1"}
+    assert {own[0] for own in server._bridge.addresses} == {"127.0.0.1"}
 
 
 def test_closing(serve, join, plain):

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
-import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
-from nuno.errors import MessageError, MissingPackageError
+from nuno.errors import MessageError, MissingPackageError, NotConnectedError
 from nuno.robot.wire.bridge_client import Client, Subscription
-from nuno.robot.wire.link import Link
 from nuno.robot.wire.outbox import KEPT, KEPT_MOST
 from nuno.robot.wire.protocol import FROM_CLIENTS, Message, decode, encode
-from nuno.robot.wire.sockets import Sockets
 
 logger = logging.getLogger(__name__)
 
@@ -23,19 +20,22 @@ SUBSCRIPTIONS = 1000
 """So many topics one client may listen to: each is remembered, whether there is such a topic or not."""
 OPENING = 10.0
 """[s] Who connects has so long to ask for a websocket."""
+CLOSING = 1.0
+"""[s] That the other side has to answer when this one closes."""
+LOOK = 0.02
+"""[s] Between two looks at what waits for slow readers."""
 
 
 class Bridge:
-    """The server: it runs in a thread of its own from when it is made until ``close``.
+    """The server, in the event loop that it is opened in: that of the thread which also does what clients ask.
 
-    A program that would only wait for what clients send may watch the sockets itself meanwhile, by ``pump``: then no
-    thread has to be woken for a message.
+    So a message wakes one thread, and the answer is written to the socket by the same one.
 
     Args:
-        receive: Called with a client and each of its messages on topics (subscriptions too), services and actions, in
-            the thread that watches the sockets, so it must not take long; ``client.done()`` once that is dealt with.
-        left: Called likewise with each client that is no longer there.
-        host: The address to listen at.
+        receive: Awaited with a client and each of its messages on topics (subscriptions too), services and actions;
+            the next message of that client is read when it has returned.
+        left: Awaited likewise with each client that is no longer there.
+        host: The address to listen at; empty stands for all of this machine.
         port: [0, 65535]; 0 takes a free one.
         max_message: Size of the longest message that is read [bytes]; who sends a longer one is disconnected.
         alive: Who is silent for so long [s] is no longer there.
@@ -43,37 +43,53 @@ class Bridge:
 
     Raises:
         MissingPackageError: websockets is not installed.
-        NotConnectedError: the port is taken, or the address is not this machine's.
     """
 
     def __init__(
-        self, receive: Callable[[Client, Message], None], left: Callable[[Client], None], host: str, port: int,
-        max_message: int, alive: float, origins: Sequence[str] | None,
+        self, receive: Callable[[Client, Message], Awaitable[None]], left: Callable[[Client], Awaitable[None]],
+        host: str, port: int, max_message: int, alive: float, origins: Sequence[str] | None,
     ) -> None:  # fmt: skip
-        self._websockets = import_websockets("a robot's server")
+        import_websockets("a robot's server")
         self._receive, self._left = receive, left
-        self._max_message, self._alive, self._origins = max_message, alive, [None, *(origins or ())]
-        self._subscribers: dict[str, tuple[Client, ...]] = {}  # replaced, never changed: other threads read it
+        self.host, self.port = host, port
+        self._max_message, self._alive = max_message, alive
+        self._origins: list[Any] = [None, *(origins or ())]
+        self._subscribers: dict[str, dict[Client, Subscription]] = {}
         self._latched: dict[str, str] = {}
-        self._gathering: int | None = None  # the thread that sends several things at once
-        self._gathered: set[Client] = set()
-        self._sockets = Sockets(host, port, alive, self._welcome, self._take, self._leave)
-        self.host, self.port = host, int(self.listening[0].getsockname()[1])
-        self.pump, self.wake = self._sockets.pump, self._sockets.wake
+        self.clients: set[Client] = set()
+        self._thread: int | None = None
+
+    async def open(self) -> None:
+        """Begin to listen.
+
+        Raises:
+            NotConnectedError: the port is taken, or the address is not this machine's.
+        """
+        from websockets.asyncio.server import serve
+
+        self._loop, self._thread = asyncio.get_running_loop(), threading.get_ident()
+        try:
+            self._server = await serve(
+                self._stay, self.host or None, self.port, origins=self._origins, compression=None,
+                max_size=self._max_message, open_timeout=OPENING, close_timeout=CLOSING,
+                ping_interval=0.5 * self._alive, ping_timeout=0.5 * self._alive, logger=_quiet(),
+            )  # fmt: skip
+        except (OSError, UnicodeError) as error:
+            raise NotConnectedError(f"cannot listen at {self.host} port {self.port}: {error}") from error
+        self.port = int(self.addresses[0][1])
+        self._looking = asyncio.create_task(self._look())
+
+    async def close(self, reason: str = "") -> None:
+        """Disconnect all, saying why, and end."""
+        self._looking.cancel()
+        code = 1011 if reason else 1001  # an error of the server, or it goes away
+        self._server.close(code=code, reason=reason.encode()[:120].decode(errors="ignore"))
+        await self._server.wait_closed()
 
     @property
-    def listening(self) -> tuple[socket.socket, ...]:
-        """The sockets that it listens at."""
-        return self._sockets.listening
-
-    @property
-    def clients(self) -> frozenset[Client]:
-        """Those that are there."""
-        return frozenset(self._sockets.clients)
-
-    def close(self, reason: str = "") -> None:
-        """Disconnect all, saying why, and end; a second time does nothing."""
-        self._sockets.close(1011 if reason else 1001, reason)  # an error of the server, or it goes away
+    def addresses(self) -> list[Any]:
+        """Addresses and ports that it listens at."""
+        return [own.getsockname() for own in self._server.sockets]
 
     def has_subscribers(self, topic: str) -> bool:
         """Return whether anyone would get what is published."""
@@ -82,73 +98,75 @@ class Bridge:
     def publish(self, topic: str, message: Message, latched: bool = False) -> None:
         """Send a message to all that have subscribed to its topic; from any thread, without waiting.
 
+        It is made into text once, whoever gets it.
+
         Args:
             topic: Its name.
             message: The message's fields.
             latched: Whether those that subscribe later get it too.
         """
-        clients = self._subscribers.get(topic, ())
-        if not clients and not latched:
+        if topic not in self._subscribers and not latched:
             return
         text = encode({"op": "publish", "topic": topic, "msg": message})
         if latched:
             self._latched[topic] = text
+        if self._thread in (None, threading.get_ident()):
+            self._publish(topic, text)
+        else:
+            self._loop.call_soon_threadsafe(self._publish, topic, text)
+
+    # In the event loop
+
+    def _publish(self, topic: str, text: str) -> None:
         now = time.monotonic()
-        for client in clients:
-            wanted = client.subscriptions.get(topic)
-            if wanted is not None and now - wanted.sent >= wanted.interval:
+        for client, wanted in tuple(self._subscribers.get(topic, {}).items()):
+            if now - wanted.sent >= wanted.interval:
                 wanted.sent = now
-                client.link.add(text, topic, wanted.keep)
-                if self._gathering == threading.get_ident():
-                    self._gathered.add(client)
-                else:
-                    client.flush()
+                client.write(text, topic, wanted.keep)
 
-    @contextmanager
-    def together(self) -> Iterator[None]:
-        """Let what this thread publishes meanwhile go out at the end, or with what is no publication."""
-        self._gathering = threading.get_ident()
+    async def _look(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK)
+            for client in tuple(self.clients):
+                client.look()
+
+    async def _stay(self, connection: Any) -> None:
+        """Serve a client until it goes."""
+        from websockets.asyncio.server import broadcast
+        from websockets.exceptions import ConnectionClosed
+
+        client = Client(connection, broadcast)
+        self.clients.add(client)
+        logger.info("%s connected", client.name)
         try:
-            yield
+            while True:
+                await self._take(client, await connection.recv(decode=False))
+        except ConnectionClosed as end:
+            logger.info("%s left: %s", client.name, end)
         finally:
-            self._gathering = None
-            for client in self._gathered:
-                client.flush()
-            self._gathered.clear()
+            self.clients.discard(client)
+            for topic in list(client.subscriptions):
+                self._unsubscribe(client, topic)
+            await self._left(client)
 
-    # In the thread that watches the sockets
-
-    def _welcome(self, own: socket.socket, name: str) -> Client:
-        protocol = self._websockets.ServerProtocol(origins=self._origins, max_size=self._max_message)
-        return Client(Link(own, protocol, self._alive, OPENING), name, self._sockets.call)
-
-    def _leave(self, client: Client) -> None:
-        for topic in list(client.subscriptions):
-            self._unsubscribe(client, topic)
-        self._left(client)
-
-    def _take(self, client: Client, data: bytes) -> None:
+    async def _take(self, client: Client, data: bytes) -> None:
         try:
             message = decode(data, FROM_CLIENTS)
             op, topic = message["op"], message.get("topic", "")
             if op == "subscribe":
                 self._subscribe(client, message)
-                self._pass_on(client, message)  # the newcomer gets what there is
+                await self._receive(client, message)  # the newcomer gets what there is
             elif op == "unsubscribe":
                 if topic not in client.subscriptions:
                     raise MessageError(f"not subscribed to {topic!r}", message.get("id"))
                 self._unsubscribe(client, topic, message.get("id"))
             elif op not in ("unadvertise", "set_level"):  # nothing follows from these
-                self._pass_on(client, message)
+                await self._receive(client, message)
         except MessageError as error:
             client.complain(str(error), error.identity)
         except Exception:  # the others must go on
             logger.exception("a message of %s could not be dealt with", client.name)
-            client.link.close(1011, "the server failed")
-
-    def _pass_on(self, client: Client, message: Message) -> None:
-        client.begin()
-        self._receive(client, message)
+            await client.connection.close(1011, "the server failed")
 
     def _subscribe(self, client: Client, message: Message) -> None:
         topic = message["topic"]
@@ -161,11 +179,9 @@ class Bridge:
         wanted.ids.add(message.get("id"))
         wanted.interval = max(0.0, 0.001 * (message.get("throttle_rate") or 0.0))
         wanted.keep = min(message.get("queue_length") or KEPT, KEPT_MOST)
-        if client not in self._subscribers.get(topic, ()):
-            self._subscribers = self._subscribers | {topic: (*self._subscribers.get(topic, ()), client)}
+        self._subscribers.setdefault(topic, {})[client] = wanted
         if topic in self._latched:
-            client.link.add(self._latched[topic])
-            client.flush()
+            client.write(self._latched[topic])
 
     def _unsubscribe(self, client: Client, topic: str, identity: str | int | None = None) -> None:
         wanted = client.subscriptions[topic]
@@ -173,28 +189,26 @@ class Bridge:
         if identity is not None and wanted.ids:
             return
         del client.subscriptions[topic]
-        others = tuple(other for other in self._subscribers[topic] if other is not client)
-        self._subscribers = {name: own for name, own in self._subscribers.items() if name != topic}
-        if others:
-            self._subscribers |= {topic: others}
+        del self._subscribers[topic][client]
+        if not self._subscribers[topic]:
+            del self._subscribers[topic]
 
 
 def import_websockets(purpose: str) -> Any:
-    """Return what is used of websockets, as one namespace.
+    """Return the module websockets.
 
     Raises:
         MissingPackageError: it is not installed.
     """
     try:
-        from types import SimpleNamespace
-
-        from websockets.client import ClientProtocol
-        from websockets.exceptions import WebSocketException
-        from websockets.server import ServerProtocol
-        from websockets.uri import parse_uri
+        import websockets
     except ImportError as error:
         raise MissingPackageError("websockets", "wire", purpose) from error
-    return SimpleNamespace(
-        ClientProtocol=ClientProtocol, ServerProtocol=ServerProtocol, WebSocketException=WebSocketException,
-        parse_uri=parse_uri,
-    )  # fmt: skip
+    return websockets
+
+
+def _quiet() -> logging.Logger:
+    """Return a log of the websockets package that says of a bad client what the bridge says of others, not more."""
+    own = logging.getLogger(f"{__name__}.websockets")
+    own.setLevel(logging.CRITICAL)
+    return own

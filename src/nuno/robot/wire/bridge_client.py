@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
-from collections import deque
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from nuno.robot.wire.link import Link
-from nuno.robot.wire.outbox import KEPT
+from nuno.robot.wire.outbox import KEPT, Outbox
 from nuno.robot.wire.protocol import Message, encode
 
 logger = logging.getLogger(__name__)
 
-UNANSWERED = 64
-"""So many commands of one client may wait for the robot; before the next is read, one of them has to be done."""
 TOLD = 20
 """So many of what one client does wrong the log warns of; nobody is to fill disks."""
+AHEAD = 2**15
+"""[bytes] That are handed to the system before it has taken them; what comes after that waits in the outbox."""
+CONTROL = 2**16
+"""[bytes] Of pongs that wait for a client that asks for them without end and reads none."""
 
 
 @dataclass(eq=False)
@@ -40,39 +42,60 @@ class Subscription:
 class Client:
     """One that has connected.
 
+    What is sent goes to the socket at once, in the thread of the event loop. What a slow reader has not taken waits
+    here, bounded, until ``look`` finds room.
+
     Args:
-        link: To it.
-        name: What it is called: its address.
-        call: Called with it, from any thread, when whoever watches the sockets is to see to it.
+        connection: To it, of the websockets package.
+        broadcast: That package's function that writes to connections without waiting.
     """
 
-    def __init__(self, link: Link, name: str, call: Callable[[Client], None]) -> None:
-        self.link, self.name = link, name
+    def __init__(self, connection: Any, broadcast: Callable[[Any, str], None]) -> None:
+        self.connection, self._broadcast = connection, broadcast
+        address = connection.remote_address or ("unknown",)
+        self.name = ":".join(str(part) for part in address[:2])
         self.subscriptions: dict[str, Subscription] = {}
-        self.unread: deque[bytes] = deque()  # that came with what was read, while too many commands wait
-        self.watched = 0  # for what a selector watches its socket
-        self._call = call
+        self.outbox = Outbox()
+        self._loop, self._thread = asyncio.get_running_loop(), threading.get_ident()
+        self._largest = 0  # message that was written [bytes]
         self._complaints = 0
-        self._begun = self._done = 0  # each counted in one thread only
 
     def __repr__(self) -> str:
         return f"<Client {self.name}>"
 
-    @property
-    def has_room(self) -> bool:
-        """Return whether another command of its may wait."""
-        return self._begun - self._done < UNANSWERED
-
     def send(self, message: Message) -> None:
         """Send a message that may not be lost; from any thread."""
-        self.link.add(encode(message))
-        self.flush()
+        text = encode(message)
+        if threading.get_ident() == self._thread:
+            self.write(text)
+        else:
+            self._loop.call_soon_threadsafe(self.write, text)
 
-    def flush(self) -> None:
-        """Send what waits, as far as the client reads."""
-        self.link.flush()
-        if self.link.wants_room or self.link.is_over:
-            self._call(self)
+    def write(self, text: str, topic: str | None = None, keep: int = KEPT) -> None:
+        """Send a text now, or let it wait where the client reads slowly; in the thread of the event loop.
+
+        Args:
+            text: What is sent.
+            topic: Of a publication: then only ``keep`` of one topic wait.
+            keep: How many.
+        """
+        if not self.outbox and self._waiting() < AHEAD:
+            self._write(text)
+        elif not self.outbox.add(text, topic, keep):
+            self.abort("it reads too slowly")
+
+    def look(self) -> None:
+        """Send what waits, as far as the client reads; give up one that takes nothing."""
+        while self.outbox and self._waiting() < AHEAD:
+            self._write(self.outbox.pop())
+        if self._waiting() > AHEAD + self._largest + CONTROL:
+            self.abort("it reads too slowly")
+
+    def abort(self, reason: str) -> None:
+        """End the connection without a word to the client."""
+        logger.warning("%s is disconnected: %s", self.name, reason)
+        self.outbox.clear()
+        self.connection.transport.abort()
 
     def answer(self, request: Message, values: Any, good: bool = True) -> None:
         """Answer the call of a service; what went wrong, where it did, is a text."""
@@ -85,16 +108,13 @@ class Client:
         logger.log(logging.WARNING if self._complaints <= TOLD else logging.DEBUG, "%s: %s", self.name, text)
         self.send({"op": "status", "level": "error", "msg": text} | told({"id": identity}))
 
-    def begin(self) -> None:
-        """Count a command that is passed on; in the thread that watches the sockets."""
-        self._begun += 1
+    def _waiting(self) -> int:
+        size: int = self.connection.transport.get_write_buffer_size()
+        return size
 
-    def done(self) -> None:
-        """Count a command as done; in the thread that they are passed to."""
-        had_room = self.has_room
-        self._done += 1
-        if not had_room:
-            self._call(self)
+    def _write(self, text: str) -> None:
+        self._largest = max(self._largest, len(text))
+        self._broadcast((self.connection,), text)
 
 
 def told(message: Message) -> Message:

@@ -12,10 +12,12 @@ from nuno.errors import RobotModelError
 from nuno.robot.interface import WRENCHES, RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.readings import JointState
+from nuno.robot.wire import image_messages as images
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.names import Names
 from nuno.robot.wire.protocol import EXECUTING
+from nuno.robot.wire.transforms import camera_frame, link_transforms
 
 logger = logging.getLogger(__name__)
 
@@ -32,13 +34,19 @@ class Broadcast:
         bridge: Where it is published.
         names: Of the topics.
         controllers: Of the robot.
+        image_rate: Images a second of the robot's time, of every camera that somebody looks through.
     """
 
-    def __init__(self, robot: RobotInterface, bridge: Bridge, names: Names, controllers: list[Controller]) -> None:
+    def __init__(
+        self, robot: RobotInterface, bridge: Bridge, names: Names, controllers: list[Controller], image_rate: float,
+    ) -> None:  # fmt: skip
         self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
         self._busy: dict[str, bool] = {}
+        self._image_interval = 1.0 / image_rate
         self._wrenches = [frame for frame in WRENCHES.values() if self._has(robot.read_wrench, frame)]
         self._has_imu = self._has(robot.read_imu)
+        self._cameras = robot.shown_cameras
+        self._shown: dict[str, float] = {}  # by topic, when an image was last published [s]
         self._base_link = robot.robot.model.frames[2].name  # after the universe and the free joint
         urdf = robot.robot.description.urdf.read_text(encoding="utf-8")
         bridge.publish(names.full(names.description), {"data": urdf}, latched=True)
@@ -55,19 +63,31 @@ class Broadcast:
             found[own.state_of(controller)] = ros.CONTROLLER_STATE
             found[own.status_of(controller)] = ros.STATUS
         found |= {own.full(own.wrench, frame=frame): ros.WRENCH for frame in self._wrenches}
+        found[own.full(own.transforms)] = ros.TRANSFORMS
+        for camera in self._cameras:
+            found[own.full(own.image, camera=camera)] = images.IMAGE
+            found[own.full(own.compressed, camera=camera)] = images.COMPRESSED_IMAGE
+            found[own.full(own.depth, camera=camera)] = images.IMAGE
+            found[own.full(own.camera_info, camera=camera)] = images.CAMERA_INFO
         return found | ({own.full(own.imu): ros.IMU} if self._has_imu else {})
 
-    def publish(self) -> None:
-        """Publish everything as it is now."""
+    def publish(self, asked: str | None = None) -> None:
+        """Publish everything as it is now, images where they are due.
+
+        Args:
+            asked: A topic that is due as somebody has just subscribed to it.
+        """
         own, time = self.names, self.robot.now()
+        self._publish_images(time, asked)
+        self._send(own.transforms, lambda: {"transforms": link_transforms(self.robot, time)})
         self._send(own.clock, lambda: {"clock": ros.time_fields(time)})
         state = self.robot.read_joint_state()
         if state is not None:
             self._send(own.joint_states, lambda: ros.joint_state_fields(state))
         self._send(own.odometry, lambda: self._odometry(time))
-        asked = [c for c in self.controllers if self.bridge.has_subscribers(own.state_of(c))]
-        reference = self.robot.read_reference() if asked else None
-        for controller in asked:
+        watched = [c for c in self.controllers if self.bridge.has_subscribers(own.state_of(c))]
+        reference = self.robot.read_reference() if watched else None
+        for controller in watched:
             fields = motion_fields(controller["joint_names"], reference, state, time)
             self.bridge.publish(own.state_of(controller), fields)
         for frame in self._wrenches:
@@ -84,6 +104,31 @@ class Broadcast:
                 info = {"goal_id": {"uuid": list(uuid.uuid4().bytes)}, "stamp": ros.time_fields(self.robot.now())}
                 goals = [{"goal_info": info, "status": EXECUTING}] if busy else []
                 self.bridge.publish(self.names.status_of(controller), {"status_list": goals}, latched=True)
+
+    def _publish_images(self, time: float, asked: str | None) -> None:
+        own = self.names
+        for camera in self._cameras:
+            frame, topics = camera_frame(camera), [
+                own.full(name, camera=camera) for name in (own.image, own.compressed, own.depth, own.camera_info)
+            ]  # fmt: skip
+            due = [self.bridge.has_subscribers(topic) and (topic == asked or self._is_due(topic, time))
+                   for topic in topics]  # fmt: skip
+            self._shown |= {topic: time for topic, now in zip(topics, due, strict=True) if now}
+            if due[0] or due[1]:
+                reading = self.robot.read_image(camera)
+                if due[0]:
+                    self.bridge.publish(topics[0], images.image_fields(reading, frame))
+                if due[1]:
+                    self.bridge.publish(topics[1], images.compressed_fields(reading, frame))
+            if due[2]:
+                self.bridge.publish(topics[2], images.image_fields(self.robot.read_depth(camera), frame))
+            if due[3]:
+                fields = images.camera_info_fields(time, self.robot.camera_info(camera), frame)
+                self.bridge.publish(topics[3], fields)
+
+    def _is_due(self, topic: str, time: float) -> bool:
+        last = self._shown.get(topic)
+        return last is None or not last <= time < last + self._image_interval - 1e-9  # time may go back
 
     def _send(self, name: str, fields: Callable[[], Fields]) -> None:
         topic = self.names.full(name)

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from nuno.errors import NunoError, RefusedError, RobotModelError, RobotTimeoutError
-from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
+from nuno.camera.camera import Camera
+from nuno.errors import RefusedError, RobotTimeoutError
+from nuno.robot.base_interface import BASE
+from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.humanoid import Humanoid
-from nuno.robot.interface import BASE, RobotInterface
+from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
-from nuno.robot.readings import ImuReading, JointState
+from nuno.robot.readings import ImageReading, ImuReading, JointState
 from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.wire import image_messages as images
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.clock import WireClock
-from nuno.robot.wire.connection import Connection, SentGoal
+from nuno.robot.wire.connection import Connection
 from nuno.robot.wire.names import ADVANCE, GO_VELOCITY, Names
-from nuno.robot.wire.protocol import ABORTED, CANCELED, EXECUTING, SUCCEEDED
+from nuno.robot.wire.newest import Newest
+from nuno.robot.wire.protocol import EXECUTING
 from nuno.robot.wire.velocity import VelocityStream
+from nuno.robot.wire.wire_goals import WireGoals
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
 
@@ -30,8 +34,6 @@ logger = logging.getLogger(__name__)
 
 Fields = dict[str, Any]
 
-LOOK = 0.05
-"""[s] Of real time, after which a waiting program looks even if nothing came."""
 STEP, STEP_TIMEOUT = 1.0, 300.0
 """[s] The longest piece that a simulation is asked to go on by, and the real time that this may take."""
 
@@ -66,22 +68,20 @@ class WireRobot(RobotInterface):
         names: Names | None = None, timeout: float = 5.0, alive: float = 20.0, controller_timeout: float | None = 3.0,
     ) -> None:  # fmt: skip
         self.names, self._controllers = names or Names(), controllers
-        self._news = threading.Condition()
-        self._count = 0  # of all that came
         self._state: JointState | None = None
         self._told: dict[str, float] = {}  # by joint, when a state last told of it [s]
-        self._latest: dict[str, Any] = {}  # by topic
         self._status: dict[str, bool] = {}  # by controller
-        self._sent: dict[str, tuple[Goal, SentGoal]] = {}  # by controller, and "base"
         self._stream: VelocityStream | None = None
-        self._known: dict[str, list[str] | None] = {}  # what there is; None where that is not told
         self._has_odometry: bool | None = None
+        self._pixels: dict[str, Fields | None] = {}  # by camera, what is published of it
         model = Humanoid(robot) if isinstance(robot, str) else robot
         self.connection = Connection(url, timeout=timeout, alive=alive)
+        self._newest = Newest(self.connection)
+        self._goals = WireGoals(self._newest)
         try:
-            self._clock = WireClock(self.connection, self.names, self._tell)
+            self._clock = WireClock(self.connection, self.names, self._newest.tell)
             self.connection.subscribe(self.names.full(self.names.joint_states), ros.JOINT_STATE, self._take_state)
-            if not self._wait(lambda: self._state is not None, timeout):
+            if not self._newest.wait(lambda: self._state is not None, timeout):
                 topic = self.names.full(self.names.joint_states)
                 raise RobotTimeoutError(f"{url} sent no {topic} within {timeout:g} s")
             super().__init__(
@@ -140,7 +140,7 @@ class WireRobot(RobotInterface):
         end = None if not timeout else self.now() + timeout
         moved, last = time.monotonic(), self.now()
         while True:
-            count, now = self._count, self.now()
+            count, now = self._newest.count, self.now()
             if condition():
                 self.connection.check()  # a goal that is lost has ended too
                 return True
@@ -149,8 +149,7 @@ class WireRobot(RobotInterface):
             if self._clock.is_stepped:
                 self.sleep(self._clock.tick)
                 continue
-            with self._news:
-                self._news.wait_for(lambda count=count: self._count != count, LOOK)  # type: ignore[misc]
+            self._newest.wait_for_news(count)
             if now != last:
                 moved, last = time.monotonic(), now
             elif time.monotonic() - moved > self.connection.timeout:
@@ -173,7 +172,7 @@ class WireRobot(RobotInterface):
         """Return whether the robot has a controller, once that is known or ``controller_timeout`` has passed."""
         action = self.names.full(controller["controller_action"])
         begin = time.monotonic()
-        while not self._is_there("action_servers", action):
+        while not self._newest.is_there("action_servers", action):
             if self.controller_timeout is not None and time.monotonic() - begin > self.controller_timeout:
                 return False
             time.sleep(0.1)
@@ -186,7 +185,7 @@ class WireRobot(RobotInterface):
 
     def read_reference(self) -> JointState | None:
         """Return where the controllers want the joints now, None until all of them have told."""
-        parts = [self._peek(self.names.state_of(own.controller), ros.CONTROLLER_STATE, _read_reference)
+        parts = [self._newest.peek(self.names.state_of(own.controller), ros.CONTROLLER_STATE, _read_reference)
                  for own in self.controller_actions]  # fmt: skip
         if not parts or any(part is None for part in parts):
             return None
@@ -211,7 +210,7 @@ class WireRobot(RobotInterface):
         """Let a controller give up what it does; its goal ends as preempted, and the joints hold where they are."""
         self.connection.check()
         name = controller["controller_type"]
-        if self._cancel(name) or not self._status.get(name):
+        if self._goals.cancel(name) or not self._status.get(name):
             return
         service = f"{self.names.full(controller['controller_action'])}/_action/cancel_goal"
         try:  # another program's goal: an id of zeros stands for all
@@ -223,8 +222,7 @@ class WireRobot(RobotInterface):
         """Return whether a controller follows a goal, whoever sent it."""
         self.connection.check()
         name = controller["controller_type"]
-        goal, _ = self._sent.get(name, (None, None))
-        return self._status.get(name, False) or (goal is not None and not goal.is_done)
+        return self._status.get(name, False) or self._goals.is_under_way(name)
 
     # Base and hands
 
@@ -235,12 +233,12 @@ class WireRobot(RobotInterface):
             RobotTimeoutError: the robot has odometry, and nothing came of it.
         """
         topic = self.names.full(self.names.odometry)
-        told = self._peek(topic, ros.ODOMETRY, lambda m: ros.read_coordinates(ros.field(m, "pose.pose")))
-        if told is None and self._has_odometry is None:
-            self._has_odometry = topic in (self._listed("topics", topic) or ())
-            if self._has_odometry and not self._wait(lambda: self._latest[topic] is not None, self.connection.timeout):
-                raise RobotTimeoutError(f"nothing came on {topic} within {self.connection.timeout:g} s")
-        return self._latest[topic] or Coordinates(*self.robot._pose())
+        if self._has_odometry is None:
+            self._has_odometry = topic in (self._newest.listed("topics", topic) or ())
+        if not self._has_odometry:
+            return self._newest.peek(topic, ros.ODOMETRY, _read_odometry) or Coordinates(*self.robot._pose())
+        place: Coordinates = self._newest.read(topic, ros.ODOMETRY, _read_odometry)
+        return place
 
     def send_base(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool) -> Goal:
         """Let the robot go to a place seen from where it is, and return the goal at once; see ``RobotInterface``.
@@ -258,7 +256,9 @@ class WireRobot(RobotInterface):
         if self._stream is not None:
             self._stream.cancel(rest=False)
         topic = self.names.full(self.names.velocity)
-        self._stream = VelocityStream(self.connection, self._clock, topic, twist, seconds, stop, goal, self._tell)
+        self._stream = VelocityStream(
+            self.connection, self._clock, topic, twist, seconds, stop, goal, self._newest.tell
+        )
         return goal
 
     def cancel_base(self) -> None:
@@ -266,7 +266,7 @@ class WireRobot(RobotInterface):
         self.connection.check()
         if self._stream is not None:
             self._stream.cancel()
-        self._cancel("base", wait=False)
+        self._goals.cancel("base", wait=False)
 
     def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
         """Let a hand open or close, and return the goal at once; see ``RobotInterface.send_gripper``."""
@@ -285,7 +285,9 @@ class WireRobot(RobotInterface):
             RobotModelError: the robot publishes no such forces.
             RobotTimeoutError: nothing came.
         """
-        return self._read(self.names.wrench.format(frame=frame), ros.WRENCH, ros.read_wrench)
+        topic = self.names.full(self.names.wrench, frame=frame)
+        force, torque = self._newest.read(topic, ros.WRENCH, ros.read_wrench)
+        return force, torque
 
     def read_imu(self) -> ImuReading:
         """Return what the inertial measurement unit tells.
@@ -294,7 +296,40 @@ class WireRobot(RobotInterface):
             RobotModelError: the robot publishes nothing of it.
             RobotTimeoutError: nothing came.
         """
-        return self._read(self.names.imu, ros.IMU, ros.read_imu)
+        reading: ImuReading = self._newest.read(self.names.full(self.names.imu), ros.IMU, ros.read_imu)
+        return reading
+
+    @property
+    def shown_cameras(self) -> tuple[str, ...]:
+        """The cameras that the robot publishes images of; all where it does not tell."""
+        topics = {name: self.names.full(self.names.compressed, camera=name) for name in self.camera_names}
+        return tuple(name for name, topic in topics.items() if self._newest.is_there("topics", topic))
+
+    def read_image(self, camera: str) -> ImageReading:
+        """Return the first image of a camera that comes from now on; see ``CameraInterface``.
+
+        It is asked for compressed; nothing comes of a camera that nobody looks through. The camera's pixels are those
+        that the robot publishes, where it does; where it is, the model tells.
+        """
+        topic = self.names.full(self.names.compressed, camera=self._known_camera(camera))
+        time, image = self._newest.take(topic, images.COMPRESSED_IMAGE, images.read_compressed)
+        return ImageReading(time, self.camera_info(camera), image)
+
+    def read_depth(self, camera: str) -> ImageReading:
+        """Return the first depth image of a camera that comes from now on; see ``CameraInterface``."""
+        topic = self.names.full(self.names.depth, camera=self._known_camera(camera))
+        time, image = self._newest.take(topic, images.IMAGE, images.read_image)
+        return ImageReading(time, self.camera_info(camera), image)
+
+    def camera_info(self, camera: str = "head") -> Camera:
+        """Return a camera: its pixels as the robot publishes them, else by the description, where it is now."""
+        own = super().camera_info(camera)
+        topic = self.names.full(self.names.camera_info, camera=camera)
+        if camera not in self._pixels:  # they do not change
+            known = topic in (self._newest.listed("topics", topic) or ())
+            self._pixels[camera] = self._newest.take(topic, images.CAMERA_INFO, dict) if known else None
+        told = self._pixels[camera]
+        return own if told is None else images.read_camera_info(told, own)
 
     # Inside
 
@@ -311,27 +346,7 @@ class WireRobot(RobotInterface):
             # as old as the oldest joint in it: who waits for a fresh state waits for all topics
             state = JointState(min(self._told[name] for name in names), names, *joined)
         self._state = state
-        self._tell()
-
-    def _tell(self) -> None:
-        """Wake those that wait."""
-        with self._news:
-            self._count += 1
-            self._news.notify_all()
-
-    def _wait(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Wait until a condition holds, up to ``timeout`` [s] of real time, and return whether it does."""
-        end = time.monotonic() + timeout
-        while not condition():
-            self.connection.check()
-            count, left = self._count, end - time.monotonic()
-            if left <= 0.0:
-                return condition()
-            if condition():
-                return True
-            with self._news:
-                self._news.wait_for(lambda count=count: self._count != count, min(left, LOOK))  # type: ignore[misc]
-        return True
+        self._newest.tell()
 
     def _watch(self, controller: Controller) -> None:
         name = controller["controller_type"]
@@ -339,99 +354,12 @@ class WireRobot(RobotInterface):
         def take(fields: Fields) -> None:
             goals = ros.field(fields, "status_list", list, default=[])
             self._status[name] = any(ros.field(goal, "status", int, default=0) <= EXECUTING + 1 for goal in goals)
-            self._tell()
+            self._newest.tell()
 
         self.connection.subscribe(self.names.status_of(controller), ros.STATUS, take)
 
     def _send_goal(self, who: str, goal: Goal, action: str, kind: str, fields: Fields) -> Goal:
-        accepted = threading.Event()
-
-        def feedback(values: Fields) -> None:
-            goal.feedback = values
-            accepted.set()
-            self._tell()
-
-        def done(sent: SentGoal) -> None:
-            _finish(goal, sent)
-            self._tell()
-
-        sent = self.connection.send_goal(action, kind, fields, feedback)
-        self._sent[who] = goal, sent
-        if not goal.is_done:
-            goal.status = GoalStatus.ACTIVE
-        sent.when_done(done)
-        if self._clock.is_nuno:
-            self._wait(lambda: accepted.is_set() or goal.is_done, self.connection.timeout)
-        return goal
-
-    def _cancel(self, who: str, wait: bool = True) -> bool:
-        """Cancel what was sent from here; returns whether anything was under way."""
-        goal, sent = self._sent.get(who, (None, None))
-        if goal is None or sent is None or goal.is_done:
-            return False
-        sent.cancel()
-        if wait:
-            self._wait(lambda: goal.is_done, self.connection.timeout)
-        return True
-
-    def _is_there(self, what: str, name: str) -> bool:
-        """Return whether the robot has an action or a topic; true where it does not tell."""
-        known = self._listed(what, name)
-        return known is None or name in known
-
-    def _listed(self, what: str, name: str) -> list[str] | None:
-        """Return the robot's actions or topics, None where untold; asked for again if a name is not among them."""
-        if what not in self._known or name not in (self._known[what] or (name,)):
-            try:
-                answer = self.connection.call(f"/rosapi/{what}", "", {})
-                self._known[what] = [str(own) for own in ros.field(answer, what, list, default=[])]
-            except (RefusedError, RobotTimeoutError) as error:
-                logger.warning("it cannot be known which %s there are: %s", what.replace("_", " "), error)
-                self._known[what] = None
-        return self._known[what]
-
-    def _peek(self, topic: str, kind: str, read: Callable[[Fields], Any]) -> Any:
-        """Return what was last heard on a topic, None before that; it is subscribed to when it is first asked for."""
-        self.connection.check()
-        if topic not in self._latest:
-            self._latest[topic] = None
-
-            def take(fields: Fields) -> None:
-                self._latest[topic] = read(fields)
-                self._tell()
-
-            self.connection.subscribe(topic, kind, take)
-        return self._latest[topic]
-
-    def _read(self, name: str, kind: str, read: Callable[[Fields], Any]) -> Any:
-        topic = self.names.full(name)
-        if self._latest.get(topic) is None:
-            if not self._is_there("topics", topic):
-                raise RobotModelError(f"{self.connection.url} has no topic {topic!r}")
-            self._peek(topic, kind, read)
-            if not self._wait(lambda: self._latest[topic] is not None, self.connection.timeout):
-                raise RobotTimeoutError(f"nothing came on {topic} within {self.connection.timeout:g} s")
-        return self._peek(topic, kind, read)
-
-
-def _finish(goal: Goal, sent: SentGoal) -> None:
-    """Let a goal end as its result says."""
-    try:
-        status, values, accepted = sent.result(0.0)
-    except NunoError as error:
-        goal.finish(GoalStatus.LOST, text=str(error))
-        return
-    fields = values if isinstance(values, Mapping) else {}
-    code = fields.get("error_code")
-    text = str(fields.get("error_string") or fields.get("error_msg") or ("" if fields else values or ""))
-    code = code if isinstance(code, int) else None
-    ends = {SUCCEEDED: GoalStatus.SUCCEEDED, CANCELED: GoalStatus.PREEMPTED, ABORTED: GoalStatus.ABORTED}
-    if not accepted:
-        goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_GOAL if code is None else code, text)
-    elif status == SUCCEEDED and fields.get("reached_goal") is False:
-        goal.finish(GoalStatus.ABORTED, code, "the hand was stopped")
-    else:
-        goal.finish(ends.get(status, GoalStatus.LOST), code, text)
+        return self._goals.send(who, goal, action, kind, fields, self._clock.is_nuno)
 
 
 def _read_reference(fields: Fields) -> JointState:
@@ -441,3 +369,7 @@ def _read_reference(fields: Fields) -> JointState:
     positions = np.array(ros.field(fields, path, list), dtype=float)
     still = np.zeros(len(joints))
     return JointState(ros.seconds(fields, "header.stamp", 0.0), joints, positions, still, still)
+
+
+def _read_odometry(fields: Fields) -> Coordinates:
+    return ros.read_coordinates(ros.field(fields, "pose.pose"))

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import MessageError, NunoError
+from nuno.robot.base_interface import BASE
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
-from nuno.robot.interface import BASE, RobotInterface
+from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge_client import Client, told
 from nuno.robot.wire.broadcast import Broadcast, motion_fields
 from nuno.robot.wire.names import GO_VELOCITY, Names
 from nuno.robot.wire.protocol import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, Message
+from nuno.robot.wire.rosapi import RosApi
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose, invert
 
@@ -36,7 +38,7 @@ TOLD = {
 FEEDBACK_INTERVAL = 0.05
 """[s] Between two feedbacks of a goal."""
 DRIVE = 1.0
-"""[s] A velocity holds so long, unless another comes; the same again prolongs it."""
+"""[s] A velocity holds so long, unless another comes."""
 
 
 @dataclass(eq=False)
@@ -81,7 +83,7 @@ class Commands:
     ) -> None:  # fmt: skip
         self.robot, self.broadcast, self.names = robot, broadcast, names
         self._running: list[Running] = []
-        self._drive: tuple[Client, tuple[float, float, float], Goal, float] | None = None
+        self._drive: tuple[Client, Goal] | None = None
         self._actions: dict[str, Callable[[Fields], Started]] = {
             names.full(names.navigate): self._navigate,
             GO_VELOCITY: self._go_velocity,
@@ -89,10 +91,6 @@ class Commands:
         self._joints: dict[str, list[str]] = {}
         self._further = dict(services)
         self._services: dict[str, Callable[[Fields], Fields]] = {
-            "/rosapi/get_time": lambda _: {"time": ros.time_fields(robot.now())},
-            "/rosapi/topics": lambda _: {"topics": list(broadcast.topics), "types": list(broadcast.topics.values())},
-            "/rosapi/services": lambda _: {"services": [*self._services, *self._further]},
-            "/rosapi/action_servers": lambda _: {"action_servers": list(self._actions)},
             "/controller_manager/list_controllers": lambda _: {"controller": _listed(controllers)},
         }
         for controller in controllers:
@@ -100,14 +98,20 @@ class Commands:
             self._joints[action] = controller["joint_names"]
             self._actions[action] = partial(self._follow, controller)
             self._services[f"{action}/_action/cancel_goal"] = partial(self._cancel_all, controller)
+        self._streams = {names.trajectory_of(controller): controller for controller in controllers}
+        self._followed: dict[str, tuple[Client, Goal]] = {}  # by topic
+        taken = {names.full(names.velocity): ros.TWIST} | dict.fromkeys(self._streams, ros.TRAJECTORY)
+        self._taken = taken
         for hand in robot.robot.description.hands:
             self._actions[names.full(names.gripper, hand=hand)] = partial(self._grip, hand)
+        rosapi = RosApi(robot, broadcast.topics, taken, self._service_names, self._actions.keys)
+        self._services |= rosapi.services
 
     def handle(self, client: Client, message: Message) -> None:
         """Do what a message asks; what cannot be done is answered, and changes nothing."""
         try:
             {
-                "subscribe": lambda *_: self.broadcast.publish(), "advertise": self._advertise,
+                "subscribe": lambda _, own: self.broadcast.publish(own["topic"]), "advertise": self._advertise,
                 "publish": self._publish, "call_service": self._call, "send_action_goal": self._send,
                 "cancel_action_goal": self._cancel,
             }[message["op"]](client, message)  # fmt: skip
@@ -140,12 +144,19 @@ class Commands:
             if not own.goal.is_done:
                 logger.warning("%s is gone; %s is stopped", client.name, own.action)
                 own.cancel()
+        for topic, (whose, goal) in list(self._followed.items()):
+            if whose is client:
+                del self._followed[topic]
+                if not goal.is_done:
+                    logger.warning("%s is gone; what it sent to %s is stopped", client.name, topic)
+                    self.robot.cancel_trajectories(self._streams[topic])
         if self._drive is not None and self._drive[0] is client:
             self._stop_driving()
 
     def stop(self) -> None:
         """End what all clients have asked for."""
-        for client in {own.client for own in self._running} | ({self._drive[0]} if self._drive else set()):
+        drivers = {client for client, _ in self._followed.values()} | ({self._drive[0]} if self._drive else set())
+        for client in {own.client for own in self._running} | drivers:
             self.leave(client)
 
     # Goals
@@ -241,41 +252,53 @@ class Commands:
 
     def _advertise(self, client: Client, message: Message) -> None:
         topic, kind = message["topic"], message["type"]
-        if topic == self.names.full(self.names.velocity) and kind not in (ros.TWIST, "geometry_msgs/Twist"):
-            raise MessageError(f"{topic} takes {ros.TWIST}, not {kind}")
+        wanted = self._taken.get(topic)
+        if wanted is not None and kind not in (wanted, wanted.replace("/msg/", "/")):
+            raise MessageError(f"{topic} takes {wanted}, not {kind}")
 
     def _publish(self, client: Client, message: Message) -> None:
         topic = message["topic"]
+        if topic in self._streams:
+            self._follow_topic(client, topic, message["msg"])
+            return
         if topic != self.names.full(self.names.velocity):
-            raise MessageError(f"nobody listens to {topic!r}, only to {self.names.full(self.names.velocity)!r}")
-        velocity, now = ros.read_twist(message["msg"]), self.robot.now()
+            raise MessageError(f"nobody listens to {topic!r}, only to: {', '.join(sorted(self._taken))}")
+        velocity = ros.read_twist(message["msg"])
         if not any(velocity):
             self._stop_driving()
             return
-        if self._drive is not None:
-            _, present, goal, end = self._drive
-            if velocity == present and not goal.is_done and end - now > 0.5 * DRIVE:
-                return
-        x, y, yaw = (DRIVE * value for value in velocity)
-        goal = self.robot.send_base(x, y, yaw, DRIVE, True)
-        self._drive = (client, velocity, goal, now + DRIVE)
+        goal = self.robot.send_velocity(*velocity, DRIVE)
+        self._drive = (client, goal)
         if goal.is_done and not goal.succeeded:
             raise MessageError(f"the robot cannot go so: {goal.text}")
 
+    def _follow_topic(self, client: Client, topic: str, fields: Fields) -> None:
+        """Send a trajectory that came on a controller's topic: nobody is told of its end, but of a refusal."""
+        controller = self._streams[topic]
+        trajectory, start = ros.read_trajectory(fields)
+        delay = 0.0 if start is None else max(0.0, start - self.robot.now())
+        goal = self.robot.send_trajectory(controller, trajectory, delay, None)
+        if goal.status == GoalStatus.REJECTED:
+            raise MessageError(f"the trajectory was refused: {goal.text}")
+        self._followed[topic] = client, goal
+
     def _stop_driving(self) -> None:
-        if self._drive is not None and not self._drive[2].is_done:
+        if self._drive is not None and not self._drive[1].is_done:
             self.robot.cancel_base()
         self._drive = None
 
+    def _service_names(self) -> list[str]:
+        return [*self._services, *self._further]
+
     def _call(self, client: Client, message: Message) -> None:
-        service = message["service"]
+        service = "/" + message["service"].lstrip("/")  # roslibjs asks for "rosapi/topics"
         if service in self._further:
             self._further[service](client, message)
         elif service in self._services:
             fields = ros.field(message, "args", (Mapping, list), default={})  # ROS 1 has lists, empty ones in effect
             client.answer(message, self._services[service](fields))
         else:
-            known = ", ".join(sorted([*self._services, *self._further]))
+            known = ", ".join(sorted(self._service_names()))
             raise MessageError(f"no service {service!r}; there are: {known}")
 
     def _refuse(self, client: Client, message: Message, text: str, error: Exception) -> None:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
-import selectors
-import socket
-import ssl
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -22,8 +18,6 @@ from nuno.errors import (
     RobotTimeoutError,
 )
 from nuno.robot.wire.bridge import import_websockets
-from nuno.robot.wire.link import Link
-from nuno.robot.wire.nudge import Nudge
 from nuno.robot.wire.protocol import FROM_SERVERS, UNKNOWN, Message, decode, encode
 from nuno.validation import number
 
@@ -31,8 +25,8 @@ logger = logging.getLogger(__name__)
 
 Fields = dict[str, Any]
 
-LOOK = 0.25
-"""[s] Between two looks at whether the other side is still there, at most."""
+CLOSING = 1.0
+"""[s] That the other side has to answer when this one closes."""
 
 
 class SentGoal:
@@ -107,11 +101,9 @@ class Connection:
         self._lost: ConnectionLostError | None = None
         self._closing = False
         self._lock = threading.Lock()  # of the tables above, against a connection that is lost meanwhile
-        self._link, self._nudge = self._connect(), Nudge()
-        ready: Future[None] = Future()
-        self._thread = threading.Thread(target=self._stay, args=(ready,), name="nuno-wire", daemon=True)
+        self._socket = self._connect()
+        self._thread = threading.Thread(target=self._stay, name="nuno-wire", daemon=True)
         self._thread.start()
-        ready.result()
 
     def __enter__(self) -> Connection:
         return self
@@ -136,8 +128,7 @@ class Connection:
     def close(self) -> None:
         """Disconnect; a second time does nothing."""
         self._closing = True
-        self._link.close(1000, "")
-        self._nudge.give()
+        self._socket.close()
         if threading.current_thread() is not self._thread:
             self._thread.join()
 
@@ -157,6 +148,17 @@ class Connection:
         if is_first:
             # One message in the queue: a state that is out of date is of no use
             self.send({"op": "subscribe", "topic": topic, "type": kind, "queue_length": 1})
+
+    def unsubscribe(self, topic: str, call: Callable[[Fields], None]) -> None:
+        """Let ``call`` have no more of a topic."""
+        with self._lock:
+            calls = self._heard.get(topic, [])
+            if call not in calls:
+                return
+            calls.remove(call)
+            is_last = not calls
+        if is_last:
+            self.send({"op": "unsubscribe", "topic": topic})
 
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
         """Publish a message on a topic."""
@@ -241,60 +243,44 @@ class Connection:
             ConnectionLostError: there is no connection any more.
         """
         self.check()
-        self._link.add(encode(message))
-        self._link.flush()
-        if self._link.wants_room:
-            self._nudge.give()
-
-    def _connect(self) -> Link:
-        """Return a link that has asked the other side for a websocket."""
         try:
-            uri = self._websockets.parse_uri(self.url)
-            own = socket.create_connection((uri.host, uri.port), self.timeout)
-            try:
-                if uri.secure:
-                    own = ssl.create_default_context().wrap_socket(own, server_hostname=uri.host)
-                protocol = self._websockets.ClientProtocol(uri, max_size=self._max_message)
-                link = Link(own, protocol, self._alive, self.timeout)
-            except BaseException:
-                own.close()
-                raise
-        except (OSError, ValueError, self._websockets.WebSocketException) as error:
+            self._socket.send(encode(message))
+        except self._websockets.ConnectionClosed as end:
+            raise ConnectionLostError(f"the connection to {self.url} is lost: {self._reason(end)}") from end
+
+    def _connect(self) -> Any:
+        from websockets.sync.client import connect
+
+        try:
+            return connect(
+                self.url, open_timeout=self.timeout, close_timeout=CLOSING, compression=None, proxy=None,
+                max_size=self._max_message, ping_interval=0.5 * self._alive, ping_timeout=0.5 * self._alive,
+            )  # fmt: skip
+        except (OSError, ValueError, EOFError, self._websockets.WebSocketException) as error:
             reason = f"no answer within {self.timeout:g} s" if isinstance(error, TimeoutError) else error
             raise NotConnectedError(f"cannot connect to {self.url}: {reason}") from error
-        link.greet()
-        return link
+
+    def _reason(self, end: Any) -> str:
+        """Return why a connection was closed."""
+        if self._closing:
+            return "it was closed here"
+        if end.rcvd is not None:
+            return f"the other side closed it, code {end.rcvd.code}{end.rcvd.reason and ', '}{end.rcvd.reason}"
+        if end.sent is not None:
+            return f"given up, code {end.sent.code}, {end.sent.reason}"
+        return "the other side went away without a word"
 
     # In the connection's thread
 
-    def _stay(self, ready: Future[None]) -> None:
-        reason, link = "this side failed", self._link
+    def _stay(self) -> None:
+        reason = "this side failed"
         try:
-            with selectors.DefaultSelector() as selector:
-                selector.register(self._nudge, selectors.EVENT_READ)
-                selector.register(link, selectors.EVENT_READ)
-                watched = selectors.EVENT_READ
-                while not link.is_over:
-                    wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if link.wants_room else 0)
-                    if wanted != watched:
-                        selector.modify(link, wanted)
-                        watched = wanted
-                    for key, _ in selector.select(min(LOOK, self._alive / 8)):
-                        if key.fileobj is self._nudge:
-                            self._nudge.take()
-                    link.flush()
-                    for data in link.read():
-                        self._hear(data)
-                    link.look(time.monotonic())
-                    if link.is_open and not ready.done():
-                        ready.set_result(None)
-            reason = "it was closed here" if self._closing else link.end
+            while True:
+                self._hear(self._socket.recv(decode=False))
+        except self._websockets.ConnectionClosed as end:
+            reason = self._reason(end)
         finally:  # whatever happened, nobody is to wait for ever
             self._lose(reason)
-            if not ready.done():
-                ready.set_exception(NotConnectedError(f"cannot connect to {self.url}: {reason}"))
-            link.shut()
-            self._nudge.close()
 
     def _hear(self, data: bytes) -> None:
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -23,6 +24,8 @@ CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
 STATUS = "action_msgs/msg/GoalStatusArray"
 IMU = "sensor_msgs/msg/Imu"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
+TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TWIST = "geometry_msgs/msg/Twist"
 ODOMETRY = "nav_msgs/msg/Odometry"
 STRING = "std_msgs/msg/String"
@@ -32,6 +35,8 @@ NAVIGATE = "nav2_msgs/action/NavigateToPose"
 ADVANCE = "nuno_msgs/srv/Advance"
 GO_VELOCITY = "nuno_msgs/action/GoVelocity"
 
+NUMBERS = (float, int)
+"""Types of numbers in JSON; bool is another."""
 LARGEST = 2.0**31 - 1.0  # [s] what the wire has 32 bits for
 
 
@@ -183,16 +188,16 @@ def trajectory_fields(trajectory: JointTrajectory, start: float | None = None) -
         trajectory: It.
         start: When it begins [s] of the robot's clock; None is when it arrives, which is a stamp of zero.
     """
+    nothing: list[list[float]] = [[]] * len(trajectory.times)
+    tables = [nothing if own is None else own.tolist()
+              for own in (trajectory.positions, trajectory.velocities, trajectory.accelerations)]  # fmt: skip
     points = [
         {
-            "positions": trajectory.positions[k].tolist(),
-            "velocities": [] if trajectory.velocities is None else trajectory.velocities[k].tolist(),
-            "accelerations": [] if trajectory.accelerations is None else trajectory.accelerations[k].tolist(),
-            "effort": [],
-            "time_from_start": time_fields(float(time)),
+            "positions": positions, "velocities": velocities, "accelerations": accelerations, "effort": [],
+            "time_from_start": time_fields(time),
         }
-        for k, time in enumerate(trajectory.times)
-    ]
+        for time, positions, velocities, accelerations in zip(trajectory.times.tolist(), *tables, strict=True)
+    ]  # fmt: skip
     return {"header": header_fields(start or 0.0), "joint_names": list(trajectory.names), "points": points}
 
 
@@ -206,24 +211,60 @@ def read_trajectory(message: Fields) -> tuple[JointTrajectory, float | None]:
     joints, points = names(message, "joint_names"), field(message, "points", list)
     if not points:
         raise MessageError("a trajectory needs at least one point")
-    given = {
-        what: [reals(point, what) for point in points] for what in ("positions", "velocities", "accelerations")
-    }  # fmt: skip
-    tables: dict[str, np.ndarray | None] = {}
-    for what, rows in given.items():
-        missing = sum(len(row) == 0 for row in rows)
-        if missing == len(rows) and what != "positions":
-            tables[what] = None
-            continue
-        wrong = next((k for k, row in enumerate(rows) if len(row) != len(joints)), None)
-        if wrong is not None:
-            raise MessageError(f"point {wrong} has {len(rows[wrong])} {what} for {len(joints)} joints")
-        tables[what] = np.array(rows)
-    times = [seconds(point, "time_from_start", 0.0) for point in points]
+    tables = _tables(points, len(joints)) or {
+        what: _table(points, what, len(joints)) for what in ("positions", "velocities", "accelerations")
+    }
+    times = _times(points)
+    if times is None:
+        times = np.array([seconds(point, "time_from_start", 0.0) for point in points])
     start = seconds(message, "header.stamp", 0.0)
     positions = tables.pop("positions")
     assert positions is not None  # of the checks above
-    return JointTrajectory(joints, np.array(times), positions, **tables), start or None
+    return JointTrajectory(joints, times, positions, **tables), start or None
+
+
+def _tables(points: list[Any], width: int) -> dict[str, np.ndarray | None] | None:
+    """Return the numbers of all points at once, (k, width) float each; None where they must be looked at one by one."""
+    tables: dict[str, np.ndarray | None] = {}
+    try:
+        for what in ("positions", "velocities", "accelerations"):
+            rows = [point.get(what) or () for point in points]
+            if not any(rows) and what != "positions":
+                tables[what] = None
+            elif not all(type(value) in NUMBERS for value in itertools.chain.from_iterable(rows)):
+                return None
+            else:
+                tables[what] = np.array(rows, dtype=float)
+    except (AttributeError, TypeError, ValueError, OverflowError):
+        return None
+    fits = all(table is None or (table.shape == (len(points), width) and np.isfinite(table).all())
+               for table in tables.values())  # fmt: skip
+    return tables if fits else None
+
+
+def _table(points: list[Any], what: str, width: int) -> np.ndarray | None:
+    """Return what points say of one thing, (k, width) float; None where they say nothing. Raises by name."""
+    rows = [reals(point, what) for point in points]
+    if all(len(row) == 0 for row in rows) and what != "positions":
+        return None
+    wrong = next((k for k, row in enumerate(rows) if len(row) != width), None)
+    if wrong is not None:
+        raise MessageError(f"point {wrong} has {len(rows[wrong])} {what} for {width} joints")
+    return np.array(rows)
+
+
+def _times(points: list[Any]) -> np.ndarray | None:
+    """Return the times of all points at once, (k,) float [s]; None where they must be looked at one by one."""
+    try:
+        given = [point["time_from_start"] for point in points]
+        parts = [(time.get("sec", 0), time.get("nanosec", 0)) for time in given]
+        if not all(type(a) in NUMBERS and type(b) in NUMBERS for a, b in parts):
+            return None
+        whole, fraction = np.array(parts, dtype=float).T
+        times = whole + 1e-9 * fraction
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        return None
+    return times if np.isfinite(times).all() else None
 
 
 def follow_fields(

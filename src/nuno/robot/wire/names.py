@@ -30,6 +30,11 @@ class Names:
         wrench: Topics of forces; "{frame}" stands for the frame's role: "left_wrist" ...
         gripper: Actions of hands; "{hand}" stands for "left_hand" ...
         description: Topic of the URDF.
+        image: Topics of colour images; "{camera}" stands for the camera's name: "head" ...
+        compressed: Likewise, compressed.
+        depth: Likewise, of depth images.
+        camera_info: Likewise, of the cameras' pixels.
+        transforms: Topic of where all links are.
     """
 
     namespace: str = ""
@@ -42,6 +47,11 @@ class Names:
     wrench: str = "{frame}/wrench"
     gripper: str = "{hand}/gripper_cmd"
     description: str = "robot_description"
+    image: str = "{camera}/image_raw"
+    compressed: str = "{camera}/image_raw/compressed"
+    depth: str = "{camera}/depth/image_raw"
+    camera_info: str = "{camera}/camera_info"
+    transforms: str = "/tf"
 
     def state_of(self, controller: Mapping[str, Any]) -> str:
         """Return the topic on which a controller tells where its joints are to be, in full."""
@@ -50,6 +60,10 @@ class Names:
     def status_of(self, controller: Mapping[str, Any]) -> str:
         """Return the topic on which a controller tells whether it follows a goal, in full."""
         return self.full(f"{controller['controller_action']}/_action/status")
+
+    def trajectory_of(self, controller: Mapping[str, Any]) -> str:
+        """Return the topic on which a controller takes trajectories, in full."""
+        return self.full(f"{controller['controller_action'].rpartition('/')[0]}/joint_trajectory")
 
     def full(self, name: str, **parts: str) -> str:
         """Return a name in full, with its parts filled in: "/joint_states"."""

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import threading
 import time
-from collections import deque
+from concurrent.futures import Future
+from contextlib import suppress
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
 from nuno.robot.known_joints import TICK
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge import Bridge
-from nuno.robot.wire.bridge_client import UNANSWERED, Client
+from nuno.robot.wire.bridge_client import Client
 from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import ADVANCE, CLOCK_KIND, RUNNING, STEPPED, Names
@@ -28,6 +30,12 @@ OFTEN = 0.004
 """[s] Of real time, at least, between two publications of a simulation that runs faster than its ticks are long."""
 STALE = 0.5
 """[s] Of the robot's time, at most, between two publications."""
+ROUNDS = 3
+"""Of the event loop, that a message needs from the socket to its handler; so many pass before a tick that is due."""
+PATIENCE = 1e-3
+"""[s] Between two looks at whether a program has given the robot's lock back."""
+WAITS = 64
+"""So many times a client may wait for at once."""
 YIELD = 1e-5
 """[s] In which a program that wants the robot's lock gets its turn, though the simulation is late."""
 LATE = 0.25
@@ -59,6 +67,7 @@ class RobotServer:
         tick: Between two looks at the robot [s]; None takes the frames of the robot's world, else 0.01 s.
         origins: Web pages that may connect, as browsers name them ("http://localhost:8080"); by default none, for any
             page that somebody looks at on this machine could.
+        image_rate: Images a second of the robot's time, of every camera that a client looks through.
 
     Raises:
         MissingPackageError: websockets is not installed.
@@ -69,7 +78,7 @@ class RobotServer:
     def __init__(
         self, robot: RobotInterface, host: str = "127.0.0.1", port: int = 9090, *,
         real_time_factor: float | None = 1.0, names: Names | None = None, max_message: int = 2**23,
-        alive: float = 20.0, tick: float | None = None, origins: tuple[str, ...] = (),
+        alive: float = 20.0, tick: float | None = None, origins: tuple[str, ...] = (), image_rate: float = 10.0,
     ) -> None:  # fmt: skip
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
             raise InvalidInputError(f"port must be a whole number in [0, 65535], got {port!r}")
@@ -80,15 +89,10 @@ class RobotServer:
         self.tick = own if tick is None else number("tick", tick, above=0.0)
         self.robot, self.lock = robot, threading.RLock()
         self.error: Exception | None = None
-        self._inbox: deque[tuple[Client, Message | None] | None] = deque()
         self._waiting: list[tuple[Client, Message, float]] = []
         alive = number("alive", alive, above=0.0)
-        self._bridge = Bridge(self._receive, self._left, host, port, max_message, alive, origins)
-        try:
-            self._begin(names or Names())
-        except BaseException:
-            self._bridge.close()
-            raise
+        self._bridge = Bridge(self._deal, self._left, host, port, max_message, alive, origins)
+        self._begin(names or Names(), number("image_rate", image_rate, above=0.0))
 
     def __enter__(self) -> RobotServer:
         return self
@@ -117,10 +121,10 @@ class RobotServer:
 
     def close(self) -> None:
         """Stop what clients have asked for, disconnect them and end; a second time does nothing."""
-        self._inbox.append(None)
-        self._bridge.wake()
+        if self._thread.is_alive():
+            with suppress(RuntimeError):  # it has ended meanwhile
+                self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join()
-        self._bridge.close()
 
     def join(self, timeout: float | None = None) -> bool:
         """Wait until it has ended, up to ``timeout`` [s]; returns whether it has.
@@ -133,9 +137,9 @@ class RobotServer:
             raise self.error
         return not self._thread.is_alive()
 
-    def _begin(self, names: Names) -> None:
+    def _begin(self, names: Names, image_rate: float) -> None:
         controllers = [client.controller for client in self.robot.controller_actions]
-        self._broadcast = Broadcast(self.robot, self._bridge, names, controllers)
+        self._broadcast = Broadcast(self.robot, self._bridge, names, controllers, image_rate)
         is_stepped = self._factor is None
         self._next_tick = time.perf_counter()
         self._published = self._next_tick, self.robot.now()
@@ -145,71 +149,90 @@ class RobotServer:
         kind = {"kind": STEPPED if is_stepped else RUNNING, "tick": self.tick}
         self._bridge.publish(CLOCK_KIND, {"data": json.dumps(kind)}, latched=True)
         self._commands.settle()
-        self._thread = threading.Thread(target=self._run, name="nuno-server", daemon=True)
+        listening: Future[None] = Future()
+        self._thread = threading.Thread(target=self._run, args=(listening,), name="nuno-server", daemon=True)
         self._thread.start()
+        listening.result()
 
-    # In the thread that watches the bridge's sockets: most often the server's own
+    # In the server's own thread, which runs an event loop: clients are served between ticks
 
-    def _receive(self, client: Client, message: Message) -> None:
-        self._inbox.append((client, message))
-
-    def _left(self, client: Client) -> None:
-        self._inbox.append((client, None))
-
-    # In the server's own thread
-
-    def _run(self) -> None:
+    def _run(self, listening: Future[None]) -> None:
         try:
-            while self._listen():
-                with self.lock:
-                    self._tick()
-                if self._factor is not None and not self._commands.has_ended:  # a result comes after its last state
-                    self._catch_up()
-                with self.lock, self._bridge.together():
-                    self._tell()
-            with self.lock:
-                self._commands.stop()
+            asyncio.run(self._serve(listening))
         except Exception as error:
-            logger.exception("the robot's simulation failed")
             self.error = error
-            self._bridge.close(f"{type(error).__name__}: {error}")
+            if not listening.done():
+                self.error = None
+                listening.set_exception(error)
 
-    def _listen(self) -> bool:
-        """Deal with what has come, and then with what comes until the next tick is due; returns whether to go on."""
-        self._bridge.pump(0.0)
-        present = len(self._inbox)
+    async def _serve(self, listening: Future[None]) -> None:
+        self._loop, self._closing, self._asked = asyncio.get_running_loop(), asyncio.Event(), asyncio.Event()
+        await self._bridge.open()
+        listening.set_result(None)
+        closing, simulation = asyncio.create_task(self._closing.wait()), asyncio.create_task(self._simulate())
+        await asyncio.wait((closing, simulation), return_when=asyncio.FIRST_COMPLETED)
+        error = simulation.exception() if simulation.done() else None
+        for task in (closing, simulation):
+            task.cancel()
+        if error is not None:
+            logger.error("the robot's simulation failed", exc_info=error)
+            await self._bridge.close(f"{type(error).__name__}: {error}")
+            raise error
+        await self._take_lock()
+        try:
+            self._commands.stop()
+        finally:
+            self.lock.release()
+        await self._bridge.close()
+
+    async def _simulate(self) -> None:
+        """Let time pass, tick by tick."""
         while True:
-            left = self._due() - time.perf_counter()
-            if present <= 0 and left <= 0.0:
-                time.sleep(YIELD)
-                return True
-            if not self._inbox:
-                self._bridge.pump(left)
-                continue
-            present -= 1
-            got = self._inbox.popleft()
-            if got is None:
-                return False
-            self._deal(*got)
+            await self._until_due()
+            await self._take_lock()
+            try:
+                self._tick()
+                self._tell()
+            finally:
+                self.lock.release()
 
-    def _due(self) -> float:
-        """Return when the next tick is due [s] of ``time.perf_counter``; without anyone who waits, never."""
+    async def _until_due(self) -> None:
+        """Let clients be served until the next tick is due; without anyone who waits, it never is."""
         if self._factor is None:
-            return 0.0 if self._waiting else float("inf")
-        return self._next_tick
+            await self._asked.wait()
+        for _ in range(ROUNDS):
+            await asyncio.sleep(0.0)
+        if self._factor is not None and (left := self._next_tick - time.perf_counter()) > 0.0:
+            await asyncio.sleep(left)
+        else:
+            time.sleep(YIELD)
 
-    def _deal(self, client: Client, message: Message | None) -> None:
-        with self.lock, self._bridge.together():
-            if message is None:
-                self._waiting = [own for own in self._waiting if own[0] is not client]
-                self._commands.leave(client)
-            else:
-                self._commands.handle(client, message)
-                if self._factor is None and not self._waiting and message["op"] in CHANGES:
-                    self._broadcast.publish()  # no tick comes that would show it
+    async def _take_lock(self) -> None:
+        """Take the robot from a program that uses it; connections are kept meanwhile."""
+        while not self.lock.acquire(blocking=False):
+            await asyncio.sleep(PATIENCE)
+
+    async def _deal(self, client: Client, message: Message) -> None:
+        """Do what a client asks."""
+        await self._take_lock()
+        try:
+            self._commands.handle(client, message)
+            if self._factor is None and not self._waiting and message["op"] in CHANGES:
+                self._broadcast.publish()  # no tick comes that would show it
             self._commands.settle()
-            if message is not None:
-                client.done()
+        finally:
+            self.lock.release()
+
+    async def _left(self, client: Client) -> None:
+        await self._take_lock()
+        try:
+            self._waiting = [own for own in self._waiting if own[0] is not client]
+            if not self._waiting:
+                self._asked.clear()
+            self._commands.leave(client)
+            self._commands.settle()
+        finally:
+            self.lock.release()
 
     def _tick(self) -> None:
         if self._factor is None:
@@ -220,20 +243,10 @@ class RobotServer:
         if span > 0.0:
             self.robot.sleep(span)
 
-    def _catch_up(self) -> None:
-        """Deal with what has come meanwhile: nobody is to wait for all that is published as well."""
-        self._bridge.pump(0.0)
-        for _ in range(len(self._inbox)):
-            got = self._inbox[0]
-            if got is None:
-                return
-            self._inbox.popleft()
-            self._deal(*got)
-
     def _tell(self) -> None:
         now, wall = self.robot.now(), time.perf_counter()
         old = wall - self._published[0] >= OFTEN or now - self._published[1] >= STALE
-        if self._factor is None or old or self._commands.has_ended:
+        if self._factor is None or old or self._commands.has_ended:  # a result comes after its last state
             self._published = wall, now
             self._broadcast.publish()
         self._commands.settle()
@@ -241,12 +254,15 @@ class RobotServer:
             self._waiting.remove(own)
             client, message, _ = own
             client.answer(message, {"time": ros.time_fields(now)})
+        if not self._waiting:
+            self._asked.clear()
 
     def _wait(self, client: Client, message: Message) -> None:
         """Let time pass for a client, who gets an answer when it has."""
         span = ros.seconds(message.get("args"), "duration")
         if not 0.0 <= span <= LONGEST:
             raise MessageError(f"duration must lie in [0, {LONGEST:g}] s, got {span:g} s")
-        if sum(own is client for own, _, _ in self._waiting) >= UNANSWERED:
-            raise MessageError(f"a client may wait for {UNANSWERED} times at once, no more")
+        if sum(own is client for own, _, _ in self._waiting) >= WAITS:
+            raise MessageError(f"a client may wait for {WAITS} times at once, no more")
         self._waiting.append((client, message, self.robot.now() + span))
+        self._asked.set()
