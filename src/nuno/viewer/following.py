@@ -71,8 +71,8 @@ class Following:
         self._sent_time = self._idle_until = self._channels_due = 0.0
         self._channels: list[Channel] = []  # pages that no server is needed for, in notebooks
         self._look(wait=True)
-        heard = _weakly(self, "_hear") if control else None
-        self._server = Server(host, port, _weakly(self, "_everything", pack({"commands": []})), heard)
+        heard = weakly(self, "_hear") if control else None
+        self._server = Server(host, port, weakly(self, "_everything", pack({"commands": []})), heard)
         world._watchers.append(self)
         self._thread = threading.Thread(
             target=_follow, args=(weakref.ref(self), self._stop, self._interval), name="nuno-viewer", daemon=True
@@ -239,7 +239,7 @@ def _follow(reference: weakref.ref[Following], stop: threading.Event, interval: 
         cost += 0.2 * (time.thread_time() - begin - cost)
 
 
-def _weakly(viewer: Following, method: str, otherwise: Any = None) -> Callable[..., Any]:
+def weakly(viewer: Following, method: str, otherwise: Any = None) -> Callable[..., Any]:
     """Return a method of the viewer that does not keep it alive, and gives ``otherwise`` when it is gone."""
     reference = weakref.ref(viewer)
 

@@ -9,7 +9,7 @@ import sys
 import webbrowser
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,10 @@ from nuno.files.recording import Recording
 from nuno.shapes.coordinates import compose, invert
 from nuno.validation import finite_array, number
 from nuno.viewer.film import Film
+from nuno.viewer.following import weakly
 from nuno.viewer.marks import DrawnCamera, camera_pose
+from nuno.viewer.message import pack
+from nuno.viewer.notebook import NotebookChannel, has_widgets, in_notebook
 from nuno.viewer.orders import Orders
 from nuno.viewer.page_server import LOOPBACK
 from nuno.viewer.scene import Scene, checked_places
@@ -100,9 +103,19 @@ class Viewer(Orders):
         return f"<Viewer at {self.url}{'' if self.is_open else ', closed'}>"
 
     def _repr_html_(self) -> str:
-        if not self.is_open:
-            return html.escape(repr(self))
-        return f'<iframe src="{self.url}" style="width: 100%; height: 500px; border: none"></iframe>'
+        return self.still()._repr_html_() if self.is_open else html.escape(repr(self))
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+        """Show the live page in a notebook, through the kernel's own channel; without anywidget, a still scene."""
+        if not self.is_open or not has_widgets():
+            return {}
+        heard = weakly(self, "_hear") if self._can_control else None
+        channel = NotebookChannel(weakly(self, "_everything", pack({"commands": []})), heard)
+        with self._turn:
+            self._channels.append(channel)
+        found = channel.widget._repr_mimebundle_()
+        bundle: dict[str, Any] = found[0] if isinstance(found, tuple) else found or {}
+        return bundle
 
     def show(self, *, open: bool = True) -> Viewer:
         """Open the page in a browser, where there is one with a screen; the address is logged in any case.
@@ -118,7 +131,7 @@ class Viewer(Orders):
         """
         self._check_open()
         logger.info("the viewer of %r is at %s", self.world, self.url)
-        if open and _has_screen() and not _in_notebook():
+        if open and _has_screen() and not in_notebook():
             webbrowser.open(self.url, new=2)
         return self
 
@@ -275,9 +288,3 @@ class Viewer(Orders):
 
 def _has_screen() -> bool:
     return sys.platform in ("darwin", "win32") or bool({"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ))
-
-
-def _in_notebook() -> bool:
-    ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    return shell is not None and "IPKernelApp" in getattr(shell, "config", {})
