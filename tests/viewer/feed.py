@@ -9,7 +9,7 @@ import time
 import numpy as np
 from tornado.websocket import websocket_connect
 
-TYPES = {"f4": np.float32, "u2": np.uint16, "u4": np.uint32}
+TYPES = {"f4": np.float32, "u1": np.uint8, "u2": np.uint16, "u4": np.uint32}
 
 
 def unpack(message):
@@ -31,12 +31,15 @@ class Feed:
 
     Attributes:
         commands: All that came, in order.
-        things: What a page would now draw, by number: points and pose.
+        things: What a page would now draw, by number: points, pose and colours.
+        latest: The last command of each kind.
     """
 
     def __init__(self, viewer):
         self.url = viewer.url
         self.commands, self.things, self.is_closed = [], {}, False
+        self.latest = {}
+        self._socket = self._loop = None
         self._thread = threading.Thread(target=lambda: asyncio.run(self._read()), daemon=True)
         self._thread.start()
         self.wait_for(lambda: self.commands)
@@ -47,6 +50,10 @@ class Feed:
         while not condition():
             assert time.monotonic() < end, "it did not come true in time"
             time.sleep(0.01)
+
+    def say(self, do, **order):
+        """Send what a page would send."""
+        self._loop.call_soon_threadsafe(self._socket.write_message, json.dumps({"do": do, **order}))
 
     def paths(self):
         """Return the paths of all that would be drawn."""
@@ -59,6 +66,7 @@ class Feed:
 
     async def _read(self):
         socket = await websocket_connect(self.url.replace("http", "ws") + "feed", max_message_size=1 << 27)
+        self._socket, self._loop = socket, asyncio.get_running_loop()
         while True:
             message = await socket.read_message()
             if message is None:
@@ -66,6 +74,7 @@ class Feed:
                 return
             for command in unpack(message):
                 self._obey(command)
+                self.latest[command["do"]] = command
                 self.commands.append(command)
 
     def _obey(self, command):
@@ -82,3 +91,5 @@ class Feed:
                 self.things[number]["pose"] = pose
         elif do == "shift":
             self.things[command["id"]]["points"] = command["points"]
+        elif do == "tint":
+            self.things[command["id"]]["colors"] = command["colors"]

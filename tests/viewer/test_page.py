@@ -216,3 +216,51 @@ def test_a_recording_is_played_in_the_live_page(browser):
         browser.wait_for("document.getElementById('bar').hidden && nuno.things.size > 0")
         assert browser.evaluate(height) == pytest.approx(ball.position[2], abs=1e-6)
         assert isinstance(film, Film)
+
+
+@needs_chromium
+def test_the_page_controls_the_world(browser, tmp_path):
+    """Buttons step and reset; a click picks what is seen there, another button attaches it; its colours are seen."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.box((0.6, 0.6, 0.04), name="table", position=(0, 0, -0.02)))
+    towel = world.add(nuno.sheet((0.4, 0.4), cells=(8, 8), name="towel", position=(0, 0, 0.01)))
+    eye, target = np.array((0.5, -0.5, 0.7)), np.array((0.0, 0, 0))
+    browser.complaints.clear()
+    with Viewer(world) as viewer:
+        viewer.look_from(eye, target)
+        browser.open(viewer.url)
+        # a gray towel on a gray table: its border is a dark line, of one pixel in a ring of five
+        picture = browser.picture()
+        save_picture(picture, tmp_path / "gray.png")
+        ids = world.ids(camera_of(eye, target)).numpy()
+        mask = (ids == world.bodies.index(towel)).astype(np.uint8)
+        rim = cv2.morphologyEx(mask, cv2.MORPH_GRADIENT, np.ones((5, 5))) > 0
+        inner = cv2.erode(mask, np.ones((15, 15))) > 0
+        rim[:, :330] = inner[:, :330] = False  # the panel
+        grey = picture.mean(axis=2)
+        assert np.percentile(grey[rim], 10) < 0.75 * np.median(grey[inner])
+        for kind in ("mousePressed", "mouseReleased"):
+            browser.call(
+                "Input.dispatchMouseEvent", type=kind, x=WIDTH // 2, y=HEIGHT // 2, button="left", clickCount=1
+            )
+        browser.wait_for("document.getElementById('name').textContent === 'towel'")
+        browser.evaluate("document.getElementById('attach').click()")
+        browser.wait_for("document.getElementById('attach').textContent === 'Detach'")
+        assert towel.is_dynamic
+        browser.evaluate("document.getElementById('one').click()")
+        browser.wait_for("document.getElementById('clock').textContent === 't = 0.02 s'")
+        browser.evaluate("(e => { e.value = 'layer'; e.onchange({ target: e }); })(document.getElementById('color'))")
+        browser.evaluate("(e => { e.value = 'height'; e.onchange({ target: e }); })(document.getElementById('value'))")
+        browser.wait_for("document.querySelectorAll('#plots canvas').length === 1")
+        shown = "[...nuno.things.values()].find((t) => t.path[1] === 'towel')"
+        browser.wait_for(f"{shown}.skin.material.vertexColors")
+        picture = browser.picture()
+        save_picture(picture, tmp_path / "controls.png")
+        red, green, blue_ = picture[inner].astype(int).T
+        # nothing lies below it: viridis begins with a dark violet
+        assert np.median(blue_ - green) > 20 and np.median(red - green) > 10
+        browser.evaluate("document.getElementById('reset').click()")
+        browser.wait_for("document.getElementById('clock').textContent === 't = 0.00 s'")
+        assert not towel.is_dynamic
+        assert browser.complaints == []
+    browser.wait_for("!document.getElementById('notice').hidden")

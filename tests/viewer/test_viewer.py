@@ -16,7 +16,7 @@ from feed import Feed
 
 import nuno
 from nuno.viewer import Film, Viewer
-from nuno.viewer import viewer as viewer_module
+from nuno.viewer import following as following_module
 from nuno.viewer.scene import Scene
 
 
@@ -55,30 +55,35 @@ def test_all_bodies_are_sent_where_they_are():
         np.testing.assert_allclose(towel["points"].reshape(-1, 3), world.find("towel").vertices, atol=1e-7)
 
 
+def shown(feed):
+    """Return the commands that came but those that say whether the world runs, which is a matter of time."""
+    return [command for command in list(feed.commands) if command["do"] != "controls"]
+
+
 def test_only_what_moved_is_sent():
     """After a step: the towel's points, and of what stands still nothing."""
     world = make_world()
     with Viewer(world, frame_rate=1e-3) as viewer:  # looks only when it is told to
         feed = Feed(viewer)
         settled(world, viewer, feed)
-        seen = len(feed.commands)
+        seen = len(shown(feed))
         world.find("ball").translate((0, 0, 0.1))
         viewer.update()
-        feed.wait_for(lambda: len(feed.commands) >= seen + 2)
-        assert [command["do"] for command in feed.commands[seen:]] == ["place", "clock"]
-        assert feed.commands[seen]["ids"] == [feed.named("world", "ball")["id"]]
-        seen = len(feed.commands)
+        feed.wait_for(lambda: len(shown(feed)) >= seen + 2)
+        assert [command["do"] for command in shown(feed)[seen:]] == ["place", "clock"]
+        assert shown(feed)[seen]["ids"] == [feed.named("world", "ball")["id"]]
+        seen = len(shown(feed))
         world.step()
         viewer.update()
-        feed.wait_for(lambda: len(feed.commands) >= seen + 2)
-        assert [command["do"] for command in feed.commands[seen:]] == ["shift", "clock"]
+        feed.wait_for(lambda: len(shown(feed)) >= seen + 2)
+        assert [command["do"] for command in shown(feed)[seen:]] == ["shift", "clock"]
         np.testing.assert_allclose(
             feed.named("world", "towel")["points"].reshape(-1, 3), world.find("towel").vertices, atol=1e-7
         )
-        seen = len(feed.commands)
+        seen = len(shown(feed))
         viewer.update()
         time.sleep(0.1)
-        assert len(feed.commands) == seen, "nothing happened, nothing is sent"
+        assert len(shown(feed)) == seen, "nothing happened, nothing is sent"
 
 
 def test_bodies_come_and_go_while_it_looks():
@@ -106,7 +111,7 @@ def test_bodies_come_and_go_while_it_looks():
 
 def test_a_body_is_removed_again_and_again_while_it_looks(caplog, monkeypatch):
     """What is drawn may be gone at any time; nothing is logged as an error, and the rest is still followed."""
-    monkeypatch.setattr(viewer_module, "SHARE", 1.0)  # looks as often as it can
+    monkeypatch.setattr(following_module, "SHARE", 1.0)  # looks as often as it can
     world = make_world()
     with caplog.at_level(logging.WARNING), Viewer(world, frame_rate=500.0, contacts=True) as viewer:
         feed = Feed(viewer)
@@ -127,8 +132,8 @@ def test_a_body_is_removed_again_and_again_while_it_looks(caplog, monkeypatch):
 
 def test_viewing_changes_no_bit(monkeypatch):
     """A world that is looked at, with contacts, and filmed, moves as one that is not."""
-    monkeypatch.setattr(viewer_module, "SHARE", 1.0)  # looks as often as it can
-    monkeypatch.setattr(viewer_module, "IDLE", 0.0)  # though there is no page
+    monkeypatch.setattr(following_module, "SHARE", 1.0)  # looks as often as it can
+    monkeypatch.setattr(following_module, "IDLE", 0.0)  # though there is no page
     runs = []
     for looked_at in (False, True):
         world = make_world()
@@ -172,7 +177,7 @@ def test_a_stepped_world_is_followed():
 
 def test_it_looks_rarely_while_nobody_does(monkeypatch):
     """Without a page a world is looked at only now and then; a page that comes is shown all of it, and follows."""
-    monkeypatch.setattr(viewer_module, "IDLE", 1e6)
+    monkeypatch.setattr(following_module, "IDLE", 1e6)
     looks = []
     look = Scene.look
     monkeypatch.setattr(Scene, "look", lambda own, sparing=False: (looks.append(sparing), look(own, sparing))[1])
@@ -198,7 +203,7 @@ def test_it_takes_a_share_of_the_time_only(monkeypatch):
             pass
 
     looks = []
-    monkeypatch.setattr(viewer_module, "SHARE", 0.1)
+    monkeypatch.setattr(following_module, "SHARE", 0.1)
     with Viewer(nuno.World(device="cpu"), frame_rate=1000.0) as viewer:
         Feed(viewer)
         monkeypatch.setattr(Scene, "look", look)

@@ -11,11 +11,11 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.shapes.coordinates import Pose, apply, invert
 from nuno.shapes.shape import Plane, Shape
+from nuno.viewer.outline import CREASE, outline
 from nuno.viewer.scene_object import SceneObject, light_of
 from nuno.viewer.style import Style
+from nuno.viewer.vertex_values import vertex_layers, vertex_strains
 from nuno.world.drawing import draw
-
-CREASE = 35.0  # [deg] between faces, above which an edge of a solid is drawn sharp
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +58,15 @@ class BodyObjects:
         style: How it is drawn.
         places: The worlds that are looked at.
         visual_meshes: What is drawn in its place; None is its own shape.
+        edges: Whether surfaces are drawn with their outlines.
     """
 
     def __init__(
-        self, body: Body, style: Style, places: Sequence[Place], visual_meshes: Sequence[VisualMesh] | None = None
-    ) -> None:
-        self.body, self.style = body, style
+        self, body: Body, style: Style, places: Sequence[Place], visual_meshes: Sequence[VisualMesh] | None = None,
+        edges: bool = True,
+    ) -> None:  # fmt: skip
+        self.body, self.style, self._edges = body, style, edges
+        self._is_dressed = visual_meshes is not None
         self.is_rigid = _is_rigid(body)
         self._deformed, self._color = body._deformed, body.color
         self._raw: Any = None
@@ -71,10 +74,10 @@ class BodyObjects:
         if visual_meshes is None:
             shown = places[:1] if isinstance(body.shape, Plane) else places  # endless planes would lie in each other
             self.objects = [self._object(place) for place in shown]
-            self._indices = [place.index for place in shown]
+            self.indices = [place.index for place in shown]
         else:
             self.objects = [_dressed(visual_mesh, place, style) for place in places for visual_mesh in visual_meshes]
-            self._indices = [place.index for place in places for _ in visual_meshes]
+            self.indices = [place.index for place in places for _ in visual_meshes]
 
     def fits(self, style: Style) -> bool:
         """Return whether the body can still be shown by these scene objects."""
@@ -95,12 +98,30 @@ class BodyObjects:
     def poses(self) -> list[Pose]:
         """Return where the rigid body was at the last look, for each scene object."""
         place, turn = self._raw
-        return [(place[k] if place.ndim == 2 else place, turn[k] if turn.ndim == 2 else turn) for k in self._indices]
+        return [(place[k] if place.ndim == 2 else place, turn[k] if turn.ndim == 2 else turn) for k in self.indices]
 
     def shift(self) -> None:
         """Set the points of the scene objects of a body that deforms to those of the last look."""
-        for obj, k in zip(self.objects, self._indices, strict=True):
+        for obj, k in zip(self.objects, self.indices, strict=True):
             obj.shift(self.style.points(self.body, self._vertices(k)) + obj.offset)
+
+    def tint(self, values: np.ndarray | None = None) -> None:
+        """Colour the vertices by the style's quantity at the last look.
+
+        Args:
+            values: Those of the vertices, (worlds, n), where the quantity depends on more than their places.
+        """
+        quantity = self.style.color_by
+        if quantity is None or self._is_dressed:
+            return
+        for obj, k in zip(self.objects, self.indices, strict=True):
+            if values is not None:
+                own = values[k if len(values) > 1 else 0]
+            elif quantity == "strain":
+                own = vertex_strains(self.body, self._vertices(k))
+            else:
+                own = vertex_layers(self.body.shape.mesh()[1], self._vertices(k))
+            obj.tint(self.style.colors(self.body, own))
 
     def _read(self) -> None:
         if not self.is_rigid:
@@ -123,8 +144,13 @@ class BodyObjects:
             points = apply(invert(tuple(part[k] if part.ndim == 2 else part for part in turned)), points)  # type: ignore[arg-type]
         else:
             points = points + place.offset
-        edges = np.empty(0, np.uint32) if style.mode == "surface" else drawing.segments.astype(np.uint32).ravel()
         crease = 0.0 if style.mode == "tetrahedra" else None if body.shape.is_cloth else CREASE
+        if style.mode != "surface":
+            edges = drawing.segments.astype(np.uint32).ravel()
+        elif self._edges and not isinstance(body.shape, Plane):
+            edges = outline(points, drawing.triangles, crease)
+        else:
+            edges = np.empty(0, np.uint32)
         return SceneObject(
             (place.root, body.name), "mesh" if len(drawing.triangles) else "lines", points, offset=place.offset,
             color=light_of(body.color if style.color is None else style.color), opacity=style.opacity,

@@ -10,13 +10,16 @@ import numpy as np
 from nuno.viewer.scene_object import SceneObject
 
 
-def changes(left: Sequence[int], entered: Sequence[SceneObject], moved: Sequence[SceneObject]) -> list[dict[str, Any]]:
+def changes(
+    left: Sequence[int], entered: Sequence[SceneObject], moved: Sequence[SceneObject], recolored: Sequence[SceneObject]
+) -> list[dict[str, Any]]:
     """Return the commands that bring a page from the look before to this one.
 
     Args:
         left: The numbers of scene objects that are there no more.
         entered: Scene objects that are new.
         moved: Those that are elsewhere, or of another form.
+        recolored: Those whose points have other colours.
     """
     commands: list[dict[str, Any]] = []
     if left:
@@ -27,6 +30,11 @@ def changes(left: Sequence[int], entered: Sequence[SceneObject], moved: Sequence
         poses = np.array([obj.pose for obj in placed], np.float32).ravel()
         commands.append({"do": "place", "ids": [obj.number for obj in placed], "poses": poses})
     commands += [{"do": "shift", "id": obj.number, "points": obj.points.ravel()} for obj in moved if obj.pose is None]
+    none = np.empty(0, np.uint8)
+    commands += [
+        {"do": "tint", "id": obj.number, "colors": none if obj.colors is None else obj.colors.ravel()}
+        for obj in recolored
+    ]
     return commands
 
 

@@ -18,8 +18,8 @@ from nuno.files.export import check_extension, one_world
 from nuno.files.whole_file import replacing
 from nuno.mesh.primitives import PLANE_HALF
 from nuno.shapes.color import rgb
-from nuno.viewer.body_objects import CREASE
 from nuno.viewer.message import pack
+from nuno.viewer.outline import CREASE, outline
 from nuno.viewer.page import film_page
 from nuno.viewer.rigid_motion import rigid_motion
 from nuno.viewer.scene import Scene
@@ -45,6 +45,7 @@ class Track:
         frames: Those at which it had moved.
         poses: Where it was then, (7,) each; or, of one that deforms or of marks,
         points: its points then, (n, 3) each.
+        tints: Frames at which its points had other colours, with these.
     """
 
     obj: SceneObject
@@ -53,6 +54,11 @@ class Track:
     frames: list[int] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
     points: list[np.ndarray] = field(default_factory=list)
+    tints: list[tuple[int, np.ndarray | None]] = field(default_factory=list)
+
+    def tint(self, frame: int) -> None:
+        """Take the colours of the scene object's points in, from a frame on."""
+        self.tints.append((frame, self.obj.colors))
 
     def add(self, frame: int) -> None:
         """Take the scene object's present state in."""
@@ -69,6 +75,11 @@ class Track:
             "first": self.first, "last": self.last, "frames": np.array(self.frames, np.uint32),
             "path": obj.path, **{name: _short(value) for name, value in obj.shape.items()},
         }  # fmt: skip
+        if self.tints:
+            row["tints"] = {
+                "frames": np.array([frame for frame, _ in self.tints], np.uint32),
+                "colors": [np.empty(0, np.uint8) if colors is None else colors.ravel() for _, colors in self.tints],
+            }
         if self.poses:
             return row | {"poses": np.array(self.poses, np.float32).ravel(), **_packed(obj.points[None])}
         if obj.shape["kind"] in ("mesh", "lines"):
@@ -124,10 +135,11 @@ class Film:
             points = one_world(body.skin(), world, axis=1)
             local, poses = rigid_motion(points)
             plane = points.shape[1] == 4 and float(np.ptp(local, axis=0).max()) >= PLANE_HALF  # stands for all of it
+            crease = CREASE if poses is not None else None
+            lines = np.empty(0, np.uint32) if plane else outline(local, body.faces, crease)
             obj = SceneObject(
                 ("recording", body.name), "mesh", local, color=light_of(rgb(body.color)), opacity=1.0, endless=plane,
-                triangles=body.faces.astype(np.uint32).ravel(), lines=np.empty(0, np.uint32),
-                crease=CREASE if poses is not None else None,
+                triangles=body.faces.astype(np.uint32).ravel(), lines=lines, crease=crease,
             )  # fmt: skip
             track = Track(obj, 0)
             for frame in range(len(points)):
@@ -251,7 +263,7 @@ class Film:
         scene = scene or self._scene
         assert scene is not None
         scene.look()
-        left, entered, moved = scene.settle()
+        left, entered, moved, recolored = scene.settle()
         frame = len(self._times)
         self._times.append(scene.time)
         for number in left:
@@ -261,6 +273,8 @@ class Film:
             self._tracks[obj.number] = Track(obj, frame)
         for obj in [*entered, *moved]:
             self._tracks[obj.number].add(frame)
+        for obj in [*(obj for obj in entered if obj.colors is not None), *recolored]:
+            self._tracks[obj.number].tint(frame)
 
     def _view_of_all(self) -> View:
         corners = []

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.world.simulation import Simulation
 
-FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6], dtype=np.uint32)
-"""Edges of ``frustum``: from the pinhole to the corners, round the image, and a stroke where up is."""
+FRUSTUM = np.array([0, 1, 0, 2, 0, 3, 0, 4, 1, 2, 2, 3, 3, 4, 4, 1, 5, 6, 7, 8, 9, 10, 11, 12], dtype=np.uint32)
+"""Edges of ``frustum``: from the pinhole to the corners, round the image, a stroke where up is, and the axes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +63,42 @@ def contact_arrows(world: Simulation, scale: float, indices: list[int]) -> list[
     return [np.concatenate(row) if row else np.empty((0, 3)) for row in rows]
 
 
+def grip_arrows(world: Simulation, scale: float, indices: list[int]) -> list[np.ndarray]:
+    """Return the forces that grips bear, of some worlds: (2 k, 3) float [m] each, from the mean of the held points.
+
+    Args:
+        world: The world.
+        scale: Length [m/N].
+        indices: Which worlds.
+    """
+    rows: list[list[np.ndarray]] = [[] for _ in indices]
+    for dynamics in world._attached():
+        for grip in dynamics.grips:
+            force = world._wrench(grip)[0]
+            for row, index in zip(rows, indices, strict=True):
+                held = held_points(grip, index)
+                if len(held):
+                    middle = held.mean(axis=0)
+                    row.append(np.stack([middle, middle + scale * force[index]]))
+    return [np.concatenate(row) if row else np.empty((0, 3)) for row in rows]
+
+
 def frustum(camera: Camera, depth: float) -> np.ndarray:
-    """Return the corners of a camera's frustum in its own frame, (7, 3) float [m]; see ``FRUSTUM``."""
+    """Return the corners of a camera's frustum and axes in its own frame, (13, 3) float [m]; see ``FRUSTUM``."""
     w, h = camera.width - 0.5, camera.height - 0.5
     pixels = np.array([(-0.5, -0.5), (w, -0.5), (w, h), (-0.5, h)])
     rays = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
     corners = depth * np.column_stack([rays, np.ones(4)])
     middle = corners[:2].mean(axis=0)
     up = middle + 0.3 * (middle - corners[2:].mean(axis=0))
-    return np.vstack([np.zeros(3), corners, middle, up])
+    axes = np.insert(0.4 * depth * np.eye(3), [0, 1, 2], 0.0, axis=0)  # from the pinhole along x, y and z
+    return np.vstack([np.zeros(3), corners, middle, up, axes])
+
+
+def frustum_colors() -> np.ndarray:
+    """Return the colours of ``frustum``, (13, 3) uint8: x is red, y green, z blue, as everywhere in robotics."""
+    axes = np.repeat([(214, 39, 40), (44, 160, 44), (31, 90, 230)], 2, axis=0)
+    return np.vstack([np.tile((31, 79, 160), (7, 1)), axes]).astype(np.uint8)
 
 
 def camera_pose(camera: Camera) -> Pose:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-TYPES = {"float32": "f4", "uint16": "u2", "uint32": "u4"}
+TYPES = {"float32": "f4", "uint8": "u1", "uint16": "u2", "uint32": "u4"}
 
 
 def pack(content: Any) -> bytes:
     """Return a message: the header's length (uint32), the header, then each array on a multiple of four bytes.
 
     Args:
-        content: Dictionaries, lists, numbers and strings, with arrays of float32, uint16 or uint32 anywhere in them.
+        content: Dictionaries, lists, numbers and strings, anywhere in them arrays of float32, uint8, uint16 or uint32.
     """
     blobs: list[bytes] = []
     place = 0

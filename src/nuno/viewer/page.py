@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from nuno.errors import MissingPackageError
 
 HERE = FilePath(__file__).parent
+SCRIPTS = ("stage.js", "things.js", "film.js", "controls.js", "page.js")  # each uses those before it
 
 
 def live_page() -> str:
@@ -26,11 +27,14 @@ def film_page(film: bytes, title: str) -> str:
         film: As ``Film.message`` returns it.
         title: The page's title.
     """
-    folder = _meshcat()
-    notices = "\n".join((folder / name).read_text() for name in ("dist/main.min.js.LICENSE.txt", "LICENSE"))
-    library = f"<!--\n{notices.replace('--', '- -')}\n-->\n<script>\n{mesh_viewer()}\n</script>"
     packed = base64.b64encode(gzip.compress(film, 9)).decode()
-    return _page(title, library, f'<script type="application/octet-stream" id="film">{packed}</script>')
+    data = f'<script type="application/octet-stream" id="film">{packed}</script>'
+    return _page(title, _library(), data)
+
+
+def channel_page() -> str:
+    """Return a page that needs nothing else, and gets its messages from the window that it is in."""
+    return _page("Nuno", _library(), '<script type="application/octet-stream" id="channel"></script>')
 
 
 @cache
@@ -39,9 +43,16 @@ def mesh_viewer() -> str:
     return (_meshcat() / "dist/main.min.js").read_text(encoding="utf-8")
 
 
+def _library() -> str:
+    folder = _meshcat()
+    notices = "\n".join((folder / name).read_text() for name in ("dist/main.min.js.LICENSE.txt", "LICENSE"))
+    return f"<!--\n{notices.replace('--', '- -')}\n-->\n<script>\n{mesh_viewer()}\n</script>"
+
+
 def _page(title: str, library: str, data: str) -> str:
     frame = (HERE / "page.html").read_text(encoding="utf-8")
-    script = f"<script>\n{(HERE / 'page.js').read_text(encoding='utf-8')}\n</script>"
+    parts = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    script = f'<script>\n"use strict";\n(function () {{\n{parts}}})();\n</script>'
     for name, text in (("title", html.escape(title)), ("library", library), ("data", data), ("script", script)):
         frame = frame.replace(f"<!--{name}-->", text, 1)
     return frame

@@ -36,15 +36,19 @@ class Server:
         host: Which of this machine's addresses it listens on.
         port: The port; None is the first that is free from 7000 on.
         everything: Returns the message that brings a new page up to date; called on the server's thread.
+        heard: Called on the server's thread with each message of a page; None lets pages say nothing.
 
     Raises:
         ViewerError: the port is taken, or the address is none of this machine's.
         MissingPackageError: meshcat is not installed.
     """
 
-    def __init__(self, host: str, port: int | None, everything: Callable[[], bytes]) -> None:
+    def __init__(
+        self, host: str, port: int | None, everything: Callable[[], bytes],
+        heard: Callable[[str], None] | None = None,
+    ) -> None:  # fmt: skip
         mesh_viewer()  # read now: a page that asks for it could not be told that it is missing
-        self._everything = everything
+        self._everything, self._heard = everything, heard
         self._clients: set[_Socket] = set()
         self._sockets, self.port = _bound(host, port)
         self.url = f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
@@ -103,8 +107,11 @@ class Server:
         routes: list[Any] = [
             (r"/", _Page, {"allowed": self._allowed, "content": live_page, "kind": "text/html"}),
             (r"/meshcat.js", _Page, {"allowed": self._allowed, "content": mesh_viewer, "kind": "text/javascript"}),
-            (r"/feed", _Socket, {"allowed": self._allowed, "clients": self._clients, "everything": self._everything}),
-        ]
+            (r"/feed", _Socket, {
+                "allowed": self._allowed, "clients": self._clients, "everything": self._everything,
+                "heard": self._heard,
+            }),
+        ]  # fmt: skip
         server = tornado.httpserver.HTTPServer(tornado.web.Application(routes, log_function=_log))
         server.add_sockets(self._sockets)
         self._loop.call_soon(self._ready.set)
@@ -152,6 +159,7 @@ class _Socket(_Local, tornado.websocket.WebSocketHandler):
 
     clients: set[_Socket]
     everything: Callable[[], bytes]
+    heard: Callable[[str], None] | None
 
     def open(self, *args: str, **kwargs: str) -> None:
         self._waiting: deque[bytes] = deque()
@@ -160,7 +168,9 @@ class _Socket(_Local, tornado.websocket.WebSocketHandler):
         self.offer(self.everything())
 
     def on_message(self, message: str | bytes) -> None:
-        """Pages have nothing to say."""
+        """Hand on what a page says, where pages may say anything."""
+        if self.heard is not None and isinstance(message, str):
+            self.heard(message)
 
     def on_close(self) -> None:
         self.clients.discard(self)

@@ -14,18 +14,33 @@ from nuno.shapes.coordinates import Pose
 from nuno.shapes.shape import Plane
 from nuno.validation import count, number
 from nuno.viewer.body_objects import BodyObjects, Place
-from nuno.viewer.marks import FRUSTUM, DrawnCamera, all_held_points, contact_arrows, frustum
+from nuno.viewer.marks import (
+    FRUSTUM,
+    DrawnCamera,
+    all_held_points,
+    contact_arrows,
+    frustum,
+    frustum_colors,
+    grip_arrows,
+)
 from nuno.viewer.scene_object import SceneObject, light_of
 from nuno.viewer.style import Styles
+from nuno.viewer.vertex_values import vertex_contacts
 from nuno.viewer.visual_meshes import VisualMeshes
 
 if TYPE_CHECKING:
+    from nuno.bodies.body import Body
     from nuno.world.simulation import Simulation
 
 WORLDS = 9  # of a batch that are drawn side by side where nothing else is said
 SHARE = 0.05  # of the time that a viewer spends on contacts, at most
 UNPLACED = np.full(7, np.nan, dtype=np.float32)
 MARK_RADIUS, SHAFT = 0.008, 0.004  # [m] radii of the marks of held points, and of arrows
+MARKS = {
+    "grips": ("balls", "#d81b9b", MARK_RADIUS),
+    "contacts": ("arrows", "#128a3a", SHAFT),
+    "grip forces": ("arrows", "#c2410c", SHAFT),
+}
 
 
 class Scene:
@@ -52,6 +67,8 @@ class Scene:
         self._entered: list[SceneObject] = []
         self._left: list[int] = []
         self._contacts_due = 0.0
+        self._values_due: dict[str, float] = {}  # of contact forces at vertices, by body
+        self._contact_values: dict[str, np.ndarray] = {}
         self._placed: list[SceneObject] = []  # whose frames and offsets the next two are
         self._inner = self._offsets = np.empty((0, 7))
 
@@ -75,8 +92,11 @@ class Scene:
             if not style.visible:
                 continue
             body_objects = self._body_objects.get(body.key)
+            if style.color_by == "contact":
+                self._look_at_contact_values(body, sparing)
             if body_objects is None or not body_objects.fits(style):
-                body_objects = BodyObjects(body, style, self.places, self.visual_meshes.of(body))
+                shown = self.visual_meshes.of(body)
+                body_objects = BodyObjects(body, style, self.places, shown, self.styles.edges)
                 self._body_objects[body.key] = body_objects
                 self._entered += body_objects.objects
                 self._looked.append(body_objects)
@@ -91,8 +111,12 @@ class Scene:
         self._look_at_marks(sparing)
         self._look_at_cameras()
 
-    def settle(self) -> tuple[list[int], list[SceneObject], list[SceneObject]]:
-        """Return the scene objects' numbers that left since the last time, those that entered, and those that moved."""
+    def settle(self) -> tuple[list[int], list[SceneObject], list[SceneObject], list[SceneObject]]:
+        """Return what changed since the last time.
+
+        Returns:
+            The numbers of the scene objects that left; those that entered, that moved, and whose colours changed.
+        """
         self._settle_bodies()
         for key, points in self._seen_marks.items():
             self._settle_mark(key, points)
@@ -108,7 +132,25 @@ class Scene:
         for obj in moved:
             obj.moved = False
         moved = [obj for obj in moved if obj.number not in new]
-        return left, entered, moved
+        recolored = [obj for obj in self.objects if obj.recolored]
+        for obj in recolored:
+            obj.recolored = False
+        return left, entered, moved, [obj for obj in recolored if obj.number not in new]
+
+    def body_of(self, number: int) -> tuple[Body, int] | None:
+        """Return the body that a scene object shows, and the world that it is in; None where it shows none."""
+        for body_objects in list(self._body_objects.values()):
+            for obj, index in zip(body_objects.objects, body_objects.indices, strict=True):
+                if obj.number == number:
+                    return body_objects.body, index
+        return None
+
+    def numbers_of(self, body: Body, index: int) -> list[int]:
+        """Return the numbers of the scene objects that show a body in one world."""
+        found = self._body_objects.get(body.key)
+        if found is None:
+            return []
+        return [obj.number for obj, k in zip(found.objects, found.indices, strict=True) if k == index]
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lowest and the highest coordinates, (3,) [m] each, of all bodies that are drawn but planes."""
@@ -144,21 +186,43 @@ class Scene:
         for body_objects in self._looked:
             if not body_objects.is_rigid:
                 body_objects.shift()
+            if body_objects.style.color_by != "contact":
+                body_objects.tint()
+        for key, values in self._contact_values.items():
+            if key in self._body_objects:
+                self._body_objects[key].tint(values)
         self._looked.clear()
+        self._contact_values.clear()
+
+    def _look_at_contact_values(self, body: Body, sparing: bool) -> None:
+        start = time.perf_counter()
+        if start >= self._values_due.get(body.key, 0.0) or not sparing:
+            self._contact_values[body.key] = vertex_contacts(self.world, body)
+            now = time.perf_counter()
+            self._values_due[body.key] = now + (now - start) / SHARE
 
     def _look_at_marks(self, sparing: bool) -> None:
-        for what, wanted in (("grips", self.styles.grips), ("contacts", self.styles.contacts)):
+        for what, wanted in (
+            ("grips", self.styles.grips), ("contacts", self.styles.contacts), ("grip forces", self.styles.grip_forces),
+        ):  # fmt: skip
             if not wanted:
                 self._leave([key for key in self._marks if key[0] == what], self._marks)
         if self.styles.grips:
             for place in self.places:
                 self._seen_marks["grips", place.index] = all_held_points(self.world, place.index) + place.offset
         start = time.perf_counter()
-        if self.styles.contacts and (start >= self._contacts_due or not sparing):
-            scale = self.styles.force_scale
-            found = contact_arrows(self.world, scale, [place.index for place in self.places])
-            for place, ends in zip(self.places, found, strict=True):
-                self._seen_marks["contacts", place.index] = ends + place.offset
+        arrows = {"contacts": contact_arrows, "grip forces": grip_arrows}
+        wanted_arrows = [
+            what
+            for what, wanted in (("contacts", self.styles.contacts), ("grip forces", self.styles.grip_forces))
+            if wanted
+        ]
+        if wanted_arrows and (start >= self._contacts_due or not sparing):
+            indices = [place.index for place in self.places]
+            for what in wanted_arrows:
+                found = arrows[what](self.world, self.styles.force_scale, indices)
+                for place, ends in zip(self.places, found, strict=True):
+                    self._seen_marks[what, place.index] = ends + place.offset
             now = time.perf_counter()
             self._contacts_due = now + (now - start) / SHARE
 
@@ -169,7 +233,7 @@ class Scene:
         obj = self._marks.get(key)
         if obj is None:
             root = next(place.root for place in self.places if place.index == key[1])
-            kind, color, size = ("balls", "#d81b9b", MARK_RADIUS) if key[0] == "grips" else ("arrows", "#128a3a", SHAFT)
+            kind, color, size = MARKS[key[0]]
             # a path of three: no body's, whatever its name
             path = (root, "marks", key[0])
             self._marks[key] = SceneObject(path, kind, points, color=light_of(color), opacity=1.0, size=size)
@@ -192,6 +256,8 @@ class Scene:
                     )
                     for place in self.places
                 ]  # fmt: skip
+                for obj in objects:
+                    obj.colors = frustum_colors()
                 self._cameras[name] = (source, objects)
                 self._entered += objects
             for place, obj in zip(self.places, self._cameras[name][1], strict=True):

@@ -28,6 +28,8 @@ class SceneObject:
         number: Its own number, of no other scene object.
         pose: (7,) float32, position [m] and quaternion (w, x, y, z), or None where only its points move.
         points: (n, 3) float32 [m].
+        colors: (n, 3) uint8, the colours of its points (sRGB), or None where all of it has one.
+        recolored: Whether ``colors`` are other than at the look before.
         moved: Whether ``pose`` or ``points`` are other than at the look before.
     """
 
@@ -44,6 +46,8 @@ class SceneObject:
         self.pose: np.ndarray | None = None
         self.points = np.asarray(points, dtype=np.float32).reshape(-1, 3)
         self.moved = False
+        self.colors: np.ndarray | None = None
+        self.recolored = False
 
     def place(self, pose: np.ndarray) -> None:
         """Set where it is, (7,) float32."""
@@ -56,11 +60,19 @@ class SceneObject:
         if now.shape != self.points.shape or not np.array_equal(now, self.points):
             self.points, self.moved = now, True
 
+    def tint(self, colors: np.ndarray | None) -> None:
+        """Set the colours of its points, (n, 3) uint8; None is its own."""
+        same = colors is self.colors or (
+            colors is not None and self.colors is not None and np.array_equal(colors, self.colors)
+        )
+        if not same:
+            self.colors, self.recolored = colors, True
+
     def entrance(self) -> dict[str, Any]:
         """Return the command that brings it to the page as it is now."""
         return {
             "do": "enter", "id": self.number, "path": self.path, "points": self.points.ravel(), "pose": self.pose,
-            **self.shape,
+            "colors": None if self.colors is None else self.colors.ravel(), **self.shape,
         }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import weakref
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from nuno.world.pace import Pace
     from nuno.world.simulation import Simulation
 
 LATE = 0.25  # a thread that is later than this [s] gives the lost time up instead of rushing after it
@@ -69,7 +70,7 @@ class Background:
         self.error: BaseException | None = None
         self._stop = threading.Event()
         self._frame = threading.Condition()
-        arguments = (weakref.ref(world), world.lock, real_time_factor)
+        arguments = (weakref.ref(world), world.lock, world._pace, real_time_factor)
         self._thread = threading.Thread(target=self._loop, args=arguments, name="nuno-world", daemon=True)
         self._thread.start()
 
@@ -94,9 +95,12 @@ class Background:
         with self._frame:
             self._frame.wait(timeout)
 
-    def _loop(self, reference: weakref.ref[Simulation], lock: FrameLock, factor: float) -> None:
+    def _loop(self, reference: weakref.ref[Simulation], lock: FrameLock, pace: Pace, factor: float) -> None:
         due = time.perf_counter()
         while not self._stop.is_set():
+            if not pace.may_go(timeout=0.05):
+                due = time.perf_counter()
+                continue
             if not lock.acquire(timeout=0.05):
                 continue
             try:
@@ -107,6 +111,7 @@ class Background:
                     return
                 span = 1.0 / world.frame_rate
                 world._advance(span)
+                pace.spend()
             except BaseException as error:
                 self.error = error  # raised again in the caller's next call
                 return
@@ -117,6 +122,6 @@ class Background:
                     self._frame.notify_all()
             lock.let_others()
             now = time.perf_counter()
-            due = max(due + span / factor, now - LATE)
+            due = max(due + span / (factor if pace.factor is None else pace.factor), now - LATE)
             if due > now:
                 self._stop.wait(due - now)

@@ -7,6 +7,7 @@ from typing import Any
 
 from nuno.errors import InvalidInputError
 from nuno.kernels.kernel_cache import take_machine_code
+from nuno.kernels.quiet import quiet_warp
 
 
 def checked_device(name: Any) -> str:
@@ -26,6 +27,7 @@ def found_device(name: str) -> str:
     Raises:
         InvalidInputError: there is no such device here.
     """
+    quiet_warp()
     if name == "cpu":
         return name
     import warp as wp

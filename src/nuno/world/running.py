@@ -76,9 +76,14 @@ class Running(Simulation):
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
         ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
         for end in with_bar(ends, "simulating", progress):
-            with self._call():
-                if end - self._time > SOON:  # less is no time: the same instant
-                    self._advance(end - self._time, end, each_frame)
+            while end - self._time > SOON:  # less is no time: the same instant
+                # a piece goes no further where the clock was set back meanwhile
+                last = min(end, self._time + 2.0 * chunk / self.frame_rate)
+                stop = self._pace.next_stop(self._time, last, 1.0 / self.frame_rate)
+                with self._call():
+                    if stop - self._time > SOON:
+                        self._advance(stop - self._time, stop, each_frame)
+            self._raise_background_error()
 
     def trace(self, body: Body | str, times: ArrayLike) -> np.ndarray:
         """Run through many instants, and return where a body's vertices are at each.

@@ -25,6 +25,7 @@ from nuno.validation import count, finite_array, number
 from nuno.world.background import FrameLock
 from nuno.world.device import checked_device, found_device
 from nuno.world.impacts import are_fast
+from nuno.world.pace import Pace
 from nuno.world.run_start import RunStart
 from nuno.world.stepping import Stepping
 
@@ -74,6 +75,7 @@ class Simulation:
         self.drivers: list[Driver] = []  # asked around every frame, such as a simulated robot
         self._left_out: list[Driver] = []  # those of which it was said that imagined worlds are without them
         self._background: Background | None = None
+        self._pace = Pace()
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
         self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
