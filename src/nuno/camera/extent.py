@@ -9,7 +9,7 @@ import warp as wp
 
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, View, view
-from nuno.camera.raster import SUBPIXELS, project
+from nuno.camera.projection import SUBPIXELS, project
 
 wp.set_module_options({"enable_backward": False})
 
