@@ -10,13 +10,13 @@ import sys
 import numpy as np
 
 import nuno
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.tasks.look_at_camera import look_at_camera
 from nuno.tasks.pick_towel import TowelPicker
 from nuno.tasks.towel_room import TABLE, make_room
 
 POINT = (int(sys.argv[1]), int(sys.argv[2])) if len(sys.argv) > 2 else (0, 5)
-QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]  # without it: two finer meshes, a minute
+QUICK = [Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])]  # without it: two finer meshes, a minute
 
 room = make_room(nuno.Cloth.preset("denim"), device="cpu")  # what is real
 talos = TowelPicker(room.driver, room.look, table=TABLE, device="cpu")  # and who knows nothing else of it

@@ -122,27 +122,27 @@ def take_picture(
         time, bodies = world.time, tuple(world.bodies)
     keys = drawn.keys(camera)
     shape = keys.shape
-    fine, fine_camera = (keys, camera) if samples == 1 else (None, camera.scaled(samples))
-    if fine is None:
-        fine = drawn.keys(fine_camera)
+    sampled, sampled_camera = (keys, camera) if samples == 1 else (None, camera.scaled(samples))
+    if sampled is None:
+        sampled = drawn.keys(sampled_camera)
     light, shadow = drawn.light(lamp, camera, keys, background)
-    rays = _local_rays(*_lens(fine_camera))
+    rays = _local_rays(*_lens(sampled_camera))
     device = world.device
     turn = wp.mat33(*camera.camera_to_world[:3, :3].ravel().tolist())
-    shaded: Any = wp.empty(fine.shape, dtype=wp.vec3, device=device)
+    shaded: Any = wp.empty(sampled.shape, dtype=wp.vec3, device=device)
     wp.launch(
-        shading._shade, dim=fine.shape,
+        shading.shade, dim=sampled.shape,
         inputs=[
-            fine, shadow, wp.array(rays, dtype=wp.vec3, device=device), turn,
+            sampled, shadow, wp.array(rays, dtype=wp.vec3, device=device), turn,
             wp.vec3(*camera.camera_to_world[:3, 3].tolist()), drawn.positions, drawn.normals, drawn.local, drawn.faces,
             drawn.owner, drawn.face_count, drawn.plane_normals, drawn.looks, light,
         ],
         outputs=[shaded], device=device,
     )  # fmt: skip
     color: Any = wp.empty((*shape, 3), dtype=wp.uint8, device=device)
-    wp.launch(shading._expose, dim=shape, inputs=[shaded, samples, float(noise), int(seed), color], device=device)
+    wp.launch(shading.expose, dim=shape, inputs=[shaded, samples, float(noise), int(seed), color], device=device)
     ids: Any = wp.empty(shape, dtype=wp.int32, device=device)
-    wp.launch(shading._to_bodies, dim=shape, inputs=[keys, drawn.owner, drawn.looks.index, ids], device=device)
+    wp.launch(shading.to_bodies, dim=shape, inputs=[keys, drawn.owner, drawn.looks.index, ids], device=device)
     depth: Any = raster.depths_of(keys)
     if world.world_count == 1:
         color, depth, ids = color[0], depth[0], ids[0]

@@ -64,7 +64,7 @@ def _owned(dx: wp.int64, dy: wp.int64) -> wp.int64:
 
 
 @wp.func
-def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
+def _rasterise(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
     """Draw one triangle that lies in front of the near plane (vertices in the camera's frame)."""
     sa = project(a, v)
     sb = project(b, v)
@@ -136,7 +136,7 @@ def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, s
 
 
 @wp.func
-def _clip_and_fill(
+def _clip_and_rasterise(
     corner_a: wp.vec3, corner_b: wp.vec3, corner_c: wp.vec3, v: View, world: int, label: Any, shift: int,
     keys: wp.array3d[Any],
 ):  # fmt: skip
@@ -164,8 +164,8 @@ def _clip_and_fill(
             c = turned
         d = _cut(a, c, near)
         c = _cut(b, c, near)
-        _fill(a, c, d, v, world, label, shift, keys)
-    _fill(a, b, c, v, world, label, shift, keys)
+        _rasterise(a, c, d, v, world, label, shift, keys)
+    _rasterise(a, b, c, v, world, label, shift, keys)
 
 
 @wp.kernel
@@ -220,7 +220,7 @@ def _draw_triangles(
             else:
                 q = p - offset
             p = p + offset
-        _clip_and_fill(p, q, r, v, world, name, shift, keys)
+        _clip_and_rasterise(p, q, r, v, world, name, shift, keys)
 
 
 @wp.kernel
@@ -371,8 +371,8 @@ def masks_of(keys: wp.array, *, out: wp.array | None = None) -> wp.array:
 def depths_of(keys: wp.array, *, out: wp.array | None = None) -> wp.array:
     """Depths (worlds, h, w) float32 [m] along the optical axis, in steps of 10 um; inf where nothing is."""
     out = wp.empty(keys.shape, dtype=wp.float32, device=keys.device) if out is None else out
-    wide = keys.dtype == wp.int64
-    arguments = [ID_BITS, ID_BACKGROUND] if wide else [1, MASK_BACKGROUND]
+    with_ids = keys.dtype == wp.int64
+    arguments = [ID_BITS, ID_BACKGROUND] if with_ids else [1, MASK_BACKGROUND]
     wp.launch(_to_depths_of[keys.dtype], dim=keys.shape, inputs=[keys, *arguments, out], device=keys.device)
     return out
 

@@ -145,7 +145,7 @@ def _result(
 ) -> PickResult:
     """Return the answer, with the future that looks most like the image."""
     ranked, seen = trials.ranked, trials.seen
-    batch, world, turn = trials.most_alike(int(ranked.order[0]), settings.score)
+    batch, world, turn = trials.best_match(int(ranked.order[0]), settings.score)
     masks = trials.masks(settings)
     futures, best_index = trials.batches[batch].whole(world)
     stages.end("compare")

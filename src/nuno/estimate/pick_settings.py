@@ -18,7 +18,7 @@ from nuno.estimate.rotations import checked_turns
 from nuno.validation import finite_array, number
 from nuno.world.device import checked_device, found_device
 
-MOST_CANDIDATES = 1024
+MAX_CANDIDATES = 1024
 """Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
 
 
@@ -129,13 +129,13 @@ def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int
         n, m = candidates
         if n < 2 or m < 2:
             raise InvalidInputError(f"a grid of candidates needs at least 2 x 2 points, got {n} x {m}")
-        if n * m > MOST_CANDIDATES:
-            raise InvalidInputError(f"a grid of candidates has at most {MOST_CANDIDATES} points, got {n} x {m}")
+        if n * m > MAX_CANDIDATES:
+            raise InvalidInputError(f"a grid of candidates has at most {MAX_CANDIDATES} points, got {n} x {m}")
         ij = np.stack(np.meshgrid(np.arange(n), np.arange(m), indexing="ij"), axis=-1).reshape(-1, 2)
         return ij, ij / (n - 1, m - 1), (n, m)
     uv = finite_array("candidates", candidates, ("k", 2))
-    if len(uv) > MOST_CANDIDATES or uv.min() < 0 or uv.max() > 1:
+    if len(uv) > MAX_CANDIDATES or uv.min() < 0 or uv.max() > 1:
         raise InvalidInputError(
-            f"candidates must be up to {MOST_CANDIDATES} fractions (u, v) of the cloth's sides, each from 0 to 1"
+            f"candidates must be up to {MAX_CANDIDATES} fractions (u, v) of the cloth's sides, each from 0 to 1"
         )
     return uv, uv, (2, 2)

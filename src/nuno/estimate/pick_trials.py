@@ -38,7 +38,7 @@ class PickTrials:
     ranked: Ranked
     seen: Seen
 
-    def most_alike(self, candidate: int, score: str) -> tuple[int, int, float]:
+    def best_match(self, candidate: int, score: str) -> tuple[int, int, float]:
         """Return the batch, the world in it, and its turn [rad], in which a candidate looks most like the image."""
         found: list[tuple[float, int, int, float]] = []
         for k, comparison in enumerate(self.comparisons):
@@ -53,7 +53,7 @@ class PickTrials:
     def masks(self, settings: PickSettings) -> np.ndarray:
         """Return (k, h, w) bool, every candidate's silhouette where it looks most like the image."""
         count, small = len(settings.uv), self.seen.camera
-        alike = (self.most_alike(candidate, settings.score) for candidate in range(count))
+        alike = (self.best_match(candidate, settings.score) for candidate in range(count))
         batch, world, turn = map(np.array, zip(*alike, strict=True))
         masks = np.zeros((count, small.height, small.width), dtype=bool)
         for k in np.unique(batch):

@@ -277,7 +277,7 @@ def make_grip(
     if target is not None and target._dynamics is not None:
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
-    most = None if max_force is None else force_limit(max_force, worlds)
+    limits = None if max_force is None else force_limit(max_force, worlds)
     present = body.vertices
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
@@ -306,10 +306,10 @@ def make_grip(
         times = np.array([world.time])
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
         jump = goal - mean
-    if compliance == 0.0 and most is None:
+    if compliance == 0.0 and limits is None:
         jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
         _tell_jump(body, positions[0], float(jumps.max()))
-    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, most)
+    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, limits)
     return Grip(body, spec, target, local)
 
 

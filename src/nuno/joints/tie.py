@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 
-MOST_FORCE = 1e4
+MAX_FORCE = 1e4
 """[N] The most that a grip or weld bears where nothing else is asked for: ten times what a person lifts."""
-MOST_ACCELERATION = 1e3
+MAX_ACCELERATION = 1e3
 """[m/s2] What a grip or weld can give the heaviest of the rigid bodies that it holds, at least: 100 g."""
 
 
@@ -85,7 +85,7 @@ class HoldSpec:
         return self.positions[:, key], self.quaternions[:, key]
 
 
-def spread_spec(spec: Any, batched: Any) -> Any:
+def batched_spec(spec: Any, batched: Any) -> Any:
     """Return a grip's, tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
     names = (
         "vertices", "corners", "barycentric", "weights", "other_corners", "other_weights", "places", "positions",
@@ -116,7 +116,7 @@ def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
         return limit
     rigid: list[Any] = [b._dynamics for b in bodies if b is not None and b._dynamics is not None]
     masses = [np.asarray(dynamics.mass) for dynamics in rigid if dynamics.is_rigid]
-    return np.max([np.full(worlds, MOST_FORCE), *(MOST_ACCELERATION * mass for mass in masses)], axis=0)
+    return np.max([np.full(worlds, MAX_FORCE), *(MAX_ACCELERATION * mass for mass in masses)], axis=0)
 
 
 def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:

@@ -169,7 +169,7 @@ def make_schedule(bodies: Iterable[Body], start: float, duration: float, frame: 
     moved = tuple((own.keys, *own.at(path._between(times))) for own, path in path_batches)
     if not bodies:
         return Schedule(times, {}, moved)
-    kinematic = {root.key: root for body in bodies if (root := _followed_by(body)) is not None}
+    kinematic = {leader.key: leader for body in bodies if (leader := _followed_by(body)) is not None}
     roots = dict(zip(kinematic, paths_at([body._path for body in kinematic.values()], times), strict=True))
     return Schedule(times, {body.key: _pose_of(body, roots) for body in bodies}, moved)
 

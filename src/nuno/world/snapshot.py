@@ -17,7 +17,7 @@ from nuno.bodies.make_dynamics import make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import Joint, JointSpec
-from nuno.joints.tie import HoldSpec, TieSpec, spread_spec
+from nuno.joints.tie import HoldSpec, TieSpec, batched_spec
 from nuno.materials import Material
 from nuno.shapes.coordinates import Pose, compose, invert
 from nuno.shapes.path import Path
@@ -153,7 +153,7 @@ class Snapshot:
             replace(
                 grip,
                 offsets=tuple(map(batched, grip.offsets)) if isinstance(grip.offsets, tuple) else batched(grip.offsets),
-                spec=spread_spec(grip.spec, batched),
+                spec=batched_spec(grip.spec, batched),
                 followed=_mapped_lead(grip.followed, batched),
             )
             for grip in self.grips

@@ -20,7 +20,7 @@ from nuno.contact.particle.feature_lists import DUE, EARLIEST, TRAVELLED
 from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
-from nuno.contact.particle.feature_queue import COLOUR, MOST_COLOURS, QUEUE, forget_queue, queue_active, room_of
+from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
 from nuno.numbers.lanes import add, anywhere, barrier, full_like, lane_max, mul, root, shares_work, sub  # noqa: F401
 from nuno.numbers.vec3 import vec3
 from nuno.numbers.warps import WARP, anyone, lowest, union_of_warp
@@ -72,7 +72,7 @@ def earliest_due(t: Any, soon: float, rank: int, size: int):
 
 
 @wp.func
-def push_listed(
+def push_elements(
     t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, travelled: float, queued: int, rank: int, size: int
 ):
     """The elements that are awake against one shape: those ``queued``, or all of them in turn where that is 0."""
@@ -137,7 +137,7 @@ def push_listed(
                 bi = one - bj
             if shares_work(size):
                 more = 0
-                first = 1 << wp.min(c, MOST_COLOURS)
+                first = 1 << wp.min(c, MAX_COLOURS)
                 second = wp.where(points > 1, first, 0)
                 if queued > 0:
                     for which in range(points):
@@ -158,7 +158,7 @@ def push_listed(
                 while first != 0:
                     now = lowest(first)
                     for which in range(1 + ((second >> now) & 1)):
-                        if point_index == which and wp.min(colour, MOST_COLOURS) == now and anywhere(on):
+                        if point_index == which and wp.min(colour, MAX_COLOURS) == now and anywhere(on):
                             push_apart(t, h, i, j, k, bi, bj, bk, point, normal, gap, on)
                         barrier(size)
                     first = first & (first - 1)
@@ -211,7 +211,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         soon = travelled
         for k in range(t.feature_shapes[0]):
             s = t.feature_shapes[topo.feature_colour.shape[0] + k]
-            push_listed(t, topo, run, shapes, s, travelled, queued, rank, size)
+            push_elements(t, topo, run, shapes, s, travelled, queued, rank, size)
         if queued > 0:
             forget_queue(t, topo, queued, rank, size)
     elif shares_work(size):

@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CYLINDER, FAR, PLANE
-from nuno.contact.particle.kinematic_pose import led_pose
+from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
 from nuno.numbers.lanes import add, anywhere, barrier, lane_max, least, most, mul, root, size_of, sub  # noqa: F401
 from nuno.numbers.vec3 import position, transposed_mul, vec3
@@ -28,7 +28,7 @@ TRAVELLED, EARLIEST, DUE = wp.constant(0), wp.constant(1), wp.constant(2)
 element wakes, and each, by how far anything has gone then [m]."""
 
 
-MOST_SLACK = wp.constant(100.0)
+MAX_SLACK = wp.constant(100.0)
 """[m] As far as a mark counts."""
 
 
@@ -40,7 +40,7 @@ def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
     turn = rotation_of(like, t, shapes, s * COLUMNS)
     slot = shapes.slot[s]
     if slot >= 0:
-        centre, turn = led_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+        centre, turn = kinematic_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
     return centre, turn
 
 
@@ -149,7 +149,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         at_once, _point = stands_between(
                             kind, p, vec3(soon, soon, soon), extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
-                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MOST_SLACK))
+                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK))
                         mark = t.feature_mark[i]
                         if mark != 0:
                             slack = wp.min(slack, mark >> 2)
@@ -167,7 +167,7 @@ def slack_of(t: Any, topo: Any, k: int):
     """Return the way that anything must go before element k may be touched [um]; below zero for never."""
     edges = topo.side.shape[0]
     mark = int(0)
-    slack = int(1.0e6 * MOST_SLACK)
+    slack = int(1.0e6 * MAX_SLACK)
     if k < edges:
         e = topo.side[k]
         for c in range(2):

@@ -38,7 +38,7 @@ STEPS = wp.constant(6)
 """Tangents looked at between two ends: the distance of a 40 mm edge from what is round by 4 mm, or from the edge of a
 box, is then found within 0.006 mm, of twenty thousand that were tried."""
 
-ROUGH = wp.constant(1.0e-5)
+EDGE_TOLERANCE = wp.constant(1.0e-5)
 """[m] What is nearer to an edge than this does not say by where it is which way is out: rounding moves it."""
 
 
@@ -125,7 +125,7 @@ def across_edge(
     mf = mf / size
     mg = mg / size
     deep = mf * p + mg * q
-    on = least(least(ROUGH - gap, deep + deepest), least(mf, mg) + SLANT)
+    on = least(least(EDGE_TOLERANCE - gap, deep + deepest), least(mf, mg) + SLANT)
     on = least(on, size - SLANT * root(dot(way, way)))
     out = vec3(mf * fx, mf * fy + mg * gy, mg * gz)
     return choose(on, deep, gap), choose(on, out, normal)
@@ -209,7 +209,7 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
             db = choose(slope, slope, db)
             part = (fb - db * high - fa + da * low) / least(da - db, tiny)
         point = a + at * way
-        if (h.kind == BOX or h.kind == CYLINDER) and anywhere(ROUGH - gap):
+        if (h.kind == BOX or h.kind == CYLINDER) and anywhere(EDGE_TOLERANCE - gap):
             gap, normal = across_edge(
                 h.kind, point, way, gap, normal, h.size.x, h.size.y, h.size.z, 0.5 * cell
             )  # fmt: skip

@@ -19,7 +19,7 @@ QUEUE = wp.constant(35)
 """Place in it where the queue begins: places in the list, and colours."""
 COLOUR = wp.constant(1 << 24)
 """By which a colour is multiplied in the queue."""
-MOST_COLOURS = wp.constant(31)
+MAX_COLOURS = wp.constant(31)
 """Colours that fit the bits of a number, and the tally."""
 ROOM = wp.constant(2048)
 """Elements that are queued at most."""
@@ -29,7 +29,7 @@ ROOM = wp.constant(2048)
 def room_of(topo: Any):
     """Return how many elements fit into the queue; none where there are more colours than it can tell apart."""
     room = int(0)
-    if topo.feature_colour.shape[0] - 1 <= MOST_COLOURS:
+    if topo.feature_colour.shape[0] - 1 <= MAX_COLOURS:
         room = wp.clamp(4 * topo.particles - QUEUE, 0, ROOM)
     return room
 

@@ -15,8 +15,8 @@ FAR = wp.constant(1.0e6)
 
 
 @wp.func
-def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
-    """Signed distance and normal of a convex hull by the planes of its faces; what is not ``near`` [m] may be nearer.
+def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, margin: Any):
+    """Signed distance and normal of a convex hull by the planes of its faces; what is not ``margin`` [m] may be nearer.
 
     Beyond an edge it is the distance from the farther plane, which is less than that from the edge.
     """
@@ -33,7 +33,7 @@ def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
         nx = choose(above, f[0], nx)
         ny = choose(above, f[1], ny)
         nz = choose(above, f[2], nz)
-        if not anywhere(near - gap):
+        if not anywhere(margin - gap):
             break
     return gap, nx, ny, nz
 

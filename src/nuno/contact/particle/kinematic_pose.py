@@ -85,7 +85,7 @@ def kinematic_rotation(like: Any, shapes: Shapes, slot: int, clock: int, group: 
 
 
 @wp.func
-def led_pose(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, origin: Any):
+def kinematic_pose(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, origin: Any):
     """Position [m] relative to the origin, and rotation, shape to world."""
     x, y, z = kinematic_position(like, shapes, slot, clock, group, worlds, origin.x, origin.y, origin.z)
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = kinematic_rotation(like, shapes, slot, clock, group, worlds)

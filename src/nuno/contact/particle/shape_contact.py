@@ -24,7 +24,7 @@ from nuno.contact.particle.distances import (
     way_in,
 )
 from nuno.contact.particle.hull import distance_hull, way_into_hull
-from nuno.contact.particle.kinematic_pose import kinematic_position, led_pose
+from nuno.contact.particle.kinematic_pose import kinematic_pose, kinematic_position
 from nuno.numbers.element_access import at
 from nuno.numbers.lanes import (  # noqa: F401
     add,
@@ -77,14 +77,14 @@ def push_out(t: Any, i: int, gap: Any, n: Any, u: Any, un: Any, mu: Any, leave: 
 
 
 @wp.func
-def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, near: Any):
+def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, margin: Any):
     """Signed distance and normal of shape s, of a mesh those of its bounding box."""
     if kind < SOLID_MESH:
         solid, n = distance_solid(kind, vec3(x, y, z), a, b, c)
         return solid, n.x, n.y, n.z
     gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
-    if kind == HULL and anywhere(near - gap):
-        return distance_hull(shapes, s, x, y, z, near)
+    if kind == HULL and anywhere(margin - gap):
+        return distance_hull(shapes, s, x, y, z, margin)
     return gap, nx, ny, nz
 
 
@@ -153,17 +153,17 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
     d = r
     if slot >= 0:
         clock = int(lane_max(t.notes[CLOCK]))
-        before, turn_before = led_pose(like, shapes, slot, clock - 1, g, w, origin)
-        centre, r = led_pose(like, shapes, slot, clock, g, w, origin)
+        before, turn_before = kinematic_pose(like, shapes, slot, clock - 1, g, w, origin)
+        centre, r = kinematic_pose(like, shapes, slot, clock, g, w, origin)
         e = centre - before
         d = r - turn_before
     # what comes nearer than this may have passed through within the substep
-    near = radius + FAST * dt
+    margin = radius + FAST * dt
     for i in range(rank, n, size):
         # in the shape's frame
         p = transposed_mul(r, to_float(position(t, i) - centre))
-        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, extent.x, extent.y, extent.z, near)
-        if anywhere(near - gap):
+        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, extent.x, extent.y, extent.z, margin)
+        if anywhere(margin - gap):
             u = less_surface(slot, position(t, i) - start_position(t, i), e, d, p)
             local = vec3(nx, ny, nz)
             normal = r * local
@@ -171,7 +171,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
             passed = -least(gap, gap - un)
             # a lane is looked at because another is near: what is swifter must not see more than it would alone
-            within = near - gap
+            within = margin - gap
             passed = least(passed, within)
             if kind == SOLID_MESH or kind == SHELL_MESH:
                 way = transposed_mul(r, u)

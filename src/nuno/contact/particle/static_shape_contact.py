@@ -29,7 +29,7 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
         mu = wp.sqrt(t.scalars[FRICTION] * row[15])
     radius = t.scalars[THICKNESS] * 0.5 + row[17]
     kind = shapes.kind[s]
-    near = radius + FAST * dt
+    margin = radius + FAST * dt
     for i in range(rank, n, size):
         # in the shape's frame
         p = transposed_mul(r, to_float(position(t, i) - centre))
@@ -41,9 +41,9 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
             nearest = 0.0
         gap = float(nearest)
         local = vec3(0.0, 0.0, 1.0)
-        if near - nearest > 0.0 and kind != PLANE:
+        if margin - nearest > 0.0 and kind != PLANE:
             gap, local = distance_solid(kind, p, sa, sb, sc)
-        if near - gap > 0.0:
+        if margin - gap > 0.0:
             u = position(t, i) - start_position(t, i)
             normal = r * local
             un = dot(u, normal)

@@ -37,11 +37,11 @@ for (int q = 0; q <= rows - 3; ++q)
         ROLLED for (int j = 0; j < 3; ++j)
             ROLLED for (int i = 0; i < 3; ++i) {
                 const V s = project(at + j * columns + i, d);
-                high[i - j + 2] = most(high[i - j + 2], s);
-                low[i - j + 2] = least(low[i - j + 2], s);
+                high[i - j + 2] = maximum(high[i - j + 2], s);
+                low[i - j + 2] = minimum(low[i - j + 2], s);
             }
         V gap = low[1] - high[0];
-        ROLLED for (int k = 1; k < 4; ++k) gap = least(gap, low[k + 1] - high[k]);
+        ROLLED for (int k = 1; k < 4; ++k) gap = minimum(gap, low[k + 1] - high[k]);
         *(I*)(uncreased + at) = gap > __builtin_elementwise_sqrt(length) * enough;
     }
 for (int q = 0; q <= rows - WINDOW; ++q)
@@ -67,10 +67,10 @@ for (int q = 0; q <= rows - WINDOW; ++q)
                 V high = (V){} - 1e30f, low = (V){} + 1e30f;
                 ROLLED for (int j = 0; j < WINDOW; ++j) {
                     const V s = project(at + i * step + j * other, d);
-                    high = most(high, s);
-                    low = least(low, s);
+                    high = maximum(high, s);
+                    low = minimum(low, s);
                 }
-                gap = least(gap, low - before);
+                gap = minimum(gap, low - before);
                 before = high;
             }
             good &= gap > __builtin_elementwise_sqrt(length) * enough;

@@ -78,7 +78,7 @@ for (int j = 0; j < F; j += 16) {
     V far = {};
     for (int c = 0; c < 3; ++c) {
         const V dx = px[c] - mx, dy = py[c] - my, dz = pz[c] - mz;
-        far = most(far, dx * dx + dy * dy + dz * dz);
+        far = maximum(far, dx * dx + dy * dy + dz * dz);
     }
     *(V*)(ball + j) = mx;
     *(V*)(ball + faces + j) = my;

@@ -32,11 +32,11 @@ RANGES = 48
 const int spans = boxes;
 const int *face_start = leaf_face_start.data, *edge_start = leaf_edge_start.data;
 const V limit = (V){} + far * far;
-auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+auto overlaps = [&](const float* rows, int count, int k, const float* low, const float* high) {
     V gap = (V){} + 1e30f;
     for (int c = 0; c < 3; ++c) {
-        gap = least(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
-        gap = least(gap, high[c] - *(const V*)(rows + c * count + k));
+        gap = minimum(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
+        gap = minimum(gap, high[c] - *(const V*)(rows + c * count + k));
     }
     return bits(gap > 0.f);
 };
@@ -51,7 +51,7 @@ auto reach = [&](const float* rows, int count, int k, const float* low, const fl
     V gap = (V){} + 1e30f;
     for (int c = 0; c < 3; ++c) {
         const V x = *(const V*)(rows + c * count + k);
-        gap = least(gap, least(x - low[c], high[c] - x));
+        gap = minimum(gap, minimum(x - low[c], high[c] - x));
     }
     return gap + r > 0.f;
 };
@@ -67,8 +67,8 @@ auto safe = [&](int a, int start) ALONE {
 };
 int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
 for (int c = 0; c < 2; ++c) {
-    int* most_counted = counted[c] + MOST_NEIGHBOURS * lanes;
-    if (*counted[c] > *most_counted) *most_counted = *counted[c];
+    int* max_counted = counted[c] + MOST_NEIGHBOURS * lanes;
+    if (*counted[c] > *max_counted) *max_counted = *counted[c];
     *counted[c] = 0;
 }
 // suspects wait until there are sixteen
@@ -77,13 +77,13 @@ auto test_faces = [&](int count) ALONE {
     const I i = *(const I*)vertex_of, f = *(const I*)face_of;
     const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
     const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit, 1e9f) > 0.f);
-    keep(hit & ((1u << count) - 1), i, a, b, c, *counted[0], (int*)triangles, 1, most_triangles, most_triangles);
+    keep(hit & ((1u << count) - 1), i, a, b, c, *counted[0], (int*)triangles, 1, max_triangles, max_triangles);
 };
 auto test_edges = [&](int count) ALONE {
     const I e = *(const I*)edge_of, f = *(const I*)other_of;
     const I a = take_int(end, e), b = take_int(end + edges, e), c = take_int(end, f), d = take_int(end + edges, f);
     const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
-    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
 };
 for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
 for (int a = 0; a < leaves; ++a) {
@@ -95,9 +95,9 @@ for (int a = 0; a < leaves; ++a) {
     // ranges of consecutive blocks that meet block a; where there are too many, the last one stretches
     int first[RANGES], last[RANGES], ranges = 0;
     for (int g = 0; g < leaves_16; g += 16)
-        for (unsigned some = meet(group, groups, g, low, high); some; some &= some - 1) {
+        for (unsigned some = overlaps(group, groups, g, low, high); some; some &= some - 1) {
             const int start = 16 * (g + __builtin_ctz(some));
-            unsigned near = meet(box, boxes, start, low, high);
+            unsigned near = overlaps(box, boxes, start, low, high);
             if (near && columns > 0) near &= ~safe(a, start);
             while (near) {
                 const int skip = __builtin_ctz(near), length = __builtin_ctz(~(near >> skip));
@@ -187,7 +187,7 @@ for (int k = 0; k < creases; k += 16) {
     const I a = take_int(table, row), b = take_int(table + 1, row);
     const I c = take_int(table + 2, row), d = take_int(table + 3, row);
     const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
-    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
 }
 #endif
 """.replace("RANGES", str(RANGES))
@@ -212,9 +212,9 @@ def search_world(
     lanes: int,
     pair_count: wp.uint64,
     triangles: wp.uint64,
-    most_triangles: int,
+    max_triangles: int,
     pairs: wp.uint64,
-    most_pairs: int,
+    max_pairs: int,
 ):
     """List the pairs that share no vertex and are nearer than ``far`` [m].
 
@@ -233,7 +233,7 @@ const float *x0 = (const float*)x, *y0 = (const float*)y, *z0 = (const float*)z;
 const V limit = (V){} + far * far;
 const int* from[2] = {(const int*)triangles, (const int*)pairs};
 int* to[2] = {(int*)near_triangles_out, (int*)near_pairs_out};
-const int room[2] = {most_triangles, most_pairs};
+const int room[2] = {max_triangles, max_pairs};
 for (int kind = 0; kind < 2; ++kind) {
     const int found = ((const int*)counts)[kind * lanes], count = found < room[kind] ? found : room[kind];
     int near_count = 0;
@@ -261,9 +261,9 @@ def filter_world(
     lanes: int,
     counts: wp.uint64,
     triangles: wp.uint64,
-    most_triangles: int,
+    max_triangles: int,
     pairs: wp.uint64,
-    most_pairs: int,
+    max_pairs: int,
     near_counts: wp.uint64,
     near_triangles_out: wp.uint64,
     near_pairs_out: wp.uint64,
@@ -330,7 +330,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
 
 
 @wp.func
-def fill_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
+def make_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
     """Pick the listed pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
     skip = wp.uint64(4 * which)
     filter_world(

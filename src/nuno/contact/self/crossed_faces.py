@@ -35,7 +35,7 @@ def box_faces(
 
 
 @wp.func
-def meet(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int):
+def boxes_overlap(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int):
     """Return whether two boxes overlap."""
     a = lower[world, i]
     b = upper[world, i]
@@ -84,11 +84,11 @@ def find_crossed(
     world, block = wp.tid()
     faces = face.shape[0]
     for other in range(block, start.shape[0] - 1):
-        if crossed[world] == 0 and meet(lower, upper, world, faces + block, faces + other):
+        if crossed[world] == 0 and boxes_overlap(lower, upper, world, faces + block, faces + other):
             for i in range(start[block], start[block + 1]):
-                if meet(lower, upper, world, i, faces + other):
+                if boxes_overlap(lower, upper, world, i, faces + other):
                     for j in range(wp.max(i + 1, start[other]), start[other + 1]):
-                        if meet(lower, upper, world, i, j) and cross(point, world, face[i], face[j]):
+                        if boxes_overlap(lower, upper, world, i, j) and cross(point, world, face[i], face[j]):
                             crossed[world] = 1
 
 

@@ -16,12 +16,12 @@ from nuno.contact.self.list_skin import (
     box_moves,
     group_count,
     join_boxes,
-    most_used_up,
+    max_used_up,
     moves_start,
     region_count,
 )
 from nuno.contact.self.narrow_phase import append, bound_leaves, middles, near_edges, near_triangle, next_place
-from nuno.contact.self.neighbour_lists import FORGET, begin_list, fill_inner_list, find_creases, swept
+from nuno.contact.self.neighbour_lists import FORGET, begin_list, find_creases, make_inner_list, swept
 from nuno.numbers.block_group import BlockGroup, grid_barrier
 from nuno.numbers.lanes import barrier, window
 from nuno.numbers.warps import WARP, in_warps, leads_warp, lowest, vote, warp_max
@@ -75,9 +75,9 @@ def list_reach(t: StateFloat, run: Settings):
 @wp.func
 def measure_closing(t: StateFloat, topo: Topology, run: Settings, rank: int, size: int):
     """Raise the figure behind the listed positions to what is used up of the margin at most; whole warps come here."""
-    most = most_used_up(t, topo, t.scalars[THICKNESS] + run.margin, margin_left(t, run), rank, size)
+    worst = max_used_up(t, topo, t.scalars[THICKNESS] + run.margin, margin_left(t, run), rank, size)
     k = 3 * topo.particles
-    high = warp_max(most, size)
+    high = warp_max(worst, size)
     if leads_warp(rank, size) and high > t.reference[k]:
         wp.atomic_max(t.reference, k, high)
 
@@ -291,14 +291,14 @@ def rebuild_by_group(t: StateFloat, topo: Topology, run: Settings, lists: Lists,
                 t.notes[INNER_TRAVEL] = FORGET
                 t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
         barrier(block_group.block_size)
-    near = swept(t, run)
-    if t.notes[INNER_TRAVEL] * 2.0 + near > t.notes[INNER_REACH]:
-        ahead = look_ahead(t, run, near)
+    approach = swept(t, run)
+    if t.notes[INNER_TRAVEL] * 2.0 + approach > t.notes[INNER_REACH]:
+        ahead = look_ahead(t, run, approach)
         if block_group.rank == 0:
             t.active_count[0] = 0
             t.active_count[1] = 0
         grid_barrier(block_group)
-        fill_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.group_size)
+        make_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.group_size)
         if block_group.rank_in_block == 0:
             t.notes[INNER_TRAVEL] = 0.0
             t.notes[INNER_REACH] = ahead

@@ -12,7 +12,7 @@ from nuno.numbers.lanes import barrier, window
 from nuno.numbers.warps import WARP, claim, lowest
 from nuno.state.cloth_state import MISSED_LEAVES, THICKNESS, StateFloat, Topology
 
-WIDE = wp.constant(5.0)
+WIDEST_SKIN = wp.constant(5.0)
 """Margin of the list of leaves over that of the list of elements."""
 TRAVELLED, WIDTH = wp.constant(6), wp.constant(7)
 """Places after the span in `State.reference`: how far any two points came closer since the leaves were listed, and the
@@ -84,7 +84,7 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, rank: int, size: int
     """
     place = travelled(topo)
     far = t.scalars[THICKNESS] + margin
-    most = float(0.0)
+    worst = float(0.0)
     for k in range(rank, t.near_leaves[0], size):
         pair = t.near_leaves[1 + k]
         a = window(t.bounds, 6 * (pair >> 16), 6)
@@ -98,8 +98,8 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, rank: int, size: int
         dx = wp.max(a[3] - b[0], b[3] - a[0])
         dy = wp.max(a[4] - b[1], b[4] - a[1])
         dz = wp.max(a[5] - b[2], b[5] - a[2])
-        most = wp.max(most, wp.sqrt(dx * dx + dy * dy + dz * dz) - spare)
-    return most
+        worst = wp.max(worst, wp.sqrt(dx * dx + dy * dy + dz * dz) - spare)
+    return worst
 
 
 @wp.func
@@ -137,7 +137,7 @@ def pair_leaves(t: StateFloat, far: float, m: int, rank: int, size: int):
 @wp.func
 def list_leaf_pairs(t: StateFloat, topo: Topology, margin: float, rank: int, size: int):
     """List the leaves that may come near: within the widest margin that there is room for."""
-    width = float(WIDE * margin)
+    width = float(WIDEST_SKIN * margin)
     count = int(-1)
     room = t.near_leaves.shape[0] - 1
     while count < 0:

@@ -76,7 +76,7 @@ def swept(t: Any, run: Settings):
 
 
 @wp.func
-def fill_inner_list(t: Any, far: Any, rank: int, size: int):
+def make_inner_list(t: Any, far: Any, rank: int, size: int):
     """Add those of the listed pairs that are nearer than ``far`` to those that may touch."""
     far2 = far * far
     none = full_like(far, -1.0)
@@ -103,9 +103,9 @@ def find_active(t: Any, run: Settings, fresh: int, rank: int, size: int):
     Few of the listed pairs ever touch before the list is made anew, and solving looks at each in every substep.
     """
     like = t.x[0]
-    near = swept(t, run)
-    if fresh != 0 or anywhere(t.notes[INNER_TRAVEL] * 2.0 + near - t.notes[INNER_REACH]):
-        ahead = near + root(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
+    approach = swept(t, run)
+    if fresh != 0 or anywhere(t.notes[INNER_TRAVEL] * 2.0 + approach - t.notes[INNER_REACH]):
+        ahead = approach + root(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
         barrier(size)
         if rank == 0:
             t.active_count[0] = t.active_count[0] * 0
@@ -113,5 +113,5 @@ def find_active(t: Any, run: Settings, fresh: int, rank: int, size: int):
             t.notes[INNER_TRAVEL] = full_like(like, 0.0)
             t.notes[INNER_REACH] = ahead
         barrier(size)
-        fill_inner_list(t, t.scalars[THICKNESS] + ahead * 1.01, rank, size)
+        make_inner_list(t, t.scalars[THICKNESS] + ahead * 1.01, rank, size)
         barrier(size)

@@ -37,7 +37,7 @@ LEAVE_SPEED = wp.constant(0.5)
 """[m/s] Layers found too close part no faster than this."""
 UNIT = wp.constant(1.0e-8)
 """[m] Step of the fixed-point sums: integers add up to the same whatever the order of threads."""
-MOST_WEIGHT = wp.constant(63.0)
+MAX_WEIGHT = wp.constant(63.0)
 """The greatest weight of a pair in the mean over a particle's contacts, where one that barely touches has 1."""
 
 
@@ -74,7 +74,7 @@ def contact_weight(t: Any, gap: float):
     through, and it is.
     """
     deep = wp.clamp(-gap / t.scalars[THICKNESS], 0.0, 1.0)
-    return 1 + int(MOST_WEIGHT * deep * deep * deep)
+    return 1 + int(MAX_WEIGHT * deep * deep * deep)
 
 
 @wp.func
