@@ -62,7 +62,7 @@ class Illumination:
             robust = prior / (1.0 + (distance / scale) ** 2)
 
     def field(self, crop: tuple[slice, slice]) -> np.ndarray:
-        """(h, w, 3) float32, the surface's smooth colour in a window (rows, columns) of the full image."""
+        """(h, w, 3) float32, the surface's smooth colour in a part (rows, columns) of the full image."""
         terms = len(self._coefficients)
         return np.exp(_quadratic(self._shape, crop)[..., :terms] @ self._coefficients.astype(np.float32))
 

@@ -61,7 +61,7 @@ class Colliders:
         self.shapes, self.count, self.keys = shapes, len(keys), tuple(keys)
         self.kinematic, self.min_radius = tuple(kinematic), min_radius
         self._meshes = meshes
-        # (worlds, led, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
+        # (worlds, kinematic, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
         self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
@@ -188,7 +188,7 @@ class Colliders:
 
     @cached_property
     def _table(self) -> np.ndarray:
-        """Key poses (worlds, led, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
+        """Key poses (worlds, kinematic, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
         shape = (-1, len(self.kinematic), FRAMES, FRAME_SIZE)
         pose = self.shapes.pose
         found = pose.numpy() if pose.device.is_cpu else np.zeros(len(pose), dtype=np.float32)

@@ -236,7 +236,7 @@ def _followed_by(frame: Coordinates) -> Any:
 
 
 def _pose_of(frame: Any, roots: dict[str, Any]) -> Pose:
-    """Return a led frame's pose from those of the bodies with paths: parts with an axis of times, or of 1."""
+    """Return a kinematic frame's pose from those of the bodies with paths: parts with an axis of times, or of 1."""
     if getattr(frame, "_path", None) is not None:
         place, turn = roots[frame.key]
         return place, frame._quaternion[..., None, :] if turn is None else turn

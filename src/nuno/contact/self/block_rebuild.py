@@ -35,7 +35,7 @@ def rebuild_by_block(t: StateFloat, topo: Topology, run: Settings, rank: int, si
         dy = t.reference[3 * n + 1] + t.reference[3 * n + 4]
         dz = t.reference[3 * n + 2] + t.reference[3 * n + 5]
         travelled = t.reference[3 * n + TRAVELLED] + wp.sqrt(dx * dx + dy * dy + dz * dz)
-        # before the next measure, points of blocks that are not listed may close in by the margin once more
+        # before the next measure, points of leaves that are not listed may close in by the margin once more
         again = lost or travelled + run.margin > t.reference[3 * n + WIDTH] - run.margin
         worst = float(0.0)
         if not again:

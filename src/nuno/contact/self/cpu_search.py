@@ -4,7 +4,7 @@ The sixteen worlds of a lane vector fold in different places and at different ti
 it needs it: its positions are copied out of the lanes, and the vector then holds sixteen boxes, triangles or edges of
 that one world. One world alone is listed by the same code.
 
-The order of a list is that of the vertices and edges sorted by block, whatever its margin and the moment it was made.
+The order of a list is that of the vertices and edges sorted by leaf, whatever its margin and the moment it was made.
 Pairs that touch are solved one after the other on the CPU, and so in the same order in every plan.
 """
 
@@ -15,11 +15,11 @@ import warp as wp
 from nuno.contact.self.cpu_flat_regions import survey_world
 from nuno.contact.self.cpu_scratch import ROOM, bound_world, copy_world
 from nuno.contact.self.simd_tests import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
-from nuno.state.cloth_state import MOST_NEIGHBOURS, Topology
-from nuno.topology.leaves import WINDOW
+from nuno.state.cloth_state import MAX_NEIGHBOURS, Topology
+from nuno.topology.leaves import FLAT_SIDE
 
 RANGES = 48
-"""Ranges of consecutive leaves near a block that are kept apart."""
+"""Ranges of consecutive leaves near a leaf that are kept apart."""
 
 
 @wp.func_native(
@@ -55,19 +55,19 @@ auto reach = [&](const float* rows, int count, int k, const float* low, const fl
     }
     return gap + r > 0.f;
 };
-// the blocks, of sixteen, that fit a tame window together with block a: no two of their elements are near
+// the leaves, of sixteen, that fit a tame square together with leaf a: no two of their elements are near
 auto safe = [&](int a, int start) ALONE {
     const int* span = leaf_span.data;
     const I left = smaller(*(const I*)(span + start), span[a]);
     const I right = larger(*(const I*)(span + spans + start), span[spans + a]);
     const I low = smaller(*(const I*)(span + 2 * spans + start), span[2 * spans + a]);
     const I high = larger(*(const I*)(span + 3 * spans + start), span[3 * spans + a]);
-    const I at = smaller(low, points / columns - WINDOW) * columns + smaller(left, columns - WINDOW);
-    return bits((right - left < WINDOW) & (high - low < WINDOW) & take_int(tame, at));
+    const I at = smaller(low, points / columns - FLAT_SIDE) * columns + smaller(left, columns - FLAT_SIDE);
+    return bits((right - left < FLAT_SIDE) & (high - low < FLAT_SIDE) & take_int(tame, at));
 };
 int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
 for (int c = 0; c < 2; ++c) {
-    int* max_counted = counted[c] + MOST_NEIGHBOURS * lanes;
+    int* max_counted = counted[c] + MAX_NEIGHBOURS * lanes;
     if (*counted[c] > *max_counted) *max_counted = *counted[c];
     *counted[c] = 0;
 }
@@ -92,7 +92,7 @@ for (int a = 0; a < leaves; ++a) {
         low[c] = box[c * boxes + a] - far;
         high[c] = box[(c + 3) * boxes + a] + far;
     }
-    // ranges of consecutive blocks that meet block a; where there are too many, the last one stretches
+    // ranges of consecutive leaves that meet leaf a; where there are too many, the last one stretches
     int first[RANGES], last[RANGES], ranges = 0;
     for (int g = 0; g < leaves_16; g += 16)
         for (unsigned some = overlaps(group, groups, g, low, high); some; some &= some - 1) {
@@ -108,7 +108,7 @@ for (int a = 0; a < leaves; ++a) {
             }
         }
     if (ranges == 0) continue;
-    // the elements near the block, side by side
+    // the elements near the leaf, side by side
     int face_count = 0, edge_count = 0;
     for (int r = 0; r < ranges; ++r) {
         const int face_stop = face_start[last[r]], edge_stop = edge_start[last[r]];
@@ -180,7 +180,7 @@ if (edges_waiting) test_edges(edges_waiting);
 const int creases = crease.shape[0];
 for (int k = 0; k < creases; k += 16) {
     I near = OWN + k < creases;
-    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_window.data, smaller(OWN + k, creases - 1)));
+    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_corner.data, smaller(OWN + k, creases - 1)));
     if (bits(near) == 0) continue;
     const I row = smaller(OWN + k, creases - 1) * 4;
     const int* table = (const int*)crease.data;
@@ -191,8 +191,8 @@ for (int k = 0; k < creases; k += 16) {
 }
 #endif
 """.replace("RANGES", str(RANGES))
-    .replace("WINDOW", str(WINDOW))
-    .replace("MOST_NEIGHBOURS", str(MOST_NEIGHBOURS))
+    .replace("FLAT_SIDE", str(FLAT_SIDE))
+    .replace("MAX_NEIGHBOURS", str(MAX_NEIGHBOURS))
 )
 def search_world(
     face: wp.array(dtype=wp.vec3i),
@@ -203,7 +203,7 @@ def search_world(
     leaf_edge_start: wp.array(dtype=int),
     leaf_span: wp.array(dtype=int),
     crease: wp.array(dtype=wp.vec4i),
-    crease_window: wp.array(dtype=int),
+    crease_corner: wp.array(dtype=int),
     columns: int,
     points: int,
     leaves: int,
@@ -314,7 +314,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         topo.leaf_edge_start,
         topo.leaf_span,
         topo.crease,
-        topo.crease_window,
+        topo.crease_corner,
         topo.columns,
         n,
         topo.leaves,

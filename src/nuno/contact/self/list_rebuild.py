@@ -8,7 +8,7 @@ from nuno.contact.self.block_rebuild import rebuild_by_block
 from nuno.contact.self.cpu_search import list_world, make_inner_list_of_world, reach_world
 from nuno.contact.self.neighbour_lists import FORGET, INNER_AHEAD, swept
 from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import LANES, add, anywhere, full_like, least, most, mul, root, shares_work, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.numbers.lanes import LANES, add, anywhere, full_like, maximum, minimum, mul, shares_work, sqrt, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
 from nuno.state.cloth_state import (
     INNER_REACH,
     INNER_TRAVEL,
@@ -44,12 +44,12 @@ def measure_moves(t: Any, topo: Topology):
             dx = at(t.x, i) - at(t.reference, i)
             dy = at(t.y, i) - at(t.reference, n + i)
             dz = at(t.z, i) - at(t.reference, 2 * n + i)
-            lx = least(lx, dx)
-            ly = least(ly, dy)
-            lz = least(lz, dz)
-            hx = most(hx, dx)
-            hy = most(hy, dy)
-            hz = most(hz, dz)
+            lx = minimum(lx, dx)
+            ly = minimum(ly, dy)
+            lz = minimum(lz, dz)
+            hx = maximum(hx, dx)
+            hy = maximum(hy, dy)
+            hz = maximum(hz, dz)
         k = 6 * (regions + g)
         put(t.bounds, k, lx)
         put(t.bounds, k + 1, ly)
@@ -75,19 +75,21 @@ def max_approach(t: Any, topo: Topology, far: Any):
             for c in range(3):
                 a = 6 * g + c
                 b = 6 * h + c
-                gap = most(gap, most(at(t.bounds, a) - at(t.bounds, b + 3), at(t.bounds, b) - at(t.bounds, a + 3)))
+                gap = maximum(
+                    gap, maximum(at(t.bounds, a) - at(t.bounds, b + 3), at(t.bounds, b) - at(t.bounds, a + 3))
+                )
                 a = a + 6 * regions
                 b = b + 6 * regions
-                span = most(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
+                span = maximum(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
                 square = square + span * span
-            worst = most(worst, root(square) - most(gap - far, zero))
+            worst = maximum(worst, sqrt(square) - maximum(gap - far, zero))
     return worst
 
 
 @wp.func
 def look_ahead(t: Any, run: Settings, approach: Any):
     """Return how far beyond its thickness a pair is picked [m]: for a few substeps, at the speed of the moment."""
-    return approach + root(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
+    return approach + sqrt(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
 
 
 @wp.func
@@ -104,7 +106,7 @@ def rebuild_lists(t: StateLanes, topo: Topology, run: Settings, rank: int, size:
     if anywhere(t.notes[TRAVEL] * 2.0 - left):
         measure_moves(t, topo)
         worst = max_approach(t, topo, t.scalars[THICKNESS] + run.margin)
-        worst = most(worst, t.notes[TRAVEL] - FORGET)
+        worst = maximum(worst, t.notes[TRAVEL] - FORGET)
         t.notes[TRAVEL] = worst * 0.5
         late = worst - left
         for k in range(lanes):
