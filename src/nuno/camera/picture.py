@@ -253,7 +253,7 @@ def _surface(body: Any, camera: Camera | None) -> tuple[np.ndarray, np.ndarray, 
     if camera is not None and not body.is_dynamic:
         vertices, faces = _split(camera, body.vertices.reshape(-1, *body.vertices.shape[-2:])[0], body.faces)
         return vertices, _normals(vertices, faces), faces, vertices
-    still = not body.is_dynamic and not body.is_deformed and body._position.ndim == 1 and body._quaternion.ndim == 1
+    still = not body.is_dynamic and not body.is_deformed and all(part.ndim == 1 for part in body.pose())
     if still:
         local, faces = body.shape.mesh()
         turn, place = body.rotation, body.position

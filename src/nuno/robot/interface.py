@@ -253,7 +253,7 @@ class RobotInterface(JointInterface):
             moment += torque + np.cross(pose.position, own) + np.cross(centre, weight)
         if force[2] < LOADED:
             raise RobotModelError(f"{self.robot.name!r} does not stand: its feet bear {force[2]:.2f} N")
-        place, turn = self.footprint()._pose()
+        place, turn = self.footprint().pose()
         point = np.append(zero_moment_point(force, moment, place[2]), place[2])
         return point if wrt == "world" else quat.rotate(quat.inverse(turn), point - place)
 
@@ -263,7 +263,7 @@ class RobotInterface(JointInterface):
         """Bring ``robot`` to the newest joint state, its base to where odometry has it; see ``JointInterface``."""
         if not super().update_robot_state(wait_until_update):
             return False
-        self.robot._place(*self.read_base()._pose())
+        self.robot._place(*self.read_base().pose())
         return True
 
     def footprint(self) -> Coordinates:
@@ -291,19 +291,19 @@ class RobotInterface(JointInterface):
 
     def _frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         self.update_robot_state()
-        return self.robot.frame_pose(name)._pose()
+        return self.robot.frame_pose(name).pose()
 
     def _to_base(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return compose(invert(self.footprint()._pose()), (position, quaternion))
+        return compose(invert(self.footprint().pose()), (position, quaternion))
 
     def _in_base(self, coords: Coordinates, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
         if not isinstance(coords, Coordinates):
             raise InvalidInputError(f"coords must be Coordinates or a frame's name, got {type(coords).__name__}")
         if frame is None or frame == BASE:
-            return coords._pose()
+            return coords.pose()
         if frame in WORLDS:
-            return self._to_base(*coords._pose())
-        return self._to_base(*compose(self._frame(frame), coords._pose()))
+            return self._to_base(*coords.pose())
+        return self._to_base(*compose(self._frame(frame), coords.pose()))
 
     def _beyond(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return what bears the foot beyond a sensor (3,) [N], at rest, and the foot's centre of mass (3,) [m]."""

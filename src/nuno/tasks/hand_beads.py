@@ -34,7 +34,7 @@ def put_beads(links: Links) -> tuple[Body, ...]:
     beads = []
     for hand in links.robot.description.hands:
         body, offset = carrier(links, hand)
-        place = Coordinates(*body._pose()).transform(Coordinates(*offset)).to_world([BEAD_AT])[0]
+        place = Coordinates(*body.pose()).transform(Coordinates(*offset)).to_world([BEAD_AT])[0]
         bead = sphere(BEAD, name=f"{hand} bead", color=BEAD_COLOR, position=place, group=0, collides_with=0)
         beads.append(links.world.add(bead))
         body.assoc(bead)

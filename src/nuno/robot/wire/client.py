@@ -240,7 +240,7 @@ class WireRobot(RobotInterface):
             self._has_odometry = topic in (self._listed("topics", topic) or ())
             if self._has_odometry and not self._wait(lambda: self._latest[topic] is not None, self.connection.timeout):
                 raise RobotTimeoutError(f"nothing came on {topic} within {self.connection.timeout:g} s")
-        return self._latest[topic] or Coordinates(*self.robot._pose())
+        return self._latest[topic] or Coordinates(*self.robot.pose())
 
     def send_base(self, x: float, y: float, yaw: float, seconds: float | None, stop: bool) -> Goal:
         """Let the robot go to a place seen from where it is, and return the goal at once; see ``RobotInterface``.
