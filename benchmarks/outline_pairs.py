@@ -26,7 +26,7 @@ from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.futures import LIFT_SECONDS, REST_SPEED, rest_speed, solver_of, table_world
-from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_counts, spread
+from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_counts, hypotheses_with
 from nuno.estimate.learned import WIDTH, described
 from nuno.estimate.outline_net import SIZE
 from nuno.estimate.ranking import CONTOUR_WEIGHT, OVERLAP_WEIGHT
@@ -37,7 +37,7 @@ from nuno.shapes.path import Path as HandPath
 FIRST = (FIRM[1], FIRM[8], LOOSE[3], LOOSE[6])
 """What an estimate begins with."""
 OTHERS = tuple(h for h in FIRM + LOOSE + SHEARING if h not in FIRST)
-DOUBLES = spread(3000.0, 1200.0)
+DOUBLES = hypotheses_with(3000.0, 1200.0)
 GRID = np.array([divmod(k, 6) for k in range(36)]) / 5
 BEST, NEAR, FAR = 8, 11, 5
 """Candidates of which pictures are kept; real picks of those nearest to the hand, and of others drawn at random: with

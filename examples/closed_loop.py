@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import nuno
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.tasks.look_at_camera import look_at_camera
 from nuno.tasks.pick_towel import TowelPicker
 from nuno.tasks.towel_room import TABLE, make_room
@@ -22,7 +22,7 @@ options.add_argument("--point", type=int, nargs=2, default=(0, 5), metavar=("I",
 options.add_argument("--out", type=Path, help="a folder for a picture")
 asked = options.parse_args()
 POINT, out = tuple(asked.point), asked.out
-QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]  # without it: two finer meshes, a minute
+QUICK = [Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])]  # without it: two finer meshes, a minute
 
 room = make_room(nuno.Cloth.preset("denim"), device="cpu")  # what is real
 talos = TowelPicker(room.driver, table=TABLE, device="cpu")  # and who knows nothing else of it

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 import nuno
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 
 CASE = Path(__file__).parent / "pick-case"
 TRUE = (0, 0)  # where this cloth was picked, in the simulation that its images were rendered from
@@ -20,7 +20,7 @@ options.add_argument("--out", type=Path, help="a folder for result.json and resu
 out = options.parse_args().out
 
 case = nuno.read_case(CASE)
-quick = Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])
+quick = Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])
 result = case.estimate(candidates=(6, 6), discretisations=[quick], device="cpu", progress=False)
 
 print(f"cloth of {result.rectangle.long_m * 100:.1f} x {result.rectangle.short_m * 100:.1f} cm")

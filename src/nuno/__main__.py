@@ -120,9 +120,9 @@ def _fold(options: argparse.Namespace) -> int:
     result = case.replay(device=options.device, progress=options.progress)
     result.save(options.out, names=case.names)
     agreement = list(result.agreement.values())
-    told = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
+    agreed = f"agreement {sum(agreement) / len(agreement):.3f}, " if agreement else ""
     sys.stdout.write(
-        f"replayed {len(result.times)} frames as {result.material_name}, {told}in {result.seconds['total']:.1f} s; "
+        f"replayed {len(result.times)} frames as {result.material_name}, {agreed}in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'}, strip.png, layers.png, hands.png and replay.glb\n"
     )
     return ANSWERED
@@ -157,12 +157,12 @@ def _compile(options: argparse.Namespace) -> int:
     device = options.device or ("cpu" if options.arch is None else "cuda")
     count = 0
 
-    def told(name: str, seconds: float) -> None:
+    def report(name: str, seconds: float) -> None:
         nonlocal count
         count += 1
         sys.stderr.write(f"nuno: {name}: {seconds:.1f} s\n")
 
-    where = compile_kernels(device, options.arch, only=options.only, jobs=options.jobs, told=told)
+    where = compile_kernels(device, options.arch, only=options.only, jobs=options.jobs, report=report)
     sys.stdout.write(f"{count} modules of kernels for {options.arch or device} in {where}\n")
     return ANSWERED
 

@@ -73,11 +73,11 @@ class Material:
             value = getattr(self, item.name)
             own = elements if item.name in self.PER_ELEMENT else None
             if item.name not in self.DIRECTED:
-                result[item.name] = _spread(item.name, value, worlds, own)
+                result[item.name] = _by_world(item.name, value, worlds, own)
                 continue
             pair = value if isinstance(value, tuple) else (value, value)
             for side, part in zip(("warp", "weft"), pair, strict=True):
-                result[f"{item.name}_{side}"] = _spread(item.name, part, worlds, own)
+                result[f"{item.name}_{side}"] = _by_world(item.name, part, worlds, own)
         return result
 
     def of_world(self, world: int, world_count: int) -> Self:
@@ -259,9 +259,9 @@ class Rigid(Material):
         """Return float32 arrays (worlds, 1); ``mass`` and ``inertia`` are left out."""
         worlds = count("world_count", world_count)
         if self.mass is not None:
-            _spread("mass", self.mass, worlds, None)
+            _by_world("mass", self.mass, worlds, None)
         names = ("density", "friction", "restitution", "air_drag")
-        return {name: _spread(name, getattr(self, name), worlds, None) for name in names}
+        return {name: _by_world(name, getattr(self, name), worlds, None) for name in names}
 
 
 def _checked_inertia(value: Any) -> np.ndarray:
@@ -291,7 +291,7 @@ def _checked(name: str, value: Any, *, zero: bool, deepest: int) -> Any:
     return float(array) if array.ndim == 0 else array
 
 
-def _spread(name: str, value: Any, worlds: int, elements: int | None) -> np.ndarray:
+def _by_world(name: str, value: Any, worlds: int, elements: int | None) -> np.ndarray:
     array = np.asarray(value, dtype=np.float32)
     shapes = {(): (1, 1), (worlds,): (worlds, 1)}
     if elements is not None:

@@ -32,9 +32,9 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
             raise ValueError("text is no number")
         array = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as problem:
-        raise error(f"{name} must be numbers of shape {_listed(shapes)}, got {_short(value)}") from problem
+        raise error(f"{name} must be numbers of shape {_shape_text(shapes)}, got {_short(value)}") from problem
     if not any(_fits(array.shape, shape) for shape in shapes):
-        raise error(f"{name} must have shape {_listed(shapes)}, got {array.shape}")
+        raise error(f"{name} must have shape {_shape_text(shapes)}, got {array.shape}")
     if not np.isfinite(array).all():
         raise error(f"{name} must be finite, got {np.count_nonzero(~np.isfinite(array))} values that are not")
     return array
@@ -50,11 +50,11 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     try:
         array = np.array(value)
     except ValueError as problem:
-        raise error(f"{name} must be indices of shape {_listed(shapes)}, got {value!r}") from problem
+        raise error(f"{name} must be indices of shape {_shape_text(shapes)}, got {value!r}") from problem
     if array.dtype.kind not in "iu":
-        raise error(f"{name} must be whole numbers of shape {_listed(shapes)}, got {array.dtype}")
+        raise error(f"{name} must be whole numbers of shape {_shape_text(shapes)}, got {array.dtype}")
     if not any(_fits(array.shape, shape) for shape in shapes):
-        raise error(f"{name} must have shape {_listed(shapes)}, got {array.shape}")
+        raise error(f"{name} must have shape {_shape_text(shapes)}, got {array.shape}")
     if array.min() < low or array.max() >= high:
         raise error(f"{name} must lie in [{low}, {high - 1}], got {array.min()} to {array.max()}")
     return array.astype(np.int32)
@@ -103,5 +103,5 @@ def _fits(actual: tuple[int, ...], wanted: Shape) -> bool:
     return all(a >= 1 if isinstance(w, str) else a == w for a, w in zip(actual, wanted, strict=True))
 
 
-def _listed(shapes: tuple[Shape, ...]) -> str:
+def _shape_text(shapes: tuple[Shape, ...]) -> str:
     return " or ".join("(" + ", ".join(map(str, s)) + ("," if len(s) == 1 else "") + ")" for s in shapes)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from nuno.camera.rim_shadow import cloth_beside_shadow
+from nuno.camera.rim_shadow import cloth_at_shadow
 
 TABLE = np.array([140.0, 120.0, 100.0])
 CLOTH = np.array([60.0, 70.0, 150.0])
@@ -28,7 +28,7 @@ def measure(image: np.ndarray, line: float, metres: float = 0.002) -> np.ndarray
     """The cloth's edge along a line at a column [px]."""
     rows = np.arange(10.0, 150.0, 2.0)
     pixels = np.column_stack([np.full_like(rows, line), rows])
-    return cloth_beside_shadow(image, pixels, np.tile([1.0, 0.0], (len(rows), 1)), metres)
+    return cloth_at_shadow(image, pixels, np.tile([1.0, 0.0], (len(rows), 1)), metres)
 
 
 @pytest.mark.parametrize("width", [2, 3, 4])
@@ -67,4 +67,4 @@ def test_a_wide_strip_is_no_shadow() -> None:
 def test_a_short_side_is_left_alone() -> None:
     """A dozen pixels say too little."""
     pixels = np.column_stack([np.full(8, EDGE + 0.0), np.arange(20.0, 36.0, 2.0)])
-    assert cloth_beside_shadow(side(3, 0.45), pixels, np.tile([1.0, 0.0], (8, 1)), 0.002) is None
+    assert cloth_at_shadow(side(3, 0.45), pixels, np.tile([1.0, 0.0], (8, 1)), 0.002) is None

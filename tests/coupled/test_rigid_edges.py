@@ -26,7 +26,7 @@ def surface(body, count=8):
 
 def outside(rigid, body):
     """Return how far the nearest point of a body's surface is outside of all convex parts of a rigid one [m]."""
-    place, turn = rigid._pose()
+    place, turn = rigid.pose()
     points = quat.rotate(quat.inverse(turn), surface(body) - place)
     least = 1.0
     for part in rigid._dynamics.parts:

@@ -10,7 +10,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate import compile_ahead
 from nuno.estimate.futures import imagine_picks
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.pick_sight import score_futures
 from nuno.estimate.similarity import Silhouette
 
@@ -37,7 +37,7 @@ def test_what_an_estimate_launches_is_asked_for(asked, monkeypatch):
     corners = np.array([(-0.1, -0.1, 0.002), (0.1, -0.1, 0.002), (0.1, 0.1, 0.002), (-0.1, 0.1, 0.002)])
     rectangle = ClothRectangle(corners, 0.2, 0.2, corners.mean(axis=0), 0.0, 0.0)
     futures = imagine_picks(
-        rectangle, np.array([(0.0, 0.0), (1.0, 1.0)]), (2, 2), Discretisation(4, 8, SPREAD[:1]), table=Table(0.0),
+        rectangle, np.array([(0.0, 0.0), (1.0, 1.0)]), (2, 2), Discretisation(4, 8, HYPOTHESES[:1]), table=Table(0.0),
         hand=np.array((0.0, 0.0, 0.3)), rest_height=0.002, device="cpu", lift_seconds=0.1,
     )  # fmt: skip
     pose = np.eye(4)

@@ -10,7 +10,7 @@ import nuno
 from nuno.camera.segmentation import segment_after, segment_before
 from nuno.camera.table import Table
 from nuno.errors import ImageError
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 
 CASE = Path(__file__).parents[2] / "examples" / "pick-case"
 TRUE = (0, 0)
@@ -53,7 +53,7 @@ def test_arm_is_no_cloth(case, arm):
 
 def test_answer_with_an_arm_in_the_image(case, arm):
     """The answer is that without an arm, and hidden pixels are ignored in the comparison."""
-    quick = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]
+    quick = [Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])]
     result = replace(case, after=covered(case.after, arm)).estimate(
         hidden=arm, discretisations=quick, device="cpu", progress=False
     )  # fmt: skip

@@ -5,7 +5,7 @@ from nuno.estimate.hypotheses import DISCRETISATIONS, FIRM, FRICTIONS, LOOSE, ce
 
 def test_stages_share_out_every_guess_once() -> None:
     """The first three stages together hold all firm and loose guesses, none twice: evidence is a mean over them."""
-    guesses = [guess for stage in DISCRETISATIONS[:3] for guess in stage.spread]
+    guesses = [guess for stage in DISCRETISATIONS[:3] for guess in stage.hypotheses]
     assert len(set(guesses)) == len(guesses)
     assert set(guesses) == {*FIRM, *LOOSE}
 
@@ -20,7 +20,7 @@ def test_stages_narrow_down() -> None:
 def test_every_stage_tries_both_frictions() -> None:
     """How far the cloth slides is as unknown as how it bends, so no stage may take one friction alone."""
     for stage in DISCRETISATIONS:
-        assert {guess.friction for guess in stage.spread} == set(FRICTIONS)
+        assert {guess.friction for guess in stage.hypotheses} == set(FRICTIONS)
 
 
 def test_cells_are_multiples_of_the_grid() -> None:

@@ -10,7 +10,7 @@ import nuno
 from nuno import ImageError, InvalidInputError
 from nuno.camera import raster
 from nuno.camera.table import Table
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.lift_prior import log_prior_of_lift
 from nuno.estimate.pick_sight import draw_futures, masks_of_turned
 from nuno.estimate.ranking import SHARE
@@ -23,8 +23,8 @@ CENTRE, YAW = np.array((0.05, 0.02, TOP + REST_HEIGHT)), 0.35  # [m], [rad]
 UV = (0.8, 0.2)  # the picked point on the sheet: a grid point of 6 x 6
 HALF = (0.45, 0.6)  # [m] of the table top
 TURN = float(np.radians(20))  # [rad] of the cloth about the hand's vertical, in `turned`
-DOUBLES = Discretisation(15, 12, SPREAD[::2])  # tells neighbouring points of a 6 x 6 grid apart
-QUICK = Discretisation(10, 10, SPREAD[::3])  # and this one does not
+DOUBLES = Discretisation(15, 12, HYPOTHESES[::2])  # tells neighbouring points of a 6 x 6 grid apart
+QUICK = Discretisation(10, 10, HYPOTHESES[::3])  # and this one does not
 
 
 def make_camera():
@@ -142,7 +142,7 @@ def test_stages_are_timed_and_futures_kept(result):
     assert set(stages) == {"read", "see", "compile", "imagine", "compare", "total"}
     assert min(stages.values()) >= 0.0
     assert sum(stages.values()) - stages["total"] == pytest.approx(stages["total"], rel=1e-9)
-    assert result.futures.world.world_count == 36 * len(DOUBLES.spread)
+    assert result.futures.world.world_count == 36 * len(DOUBLES.hypotheses)
     assert result.masks.shape == (36, 120, 160) and result.real.mask.shape == (120, 160)
 
 
@@ -261,7 +261,7 @@ def test_images_of_a_plain_cloth_change_nothing(small, seen):
 
 def test_a_sure_answer_ends_the_stages(small, seen):
     """Once a candidate is as likely as `sure`, later stages are left out, bit for bit; 1 runs them all."""
-    stages = [QUICK, replace(QUICK, spread=SPREAD[1:3], best=3)]
+    stages = [QUICK, replace(QUICK, hypotheses=HYPOTHESES[1:3], best=3)]
     given = options(seen, candidates=(3, 2), discretisations=stages)
     early = nuno.estimate_pick(None, None, **given, sure=small.confidence)
     np.testing.assert_array_equal(early.scores, small.scores)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from nuno import Camera, InvalidInputError
 from nuno.estimate.ranking import Comparison, rank
-from nuno.estimate.rotations import SPREAD, TURNS, checked_turns, log_prior, turn, view_of_turned
+from nuno.estimate.rotations import DEVIATION, TURNS, checked_turns, log_prior, turn, view_of_turned
 
 HAND = np.array((0.1, -0.2, 1.05))
 
@@ -44,7 +44,7 @@ def test_the_prior_adds_up_to_one():
     logs = log_prior(TURNS)
     assert np.exp(logs).sum() == pytest.approx(1.0, abs=1e-15)
     at, none = TURNS[0], TURNS.index(0.0)
-    assert logs[none] - logs[0] == pytest.approx(0.5 * (at / SPREAD) ** 2)
+    assert logs[none] - logs[0] == pytest.approx(0.5 * (at / DEVIATION) ** 2)
     assert log_prior([0.0]) == [0.0]
 
 
@@ -66,7 +66,7 @@ def comparison(turns, chamfer):
 
 def test_the_evidence_is_averaged_over_turns():
     """Likelihood 1 / (1 + chamfer)^5, weighed by the prior; contour distance and eq. (1) look at no turn alone."""
-    turns = (-SPREAD, 0.0, SPREAD)
+    turns = (-DEVIATION, 0.0, DEVIATION)
     seen = comparison(turns, [[[0.0, 9.0]], [[9.0, 1.0]], [[9.0, 9.0]]])
     side = np.exp(-0.5)
     prior = np.array((side, 1.0, side)) / (1 + 2 * side)

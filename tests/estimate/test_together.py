@@ -8,15 +8,15 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate import pick, together
 from nuno.estimate.futures import imagine_picks, solver_of
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.together import alike, imagine_together
 
 TOP, REST_HEIGHT = 0.7, 0.0025  # [m]
 HAND = np.array((0.0, 0.0, 1.1))  # [m]
 CORNERS = np.array(((-0.2, -0.15), (0.2, -0.15), (0.2, 0.15), (-0.2, 0.15)))  # [m]
 UV = np.array(((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 1.0), (1.0, 1.0)))
-FIRST = Discretisation(6, 6, SPREAD[:2])
-STAGES = (Discretisation(6, 6, SPREAD[2:4], best=4), Discretisation(6, 6, SPREAD[4:6], best=2))
+FIRST = Discretisation(6, 6, HYPOTHESES[:2])
+STAGES = (Discretisation(6, 6, HYPOTHESES[2:4], best=4), Discretisation(6, 6, HYPOTHESES[4:6], best=2))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_a_part_is_what_the_stage_imagines_by_itself(both, settings, stage, chos
     number = len(chosen)  # the first candidate under the second hypothesis
     batch, place = part.whole(number)
     assert batch.world.time == alone.world.time
-    assert batch.discretisation.spread[place // batch.candidates] is STAGES[stage].spread[1]
+    assert batch.discretisation.hypotheses[place // batch.candidates] is STAGES[stage].hypotheses[1]
     solvers = solver_of(batch.body), solver_of(alone.body)
     for a, b in zip(*(s.velocities_apart() for s in solvers), strict=True):
         np.testing.assert_array_equal(a[place], b[number])
@@ -61,7 +61,7 @@ def test_what_is_not_in_the_batch_is_told(both):
 
 def test_stages_of_one_mesh_and_step_are_alike():
     """Another mesh, another step and a stage that looks at all candidates are left out."""
-    others = (Discretisation(9, 6, SPREAD, best=2), Discretisation(6, 8, SPREAD, best=2), FIRST)
+    others = (Discretisation(9, 6, HYPOTHESES, best=2), Discretisation(6, 8, HYPOTHESES, best=2), FIRST)
     assert alike((STAGES[0], *others, STAGES[1])) == STAGES
     assert alike((FIRST, *STAGES)) == (FIRST,)
 
@@ -79,7 +79,7 @@ def test_an_estimate_is_the_same(monkeypatch):
     before = world.masks(camera, cloth).numpy()
     cloth.locate((0, 0, 0.95)).rotate(1.4, "y", wrt="world")  # hangs as no pick does: no stage is sure
     after = world.masks(camera, cloth).numpy()
-    stages = (FIRST, STAGES[0], Discretisation(9, 6, SPREAD[2:4], best=3), STAGES[1])
+    stages = (FIRST, STAGES[0], Discretisation(9, 6, HYPOTHESES[2:4], best=3), STAGES[1])
     found, batches = [], []
     imagine = together.imagine_together
     monkeypatch.setattr(together, "imagine_together", lambda *a, **k: batches.append(imagine(*a, **k)) or batches[-1])
@@ -91,7 +91,7 @@ def test_an_estimate_is_the_same(monkeypatch):
             progress=False,
         )  # fmt: skip
         batch = result.futures
-        guess = batch.discretisation.spread[result.best_index // batch.candidates]
+        guess = batch.discretisation.hypotheses[result.best_index // batch.candidates]
         world = result.adopt()
         found.append((result.scores, result.masks, guess, world.time, world.find("cloth").vertices))
     for a, b in zip(*found, strict=True):

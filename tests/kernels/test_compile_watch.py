@@ -7,7 +7,7 @@ import time
 import pytest
 import warp as wp
 
-from nuno.kernels.compile_watch import TOLD_AFTER, Stages, compiling_watched
+from nuno.kernels.compile_watch import LOGGED_AFTER, Stages, compiling_watched
 
 
 class Heard:
@@ -77,7 +77,7 @@ def test_compiling_is_a_stage_wherever_it_happens(heard):
 def test_a_wait_is_told_by_name(heard, caplog, how):
     """Module and seconds; short ones are not worth it."""
     with caplog.at_level(logging.WARNING), compiling_watched():
-        wp.get_logger().info(loaded(0.9 * TOLD_AFTER, how))
+        wp.get_logger().info(loaded(0.9 * LOGGED_AFTER, how))
         assert caplog.messages == []
         wp.get_logger().info(loaded(17.34, how))
     assert len(caplog.messages) == 1 and "17.3 s" in caplog.text and "nuno.state.pack" in caplog.text

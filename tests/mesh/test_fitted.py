@@ -7,12 +7,12 @@ from test_lattice import arrays, turned_box
 
 from matching import inner_faces_match
 from nuno.mesh import primitives
-from nuno.mesh.fill import inside_nodes
 from nuno.mesh.fitted import UnresolvedMeshError, fitted_tetrahedra
 from nuno.mesh.lattice import lattice_tetrahedra
 from nuno.mesh.nearest import NearestOn
-from nuno.mesh.relaxed import LEAST_HEIGHT, heights
+from nuno.mesh.relaxed import MIN_HEIGHT, heights
 from nuno.mesh.tetrahedra import boundary_faces, volumes
+from nuno.mesh.voxel_occupancy import inside_nodes
 
 
 def wavy_ball():
@@ -49,7 +49,7 @@ def test_elements(case):
     assert inner_faces_match(made.tets)
     assert len(np.unique(made.tets)) == len(made.vertices)
     # voxels are a little smaller than the cell where the box is no multiple of it: 0.8 at the least here
-    assert heights(made.vertices, made.tets).min() > 0.8 * LEAST_HEIGHT * cell
+    assert heights(made.vertices, made.tets).min() > 0.8 * MIN_HEIGHT * cell
 
 
 def test_boundary_is_on_the_surface(case):

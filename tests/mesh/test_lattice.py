@@ -7,9 +7,9 @@ import trimesh
 from matching import inner_faces_match
 from nuno import MeshError
 from nuno.mesh import primitives
-from nuno.mesh.fill import filled_fraction
 from nuno.mesh.lattice import FLOOR, lattice_tetrahedra
 from nuno.mesh.tetrahedra import FACES, volumes
+from nuno.mesh.voxel_occupancy import filled_fraction
 
 TURN = trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))[:3, :3]
 

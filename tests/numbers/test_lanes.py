@@ -3,7 +3,7 @@
 import numpy as np
 import warp as wp
 
-from nuno.numbers.lanes import LANES, add, choose, div, lane, least, most, mul, sub  # noqa: F401
+from nuno.numbers.lanes import LANES, add, choose, div, lane, maximum, minimum, mul, sub  # noqa: F401
 
 COUNT = 17
 
@@ -24,8 +24,8 @@ def _all_kinds(a: wp.array(dtype=lane), b: wp.array(dtype=lane), s: float, out: 
     out[9] = x / y
     out[10] = x / s
     out[11] = s / x
-    out[12] = least(x, s)
-    out[13] = most(s, x)
+    out[12] = minimum(x, s)
+    out[13] = maximum(s, x)
     out[14] = choose(y, s, x)
     out[15] = choose(y, x, s)
     out[16] = choose(y, s, 2.0)

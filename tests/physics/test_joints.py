@@ -110,8 +110,8 @@ def test_a_four_bar_closes_and_its_rocker_goes_where_geometry_says():
     for _ in range(180):
         world.step()
         assert max(map(gap, joints)) < 2e-5
-        now = apply(first._pose(), np.array([(0.5 * crank, 0.0, 0.0)]))[0]
-        found = apply(last._pose(), np.array([(0.5 * rocker, 0.0, 0.0)]))[0]
+        now = apply(first.pose(), np.array([(0.5 * crank, 0.0, 0.0)]))[0]
+        found = apply(last.pose(), np.array([(0.5 * rocker, 0.0, 0.0)]))[0]
         np.testing.assert_allclose(found, corner(now), atol=1e-4)  # the gaps, as the linkage multiplies them
     assert drive.velocity == pytest.approx(6.0, rel=0.01)
 

@@ -18,7 +18,7 @@ def test_every_mesh_is_where_the_robot_has_it(name, request):
     assert [look.shape for look in looks] == list(shapes)
     data = robot.update()
     for look, shape in zip(looks, shapes, strict=True):
-        place, _ = compose(links.bodies[look.body]._pose(), look.pose)
+        place, _ = compose(links.bodies[look.body].pose(), look.pose)
         np.testing.assert_allclose(place, data.oMi[shape.joint].act(shape.position), atol=1e-12)
     with_body = {links.joints[look.body] for look in looks}
     assert ({shape.joint for shape in shapes} - with_body != set()) == (name == "g1")

@@ -7,7 +7,7 @@ import pytest
 
 import nuno
 from nuno.errors import EstimationError
-from nuno.estimate.hypotheses import SPREAD, Discretisation
+from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.robot.humanoid import Humanoid
 from nuno.tasks.hand_beads import BEAD, BEAD_AT, find_bead
 from nuno.tasks.pick_towel import OPENING, PINCH, TowelPicker, pinching
@@ -17,7 +17,7 @@ PICKS = ((0, 0), (5, 0), (0, 5), (5, 5), (1, 2), (3, 3))
 """All corners and two points within, chosen before any was tried."""
 INSIDE = (3, 3)
 """Of these, the one that a single coarse mesh tells from its neighbours by most: the fast tests take that."""
-QUICK = [Discretisation(cells=15, substeps=12, spread=SPREAD[1::2])]
+QUICK = [Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])]
 TOUCHED = ("angle_vector", "angle_vector_sequence", "wait_interpolation", "move_gripper", "start_grasp", "sleep",
            "update_robot_state", "default_controller")  # fmt: skip
 

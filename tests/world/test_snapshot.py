@@ -283,14 +283,14 @@ def test_a_body_forgets_a_parent_that_it_had_meanwhile():
     world = nuno.World(device="cpu")
     cup = world.add(nuno.cylinder(0.04, 0.1, position=(0.1, 0.2, 0.3)).rotate(0.3, (1, 2, 3)))
     tray = world.add(nuno.box((0.3, 0.3, 0.02), position=(0.3, 0.1, 0.7)).rotate(1.1, (3, 1, 2)))
-    pose, saved = cup._pose(), world.save()
+    pose, saved = cup.pose(), world.save()
     tray.assoc(cup)
     for body in (cup, tray):
         world.remove(body)
     tray.translate((1.0, 0.0, 0.0))
     world.restore(saved)
     assert cup.parent is None
-    np.testing.assert_array_equal(np.concatenate(cup._pose()), np.concatenate(pose))
+    np.testing.assert_array_equal(np.concatenate(cup.pose()), np.concatenate(pose))
 
 
 def test_a_body_that_follows_a_frame_is_where_it_was_to_the_bit():
@@ -299,8 +299,8 @@ def test_a_body_that_follows_a_frame_is_where_it_was_to_the_bit():
     frame = nuno.Coordinates((0.3, -0.2, 0.7)).rotate(0.7, (1, 2, 3))
     cup = world.add(nuno.cylinder(0.04, 0.1, position=(0.1, 0.2, 0.3)).rotate(0.3, (3, 2, 1)))
     frame.assoc(cup)
-    pose, saved = np.concatenate(cup._pose()), world.save()
+    pose, saved = np.concatenate(cup.pose()), world.save()
     cup.translate((0.1, 0.0, 0.0))
     world.restore(saved)
     assert cup.parent is frame
-    np.testing.assert_array_equal(np.concatenate(cup._pose()), pose)
+    np.testing.assert_array_equal(np.concatenate(cup.pose()), pose)

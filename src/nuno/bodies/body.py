@@ -282,7 +282,7 @@ class Body(Quantities, Coordinates):
 
     def _vertices(self) -> np.ndarray:
         """Return (n, 3) or (worlds, n, 3), not to be written to."""
-        return self._rigid_vertices(self._pose()) if self._dynamics is None else self._dynamics.vertices(self)
+        return self._rigid_vertices(self.pose()) if self._dynamics is None else self._dynamics.vertices(self)
 
     def _rigid_vertices(self, pose: Pose) -> np.ndarray:
         """Return (n, 3) or (worlds, n, 3) of the body as it is when static, at a pose."""
@@ -302,9 +302,10 @@ class Body(Quantities, Coordinates):
         vertices, base = self._deformed
         return apply(invert(base), vertices)
 
-    def _pose(self) -> Pose:
+    def pose(self) -> Pose:
+        """Return position [m] and quaternion in the world frame, of a dynamic body as its solver has it."""
         if self._dynamics is None:
-            return super()._pose()
+            return super().pose()
         with self._guard():
             return self._dynamics.pose(self)
 

@@ -242,10 +242,10 @@ class ParticleDynamics(Dynamics):
         """Bring the grips and pushes of a span from ``time`` on; a leading body's last move takes a ``frame`` [s]."""
         grips = [grip for grip in self.grips if not grip.is_tie]
         for grip in self.grips:
-            if grip.is_tie and grip._offsets is not None:
-                grip._spec_for(time, frame)
+            if grip.is_tie and grip.offsets is not None:
+                grip.spec_for(time, frame)
         if self.grips_changed or any(grip.target is not None for grip in grips):
-            self.solver.set_grips([grip._spec_for(time, frame) for grip in grips])
+            self.solver.set_grips([grip.spec_for(time, frame) for grip in grips])
             self.grips_changed = False
         pushing = self.pushing(time)
         if pushing != self._pushing:

@@ -167,7 +167,7 @@ class RigidScene:
 
     def bring_static(self, body: Body) -> int:
         """Tell the solver of a static body as it is now; return its slot."""
-        pose = body._pose()
+        pose = body.pose()
         where = (pose[0].tobytes(), pose[1].tobytes())
         known = self.static.get(body.key)
         if known is not None and known.is_of(body, body._deformed):
@@ -222,7 +222,7 @@ class RigidDynamics(Dynamics):
         self.deformed, self.thickness = body._deformed, body.thickness
         values = material.resolved(world.world_count)
         self.mass, self.inertia, self.centre = _mass_of(body, material, values["density"][:, 0])
-        place, turn = body._pose()
+        place, turn = body.pose()
         self.scene = world._rigid_scene(place)
         self.solver = self.scene.solver
         slot, rows = self.scene.kept.pop(body.key, (None, None))

@@ -9,7 +9,7 @@ import warp as wp
 
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, View, view
-from nuno.camera.raster import SUBPIXELS, project
+from nuno.camera.projection import SUBPIXELS, project
 
 wp.set_module_options({"enable_backward": False})
 
@@ -18,7 +18,7 @@ _NOTHING = (1 << 30, 1 << 30, -(1 << 30), -(1 << 30), 0)
 
 
 @wp.kernel
-def _spread(positions: wp.array2d[wp.vec3], v: View, row: int, extents: wp.array2d[int]):
+def _widen(positions: wp.array2d[wp.vec3], v: View, row: int, extents: wp.array2d[int]):
     """Widen a row of extents [1/256 px] to one vertex; those that are not finite are left out."""
     world, i = wp.tid()
     p = v.rotation * (positions[world, i] - v.origin)
@@ -50,7 +50,7 @@ def regions_of(positions: wp.array, cameras: Sequence[Camera], *, margin: int = 
     """
     extents: wp.array = wp.array(np.tile(np.int32(_NOTHING), (len(cameras), 1)), dtype=int, device=positions.device)
     for row, camera in enumerate(cameras):
-        wp.launch(_spread, dim=positions.shape, inputs=[positions, view(camera), row, extents], device=positions.device)
+        wp.launch(_widen, dim=positions.shape, inputs=[positions, view(camera), row, extents], device=positions.device)
     return [_region(found, camera, margin) for found, camera in zip(extents.numpy(), cameras, strict=True)]
 
 

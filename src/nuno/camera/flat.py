@@ -126,8 +126,8 @@ def _faint(
     limit, _ = cv2.threshold((25.0 * distance[inner]).astype(np.uint8), 0, 255, cv2.THRESH_OTSU)
     found = ((25.0 * distance > limit) & inner).astype(np.uint8)
     blob = _choose(cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), distance, pixel, xy)
-    beside = inner & ~grow(blob, 3)
-    even = beside.sum() > 30 and np.quantile(distance[blob], 0.2) > np.quantile(distance[beside], 0.95)
+    around = inner & ~grow(blob, 3)
+    even = around.sum() > 30 and np.quantile(distance[blob], 0.2) > np.quantile(distance[around], 0.95)
     if not even or _likeness(blob, xy) < _RECTANGLE:
         raise ClothNotFoundError("no cloth: nothing like a rectangle differs from the table")
     return blob
@@ -274,12 +274,12 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
     labels, table = enlarge(blob), enlarge(surface)
     rows, columns = np.flatnonzero(labels.any(axis=1)), np.flatnonzero(labels.any(axis=0))
     pad = 12 + int(0.15 * max(np.ptp(rows), np.ptp(columns)))
-    window = (
+    crop = (
         slice(max(0, rows[0] - pad), min(h, rows[-1] + pad + 1)),
         slice(max(0, columns[0] - pad), min(w, columns[-1] + pad + 1)),
     )
-    image = rgb[window].astype(np.float32)
-    labels, table = labels[window], table[window]
+    image = rgb[crop].astype(np.float32)
+    labels, table = labels[crop], table[crop]
     # What lies beyond the table's edge is no cloth on it, whatever its colour; the surface ends a block short of it.
     on_table = grow(table, 4)
     around = table & ~grow(labels, 8)
@@ -289,12 +289,12 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
     field = light.field((slice(0, image.shape[0]), slice(0, image.shape[1])))
     image = np.clip(image / field * light.level(), 0, 255)
     inside = shrink(labels, 5) if shrink(labels, 5).sum() > 20 else labels
-    for turn in range(3):
+    for attempt in range(3):
         soft = cv2.GaussianBlur(image, (0, 0), 0.8)
         ratio = np.log(colour_density(soft[inside], soft) / colour_density(soft[around], soft))
         ratio = np.clip(ratio, -6, 6)
         guide = discriminant(soft, inside, around)
-        score = guided_filter(ratio, guide, radius=4 if turn < 2 else 3, epsilon=0.05)
+        score = guided_filter(ratio, guide, radius=4 if attempt < 2 else 3, epsilon=0.05)
         labels = _without_bays(_near((score > 0) & on_table, labels), score)
         inside, around = shrink(labels, 3), table & ~grow(labels, 4)
         if inside.sum() < 20 or around.sum() < 20:
@@ -302,7 +302,7 @@ def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray
     if labels.sum() < 0.5 * blob.sum() * _STEP**2:
         raise ClothNotFoundError(f"no cloth: what looked like one dissolved on a closer look; {_HELP}")
     mask = np.zeros((h, w), dtype=bool)
-    mask[window] = labels
+    mask[crop] = labels
     return mask
 
 
@@ -326,11 +326,11 @@ def _without_bays(mask: np.ndarray, score: np.ndarray) -> np.ndarray:
     bays = cv2.morphologyEx(np.where(mask, np.uint8(0), hull), cv2.MORPH_OPEN, small)
     count, parts = cv2.connectedComponents(bays, connectivity=4)
     mean = np.bincount(parts.ravel(), weights=score.ravel(), minlength=count) / np.bincount(parts.ravel())
-    fill = mean > -_DOUBT
-    fill[0] = False
-    if not fill.any():
+    closed = mean > -_DOUBT
+    closed[0] = False
+    if not closed.any():
         return mask
-    filled = np.minimum(cv2.dilate(fill[parts].astype(np.uint8), small), hull)
+    filled = np.minimum(cv2.dilate(closed[parts].astype(np.uint8), small), hull)
     return fill_holes(mask | filled.astype(bool))
 
 

@@ -94,11 +94,11 @@ def view(camera: Camera, region: Region | None = None, *, near: float = 0.01) ->
         v.distorted = 1
         coefficients = np.pad(given[:12], (0, 12 - len(given[:12])))
         v.coefficients = _coefficients(*coefficients.tolist())
-        v.radius2 = _largest_radius2(camera, coefficients)
+        v.radius2 = _radius2_limit(camera, coefficients)
     return v
 
 
-def _largest_radius2(camera: Camera, c: np.ndarray) -> float:
+def _radius2_limit(camera: Camera, c: np.ndarray) -> float:
     """Square of the largest radius [m at 1 m depth] at which the distortion is trusted.
 
     Distortion polynomials turn back beyond the field that they were fitted to, and would bring points from

@@ -160,33 +160,34 @@ def take_picture(
         time, bodies = world.time, tuple(world.bodies)
     keys = drawn.keys(camera)
     shape = keys.shape
-    fine, fine_camera = (keys, camera) if samples == 1 else (None, camera.scaled(samples))
-    if fine is None:
-        fine = drawn.keys(fine_camera)
-    rays = _local_rays(*_lens(fine_camera))
+    sampled, sampled_camera = (keys, camera) if samples == 1 else (None, camera.scaled(samples))
+    if sampled is None:
+        sampled = drawn.keys(sampled_camera)
+    rays = _local_rays(*_lens(sampled_camera))
     device = world.device
     turn = wp.mat33(*camera.camera_to_world[:3, :3].ravel().tolist())
-    shaded: Any = wp.empty(fine.shape, dtype=wp.vec3, device=device)
+    shaded: Any = wp.empty(sampled.shape, dtype=wp.vec3, device=device)
     points = lamp.points()
-    total = shaded if len(points) == 1 else wp.zeros(fine.shape, dtype=wp.vec3, device=device)
+    total = shaded if len(points) == 1 else wp.zeros(sampled.shape, dtype=wp.vec3, device=device)
     on_device: Any = wp.array(rays, dtype=wp.vec3, device=device)
     for place in points:
         light, shadow = drawn.light(lamp, place, camera, keys, background)
         wp.launch(
-            shading._shade, dim=fine.shape,
+            shading.shade, dim=sampled.shape,
             inputs=[
-                fine, shadow, on_device, turn, wp.vec3(*camera.camera_to_world[:3, 3].tolist()), drawn.positions,
+                sampled, shadow, on_device, turn, wp.vec3(*camera.camera_to_world[:3, 3].tolist()), drawn.positions,
                 drawn.normals, drawn.local, drawn.faces, drawn.owner, drawn.face_count, drawn.plane_normals,
                 drawn.looks, light,
             ],
             outputs=[shaded], device=device,
         )  # fmt: skip
         if total is not shaded:
-            wp.launch(shading._add, dim=fine.shape, inputs=[shaded, 1.0 / len(points)], outputs=[total], device=device)
+            share = 1.0 / len(points)
+            wp.launch(shading.add, dim=sampled.shape, inputs=[shaded, share], outputs=[total], device=device)
     color: Any = wp.empty((*shape, 3), dtype=wp.uint8, device=device)
-    wp.launch(shading._expose, dim=shape, inputs=[total, samples, float(noise), int(seed), color], device=device)
+    wp.launch(shading.expose, dim=shape, inputs=[total, samples, float(noise), int(seed), color], device=device)
     ids: Any = wp.empty(shape, dtype=wp.int32, device=device)
-    wp.launch(shading._to_bodies, dim=shape, inputs=[keys, drawn.owner, drawn.looks.index, ids], device=device)
+    wp.launch(shading.to_bodies, dim=shape, inputs=[keys, drawn.owner, drawn.looks.index, ids], device=device)
     depth: Any = raster.depths_of(keys)
     if world.world_count == 1:
         color, depth, ids = color[0], depth[0], ids[0]
@@ -296,7 +297,7 @@ def _surface(body: Any, camera: Camera | None) -> tuple[np.ndarray, np.ndarray, 
     if camera is not None and not body.is_dynamic:
         vertices, faces = _split(camera, body.vertices.reshape(-1, *body.vertices.shape[-2:])[0], body.faces)
         return vertices, _normals(vertices, faces), faces, vertices
-    still = not body.is_dynamic and not body.is_deformed and body._position.ndim == 1 and body._quaternion.ndim == 1
+    still = not body.is_dynamic and not body.is_deformed and all(part.ndim == 1 for part in body.pose())
     if still:
         local, faces = body.shape.mesh()
         turn, place = body.rotation, body.position

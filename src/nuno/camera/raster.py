@@ -30,6 +30,7 @@ import numpy as np
 import warp as wp
 
 from nuno.camera.image_region import Region, View
+from nuno.camera.projection import project
 from nuno.errors import InvalidInputError
 
 wp.set_module_options({"enable_backward": False})
@@ -39,46 +40,10 @@ ID_BITS = 20
 LAST_LABEL = (1 << ID_BITS) - 1  # of int64 keys
 MASK_BACKGROUND = 2**31 - 1
 ID_BACKGROUND = 2**63 - 1
-SUBPIXELS = 256
 
 _STEPS = wp.constant(1.0 / DEPTH_STEP)
 _FARTHEST = wp.constant(1.0e4)  # [m]; 1e9 steps fit 30 bits
-_SUBPIXELS = wp.constant(float(SUBPIXELS))
 _EDGE_ON = wp.constant(0.3)  # cosine below which the sides of a thick triangle are drawn too: else they are hidden
-_FARTHEST_SUBPIXEL = wp.constant(2.0**29)  # products of two differences then stay below 2**61
-
-
-@wp.func
-def _distort(x: float, y: float, v: View) -> wp.vec2:
-    """OpenCV's distortion of a point at one metre of depth."""
-    c = v.coefficients
-    r2_true = x * x + y * y
-    s = float(1.0)
-    if r2_true > v.radius2:
-        s = wp.sqrt(v.radius2 / r2_true)
-    px = x * s
-    py = y * s
-    r2 = px * px + py * py
-    radial = (1.0 + r2 * (c[0] + r2 * (c[1] + r2 * c[4]))) / (1.0 + r2 * (c[5] + r2 * (c[6] + r2 * c[7])))
-    dx = 2.0 * c[2] * px * py + c[3] * (r2 + 2.0 * px * px) + r2 * (c[8] + r2 * c[9])
-    dy = c[2] * (r2 + 2.0 * py * py) + 2.0 * c[3] * px * py + r2 * (c[10] + r2 * c[11])
-    return wp.vec2((px * radial + dx) / s, (py * radial + dy) / s)
-
-
-@wp.func
-def project(p: wp.vec3, v: View) -> wp.vec2i:
-    """Pixel of a point in the camera's frame, in steps of 1/256 px."""
-    x = p[0] / p[2]
-    y = p[1] / p[2]
-    if v.distorted != 0:
-        q = _distort(x, y, v)
-        x = q[0]
-        y = q[1]
-    sx = (v.fx * x + v.cx) * _SUBPIXELS
-    sy = (v.fy * y + v.cy) * _SUBPIXELS
-    sx = wp.clamp(sx, -_FARTHEST_SUBPIXEL, _FARTHEST_SUBPIXEL)
-    sy = wp.clamp(sy, -_FARTHEST_SUBPIXEL, _FARTHEST_SUBPIXEL)
-    return wp.vec2i(int(wp.floor(sx + 0.5)), int(wp.floor(sy + 0.5)))
 
 
 @wp.func
@@ -99,7 +64,7 @@ def _owned(dx: wp.int64, dy: wp.int64) -> wp.int64:
 
 
 @wp.func
-def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
+def _rasterise(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, shift: int, keys: wp.array3d[Any]):
     """Draw one triangle that lies in front of the near plane (vertices in the camera's frame)."""
     sa = project(a, v)
     sb = project(b, v)
@@ -171,7 +136,7 @@ def _fill(a: wp.vec3, b: wp.vec3, c: wp.vec3, v: View, world: int, label: Any, s
 
 
 @wp.func
-def _clip_and_fill(
+def _clip_and_rasterise(
     corner_a: wp.vec3, corner_b: wp.vec3, corner_c: wp.vec3, v: View, world: int, label: Any, shift: int,
     keys: wp.array3d[Any],
 ):  # fmt: skip
@@ -199,8 +164,8 @@ def _clip_and_fill(
             c = turned
         d = _cut(a, c, near)
         c = _cut(b, c, near)
-        _fill(a, c, d, v, world, label, shift, keys)
-    _fill(a, b, c, v, world, label, shift, keys)
+        _rasterise(a, c, d, v, world, label, shift, keys)
+    _rasterise(a, b, c, v, world, label, shift, keys)
 
 
 @wp.kernel
@@ -255,7 +220,7 @@ def _draw_triangles(
             else:
                 q = p - offset
             p = p + offset
-        _clip_and_fill(p, q, r, v, world, name, shift, keys)
+        _clip_and_rasterise(p, q, r, v, world, name, shift, keys)
 
 
 @wp.kernel
@@ -406,8 +371,8 @@ def masks_of(keys: wp.array, *, out: wp.array | None = None) -> wp.array:
 def depths_of(keys: wp.array, *, out: wp.array | None = None) -> wp.array:
     """Depths (worlds, h, w) float32 [m] along the optical axis, in steps of 10 um; inf where nothing is."""
     out = wp.empty(keys.shape, dtype=wp.float32, device=keys.device) if out is None else out
-    wide = keys.dtype == wp.int64
-    arguments = [ID_BITS, ID_BACKGROUND] if wide else [1, MASK_BACKGROUND]
+    with_ids = keys.dtype == wp.int64
+    arguments = [ID_BITS, ID_BACKGROUND] if with_ids else [1, MASK_BACKGROUND]
     wp.launch(_to_depths_of[keys.dtype], dim=keys.shape, inputs=[keys, *arguments, out], device=keys.device)
     return out
 

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.edges import edge_in_image, edge_in_mask, side_pixels
 from nuno.camera.image import check_image, check_mask
-from nuno.camera.rim_shadow import cloth_beside_shadow
+from nuno.camera.rim_shadow import cloth_at_shadow
 from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _ENDS = 0.06  # share of a side next to a corner that is not measured: there the other side bends the edge
-_LEAST = 0.2  # share of a side that must show an edge
+_MIN_SHARE = 0.2  # share of a side that must show an edge
 _SCATTER = 0.25  # [px] median scatter of an edge about its line that noise explains
 _AGREE = 1.0  # [px] how far an edge may be from the one that most others agree on
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
@@ -112,7 +112,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
     if not mask.any():
         raise ClothNotFoundError("the mask is empty, so there is no cloth to measure")
     warnings: list[str] = []
-    mask = _largest(mask, warnings)
+    mask = _main_part(mask, warnings)
     pose = _spanning(mask, camera, plane_height)
     soft_mask = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     for _ in range(3):
@@ -130,7 +130,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
     return _labelled(pose, camera, plane_height, residual, warnings)
 
 
-def _largest(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
+def _main_part(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA]
     if areas.max() < 0.95 * areas.sum():
@@ -164,14 +164,14 @@ def _fit_to_edges(
     for side, (pixels, normals, seen) in enumerate(lines):
         pixels, normals, count = pixels[seen], normals[seen], len(seen)
         edge = edge_in_mask(mask, pixels, normals)
-        beside = shadows[side]
-        if beside is not None:
-            edge = pixels + beside[:, None] * normals
+        shift = shadows[side]
+        if shift is not None:
+            edge = pixels + shift[:, None] * normals
         elif image is not None:
             edge = _refined(pixels, normals, edge, edge_in_image(image, pixels, normals))
         good = np.isfinite(edge).all(axis=1)
         edge, normals = edge[good], normals[good]
-        if len(edge) < _LEAST * count:
+        if len(edge) < _MIN_SHARE * count:
             raise EstimationError(
                 f"only {len(edge) / count:.0%} of one side of the cloth shows an edge: it is cut off, "
                 "or the region is not a rectangle on the plane"
@@ -195,25 +195,25 @@ def _shadows(
         middle = len(pixels) // 2
         ground = camera.back_project(np.stack([pixels[middle], pixels[middle] + normals[middle]]), height)
         metres = float(np.linalg.norm(ground[1] - ground[0]))
-        found.append(cloth_beside_shadow(image, pixels[seen], normals[seen], metres))
+        found.append(cloth_at_shadow(image, pixels[seen], normals[seen], metres))
     return [None if found[(side + 2) % 4] is not None else found[side] for side in range(4)]
 
 
-def _refined(line: np.ndarray, normals: np.ndarray, rough: np.ndarray, fine: np.ndarray) -> np.ndarray:
+def _refined(line: np.ndarray, normals: np.ndarray, mask_edge: np.ndarray, image_edge: np.ndarray) -> np.ndarray:
     """The edge (k, 2) along a line (k, 2): the image's, or the mask's where the image's is in doubt.
 
     The mask is right on average but may be rough; the image is fine where a plain cloth meets a plain
     table. Where a pattern runs along the side, the image's edges jump between the cloth's and the pattern's.
     """
-    offsets = [((edge - line) * normals).sum(axis=1) for edge in (rough, fine)]
+    offsets = [((edge - line) * normals).sum(axis=1) for edge in (mask_edge, image_edge)]
     middles = [float(np.median(offset[np.isfinite(offset)])) for offset in offsets if np.isfinite(offset).any()]
     if len(middles) < 2 or np.isfinite(offsets[1]).mean() < 0.5 or abs(middles[1] - middles[0]) > _AGREE:
-        return rough
+        return mask_edge
     scatter = [float(np.nanmedian(np.abs(offset - middle))) for offset, middle in zip(offsets, middles, strict=True)]
     if scatter[1] > max(scatter[0], _SCATTER):
-        return rough
-    fine[np.abs(offsets[1] - middles[1]) > _AGREE] = np.nan
-    return fine
+        return mask_edge
+    image_edge[np.abs(offsets[1] - middles[1]) > _AGREE] = np.nan
+    return image_edge
 
 
 def _least_squares(pose: _Pose, points: np.ndarray, sides: np.ndarray, weights: np.ndarray) -> tuple[_Pose, float]:

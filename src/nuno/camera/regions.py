@@ -44,10 +44,10 @@ def fill_doubtful_holes(mask: np.ndarray, score: np.ndarray, *, area: int, doubt
     rim = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     sizes = stats[:, cv2.CC_STAT_AREA]
     mean = np.bincount(labels.ravel(), weights=score.ravel(), minlength=count) / np.maximum(sizes, 1)
-    fill = (sizes <= area) | (mean > -doubt)
-    fill[rim] = False
-    fill[0] = False  # the mask itself
-    return mask | fill[labels]
+    closed = (sizes <= area) | (mean > -doubt)
+    closed[rim] = False
+    closed[0] = False  # the mask itself
+    return mask | closed[labels]
 
 
 def parts_at(found: np.ndarray, score: np.ndarray, anchor: np.ndarray, pixel: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ CHUNK_BYTES = 512 * 2**20  # key images held at a time; 8,192 worlds of 320 x 24
 # With distortion, static meshes are split until an edge spans 1/20 of its depth: for k1 = 0.3, half a metre
 # off the axis at one metre, straight edges then leave the curve by 3e-4 of the focal length (0.14 px at 500).
 DISTORTED_EDGE = 0.05
-_MOST_SPLITS = 64  # of a mesh's extent, so that a mesh that touches the camera stays drawable
+_MAX_SPLITS = 64  # of a mesh's extent, so that a mesh that touches the camera stays drawable
 
 
 def render_masks(
@@ -130,7 +130,7 @@ def _render(
     region = Region.full(camera) if region is None else region
     seen = view(camera, region)
     device, worlds = world.device, int(world.world_count)
-    wide = read is raster.ids_of
+    with_ids = read is raster.ids_of
 
     def skin(body: Any) -> tuple[np.ndarray, np.ndarray]:
         return body.skin() if getattr(body.shape, "is_soft", False) else (body.vertices, body.faces)
@@ -148,7 +148,7 @@ def _render(
         triangles: wp.array = wp.array(np.ascontiguousarray(faces, dtype=np.int32), dtype=wp.vec3i, device=device)
         raster.draw(keys, points, triangles, seen, label, thickness=thickness)
 
-    layer = raster.key_images(1, region, device, ids=wide)
+    layer = raster.key_images(1, region, device, ids=with_ids)
     differing: list[tuple[Any, np.ndarray, int]] = []
     for k, body in enumerate(world.bodies):
         if k in hidden:
@@ -162,8 +162,8 @@ def _render(
             differing.append((body, vertices, labels[k]))
 
     out = wp.empty((worlds, region.height, region.width), dtype=dtype, device=device)
-    size = max(1, CHUNK_BYTES // ((8 if wide else 4) * region.width * region.height))
-    keys = raster.key_images(min(size, worlds), region, device, ids=wide)
+    size = max(1, CHUNK_BYTES // ((8 if with_ids else 4) * region.width * region.height))
+    keys = raster.key_images(min(size, worlds), region, device, ids=with_ids)
     for first in range(0, worlds, size):
         last = min(first + size, worlds)
         chunk = keys[: last - first]
@@ -195,7 +195,7 @@ def _split(camera: Camera, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.
 
     extent = float(np.ptp(vertices, axis=0).max())
     nearest = float(camera.depth_of(vertices).min())
-    longest = max(DISTORTED_EDGE * nearest, extent / _MOST_SPLITS)
+    longest = max(DISTORTED_EDGE * nearest, extent / _MAX_SPLITS)
     if not np.isfinite(longest) or longest <= 0.0:
         return vertices, faces
     return remesh.subdivide_to_size(vertices, faces, longest, max_iter=20)

@@ -21,7 +21,7 @@ _ALIKE = 12.0  # [levels] between colours that may be one: four times a camera's
 _EVEN = 0.05  # median deviation of its share of the light along a side: a lamp's shadow is equally dark all along
 
 
-def cloth_beside_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float) -> np.ndarray | None:
+def cloth_at_shadow(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, metres: float) -> np.ndarray | None:
     """Return where the cloth ends along a side that has its shadow beside it.
 
     Along the normal three colours follow each other: the cloth's, the table's in shadow, and the table's. Where that
@@ -89,8 +89,8 @@ def _along(image: np.ndarray, pixels: np.ndarray, normals: np.ndarray, offsets: 
 @cache
 def _profiles() -> tuple[np.ndarray, ...]:
     """Edges (n,) and strips' widths (n,) [px] that are tried, with the shares (n, m) of cloth, strip and table."""
-    at, wide = np.arange(-5.0, 3.01, 0.25), np.arange(_NARROWEST, 6.01, 0.5)
-    edges, widths = (a.ravel() for a in np.meshgrid(at, wide))
+    at, breadths = np.arange(-5.0, 3.01, 0.25), np.arange(_NARROWEST, 6.01, 0.5)
+    edges, widths = (a.ravel() for a in np.meshgrid(at, breadths))
     near = edges + widths <= 4.0
     blurs = np.concatenate([np.full(near.sum(), _BLUR), np.repeat(_BLURS, len(at))])[:, None]
     edges = np.concatenate([edges[near], np.tile(at, len(_BLURS))])

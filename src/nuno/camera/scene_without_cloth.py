@@ -66,16 +66,16 @@ class Background:
         return total * np.exp(self.grain) + _UNKNOWN
 
     def _mixture(
-        self, view: np.ndarray, colour: np.ndarray, noise2: np.ndarray, spread: float, table: np.ndarray
+        self, view: np.ndarray, colour: np.ndarray, noise2: np.ndarray, variation: float, table: np.ndarray
     ) -> np.ndarray:
         """Density of the view if the colour is lit, in the usual shadow on the table, or in some shadow."""
         usual, some = (0.25, 0.05) if self.shades else (0.0, 0.15)
         at = np.where(table, 1.0, 0.25).astype(np.float32)  # a shadow falls on the table first
-        total = (1.0 - at * (usual + some)) * normal_density(view, colour, noise2 + (spread * colour) ** 2)
+        total = (1.0 - at * (usual + some)) * normal_density(view, colour, noise2 + (variation * colour) ** 2)
         total += at * some * shaded_density(view, colour, self.noise, *_SHADE)
         for shade in self.shades:
             shaded = np.float32(shade) * colour
-            variance = noise2 + ((spread + 0.02) * shaded) ** 2
+            variance = noise2 + ((variation + 0.02) * shaded) ** 2
             total += at * (usual / len(self.shades)) * normal_density(view, shaded, variance)
         return total
 
@@ -159,24 +159,24 @@ def _grain(
     """
     now = brightness(view)
     smooth_now = cv2.blur(now, (7, 7))
-    fine_now = now - smooth_now
+    detail_now = now - smooth_now
     old = brightness(first)
     smooth_old = cv2.blur(old, (7, 7))
-    fine_old = old - smooth_old
+    detail_old = old - smooth_old
     level = np.where(hidden, cv2.blur(brightness(scene), (7, 7)), smooth_old)
     share = np.clip(smooth_now / np.maximum(level, 8.0), 0.15, 1.3)
-    noise2 = np.float32(max(1.48 * float(np.median(np.abs(fine_now - fine_old)[~hidden])), 0.5) ** 2)
-    table2, cloth2 = float(fine_old[ring].var()), float(fine_old[cloth].var())
-    expected = share * fine_old
+    noise2 = np.float32(max(1.48 * float(np.median(np.abs(detail_now - detail_old)[~hidden])), 0.5) ** 2)
+    table2, cloth2 = float(detail_old[ring].var()), float(detail_old[cloth].var())
+    expected = share * detail_old
     width2 = noise2 + (0.1 * expected) ** 2
     cloth_width2 = noise2 + share * share * cloth2
-    evidence = np.log(_heavy_tailed(fine_now - expected, width2) / _heavy_tailed(fine_now, cloth_width2))
-    rough = [np.abs(fine_old[where]) / np.maximum(smooth_old[where], 8.0) for where in (ring, cloth)]
-    found = np.abs(fine_now[hidden]) / np.maximum(smooth_now[hidden], 8.0)
+    evidence = np.log(_heavy_tailed(detail_now - expected, width2) / _heavy_tailed(detail_now, cloth_width2))
+    roughness = [np.abs(detail_old[where]) / np.maximum(smooth_old[where], 8.0) for where in (ring, cloth)]
+    found = np.abs(detail_now[hidden]) / np.maximum(smooth_now[hidden], 8.0)
     noise = np.sqrt(noise2) / np.maximum(smooth_now[hidden], 8.0)
-    evidence[hidden] = _roughness_ratio(found, noise, *rough)
+    evidence[hidden] = _roughness_ratio(found, noise, *roughness)
     # At an outline, of the cloth or of a shadow, the step is neither surface's texture.
-    outline = np.abs(fine_now) > 4.0 * np.sqrt(np.maximum(cloth_width2, noise2 + share * share * table2))
+    outline = np.abs(detail_now) > 4.0 * np.sqrt(np.maximum(cloth_width2, noise2 + share * share * table2))
     evidence[cv2.dilate(outline.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)] = 0.0
     return np.clip(evidence, -2.5, 2.5)
 
@@ -197,12 +197,12 @@ def _roughness_ratio(found: np.ndarray, noise: np.ndarray, table: np.ndarray, cl
     """
     bins = np.concatenate([np.linspace(0.0, 0.06, 13), [0.075, 0.1, 0.14, 0.2, 0.3, np.inf]])
     evidence = np.zeros(len(found), dtype=np.float32)
-    least = float(noise.min(initial=np.inf))
+    lowest = float(noise.min(initial=np.inf))
     for low, high in ((0.0, 0.014), (0.014, 0.025), (0.025, np.inf)):
         at = (noise >= low) & (noise < high)
         if not at.any():
             continue
-        more = max(float(np.median(noise[at])) ** 2 - least**2, 0.0) * 0.5
+        more = max(float(np.median(noise[at])) ** 2 - lowest**2, 0.0) * 0.5
         counts = [np.histogram(np.sqrt(x * x + more), bins)[0] for x in (table, cloth)]
         shares = [np.convolve(c, [0.25, 0.5, 0.25], "same") / max(c.sum(), 1) + 0.01 for c in counts]
         ratio = np.log(shares[0] / shares[1])
@@ -242,18 +242,18 @@ def _shades(
     old, now = (cv2.blur(image, (5, 5))[::2, ::2] for image in (grey, dimmed))
     found: list[float] = []
     # Both thresholds are a few square centimetres of table.
-    for weight, least, needed in ((weights, 150.0, -_ODDS), (np.ones_like(shares), 300.0, _ODDS)):
+    for weight, lowest, needed in ((weights, 150.0, -_ODDS), (np.ones_like(shares), 300.0, _ODDS)):
         counts, edges = np.histogram(shares, bins=70, range=(0.2, 0.9), weights=weight)
-        sharp = np.convolve(counts, np.ones(5), "same")
+        smoothed = np.convolve(counts, np.ones(5), "same")
         for _ in range(4):
-            best = int(sharp.argmax())
-            if sharp[best] < least or len(found) == 2:
+            best = int(smoothed.argmax())
+            if smoothed[best] < lowest or len(found) == 2:
                 break
             peak = 0.5 * (edges[best] + edges[best + 1])
             if _goes_on(old, now, peak, seen, noise) > needed:
                 found.append(float(np.median(shares[np.abs(shares - peak) < 0.03])))
-                least = max(least, 0.25 * float(sharp[best]))  # a second lamp's is much like the first's
-            sharp[max(best - 5, 0) : best + 6] = -np.inf
+                lowest = max(lowest, 0.25 * float(smoothed[best]))  # a second lamp's is much like the first's
+            smoothed[max(best - 5, 0) : best + 6] = -np.inf
         if found:
             break
     return tuple(found)
@@ -286,10 +286,10 @@ def _goes_on(old: np.ndarray, now: np.ndarray, share: float, seen: np.ndarray, n
     # 0.6 of the noise is left after a mean over 5 x 5 of pixels that are smoothed already, and 1 / sqrt(6) of that in
     # one image's mean of three channels: it belongs to no texture.
     own = float(((0.6 / np.sqrt(6.0) * noise / old[region]) ** 2).mean())
-    spread = float((x * x).mean()) - own
-    if spread < own:
+    variation = float((x * x).mean()) - own
+    if variation < own:
         return 0.0
-    slope = float((x * y).mean()) / spread
+    slope = float((x * y).mean()) / variation
     left = max(float(((y - slope * x) ** 2).mean()), own)
     # Neighbours are not independent: one in 25 counts. The likelihood of slope 1 against that of slope 0.
-    return (slope - 0.5) * spread / left * len(x) / 25.0
+    return (slope - 0.5) * variation / left * len(x) / 25.0

@@ -103,7 +103,7 @@ def look_after(
     if not mask.any():
         raise ClothNotFoundError("the mask before is empty, so nothing is known of the cloth's colours")
 
-    reach = _sphere(camera, hand, _largest_length(mask, camera, table.height), step=4)
+    reach = _sphere(camera, hand, _length_limit(mask, camera, table.height), step=4)
     if not reach.any():
         raise ClothNotFoundError(f"the hand at {hand.tolist()} m and all within the cloth's reach is not in the image")
     covered = None if hidden is None else check_mask(hidden, camera, "hidden")
@@ -160,7 +160,7 @@ def _check_hint(hint: ArrayLike | None, camera: Camera) -> np.ndarray | None:
     return values
 
 
-def _largest_length(mask: np.ndarray, camera: Camera, height: float) -> float:
+def _length_limit(mask: np.ndarray, camera: Camera, height: float) -> float:
     """The longest distance [m] across the cloth, flat at a height [m]: its reach from the hand."""
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     ground = camera.back_project(np.concatenate(contours)[:, 0].astype(float), height)[:, :2]

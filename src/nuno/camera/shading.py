@@ -17,7 +17,7 @@ wp.set_module_options({"enable_backward": False})
 _LABELS = wp.constant((1 << ID_BITS) - 1)
 _NOTHING = wp.constant(wp.int64(ID_BACKGROUND))
 _STEP = wp.constant(DEPTH_STEP)
-_SHARP = wp.constant(0.75)  # cosine between a corner's normal and the face's below which the edge is drawn sharp
+_CREASE = wp.constant(0.75)  # cosine between a corner's normal and the face's below which the edge is drawn sharp
 _BLUR = wp.constant(1)  # texels around a point's own in the shadow map that are asked too
 
 
@@ -73,7 +73,7 @@ def _lit(point: wp.vec3, normal: wp.vec3, world: int, light: Light, shadow: wp.a
 
 
 @wp.kernel
-def _shade(
+def shade(
     # what was drawn
     keys: wp.array3d[wp.int64],
     shadow: wp.array3d[wp.int64],
@@ -127,11 +127,11 @@ def _shade(
         na = normals[world, corners[0]]
         nb = normals[world, corners[1]]
         nc = normals[world, corners[2]]
-        if wp.dot(na, flat) < _SHARP:
+        if wp.dot(na, flat) < _CREASE:
             na = flat
-        if wp.dot(nb, flat) < _SHARP:
+        if wp.dot(nb, flat) < _CREASE:
             nb = flat
-        if wp.dot(nc, flat) < _SHARP:
+        if wp.dot(nc, flat) < _CREASE:
             nc = flat
         normal = wp.normalize((1.0 - u - v) * na + u * nb + v * nc)
         place = (1.0 - u - v) * local[corners[0]] + u * local[corners[1]] + v * local[corners[2]]
@@ -151,7 +151,7 @@ def _shade(
 
 
 @wp.kernel
-def _add(light: wp.array3d[wp.vec3], share: float, sum_out: wp.array3d[wp.vec3]):
+def add(light: wp.array3d[wp.vec3], share: float, sum_out: wp.array3d[wp.vec3]):
     """Add a share of the light that reaches each pixel."""
     world, row, column = wp.tid()
     sum_out[world, row, column] += share * light[world, row, column]
@@ -167,7 +167,7 @@ def _screen(x: float) -> float:
 
 
 @wp.kernel
-def _expose(light: wp.array3d[wp.vec3], samples: int, noise: float, seed: int, color_out: wp.array4d[wp.uint8]):
+def expose(light: wp.array3d[wp.vec3], samples: int, noise: float, seed: int, color_out: wp.array4d[wp.uint8]):
     """Bytes of the mean of samples x samples pixels, with noise."""
     world, row, column = wp.tid()
     total = wp.vec3(0.0, 0.0, 0.0)
@@ -183,7 +183,7 @@ def _expose(light: wp.array3d[wp.vec3], samples: int, noise: float, seed: int, c
 
 
 @wp.kernel
-def _to_bodies(
+def to_bodies(
     keys: wp.array3d[wp.int64], owner: wp.array[wp.int32], index: wp.array[wp.int32], ids_out: wp.array3d[wp.int32]
 ):
     """Write which body is seen, -1 for none."""

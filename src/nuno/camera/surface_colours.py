@@ -14,10 +14,10 @@ COLOUR_VOLUME = 256.0**3
 _BINS = 32
 
 
-def _quadratic(shape: tuple[int, int], window: tuple[slice, slice] | None = None) -> np.ndarray:
+def _quadratic(shape: tuple[int, int], crop: tuple[slice, slice] | None = None) -> np.ndarray:
     """(h, w, 6) float32, the monomials of second degree in image coordinates scaled to about -1 ... 1."""
     h, w = shape
-    rows, columns = window or (slice(0, h), slice(0, w))
+    rows, columns = crop or (slice(0, h), slice(0, w))
     y = ((np.arange(rows.start, rows.stop) + 0.5) / h * 2 - 1)[:, None]
     x = ((np.arange(columns.start, columns.stop) + 0.5) / w * 2 - 1)[None, :]
     one = np.ones((y.size, x.size))
@@ -61,10 +61,10 @@ class Illumination:
             scale = max(1.5 * float(_weighted_median(distance, prior**2)), 0.02)
             robust = prior / (1.0 + (distance / scale) ** 2)
 
-    def field(self, window: tuple[slice, slice]) -> np.ndarray:
-        """(h, w, 3) float32, the surface's smooth colour in a window (rows, columns) of the full image."""
+    def field(self, crop: tuple[slice, slice]) -> np.ndarray:
+        """(h, w, 3) float32, the surface's smooth colour in a part (rows, columns) of the full image."""
         terms = len(self._coefficients)
-        return np.exp(_quadratic(self._shape, window)[..., :terms] @ self._coefficients.astype(np.float32))
+        return np.exp(_quadratic(self._shape, crop)[..., :terms] @ self._coefficients.astype(np.float32))
 
     def level(self) -> np.ndarray:
         """(3,) float32, the colour in the middle of the image."""
@@ -121,7 +121,7 @@ def shaded_density(
     noise: float,
     darkest: float,
     brightest: float,
-    spread: float = 0.03,
+    variation: float = 0.03,
 ) -> np.ndarray:
     """Density of pixels that show a colour in any light between two.
 
@@ -134,7 +134,7 @@ def shaded_density(
         noise: Standard deviation of a channel [levels].
         darkest: Least share of the full light.
         brightest: Largest share.
-        spread: How much the colour itself varies, relative to it.
+        variation: How much the colour itself varies, relative to it.
 
     Returns:
         (...) float32, per unit of the colour cube.
@@ -143,7 +143,7 @@ def shaded_density(
     share = np.einsum("...i,...i->...", pixels, colour) / length2
     along2 = share * share * length2
     across2 = np.maximum(np.einsum("...i,...i->...", pixels, pixels) - along2, 0.0)
-    variance = np.float32(noise**2) + np.float32(spread**2) * along2
+    variance = np.float32(noise**2) + np.float32(variation**2) * along2
     ends = np.clip(np.minimum(share - darkest, brightest - share) / np.float32(0.05) + np.float32(0.5), 0.0, 1.0)
     even = ends / (np.float32(brightest - darkest) * np.sqrt(length2))
     return even * np.exp(-0.5 * across2 / variance) / (np.float32(2 * np.pi) * variance)

@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, is_set
-from nuno.numbers.lanes import add, div, full_like, most, mul, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, maximum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import cross, dot, move, offset, position, put_position
 
 
@@ -25,7 +25,7 @@ def bend_stiffness(weight: Any, alpha: Any):
     not undo, about half of the weight; taken off, a strip hangs as its rigidity says at far larger steps. The floor
     bounds the over-relaxation to 1.25, well inside of 2, where it would oscillate.
     """
-    return most(weight * 0.5 + alpha, weight * 0.8) + 1.0e-12
+    return maximum(weight * 0.5 + alpha, weight * 0.8) + 1.0e-12
 
 
 @wp.func
@@ -122,7 +122,7 @@ def bend_patch(t: Any, table: Any, k: int, alpha: Any):
             e = x1 - x0
             f = x2 - x0
             n = cross(e, f)
-            scale = 1.0 / root(dot(n, n) + 1.0e-20) * table.patch_rest[r + 2]
+            scale = 1.0 / sqrt(dot(n, n) + 1.0e-20) * table.patch_rest[r + 2]
             error = error - e * table.patch_rest[r] - f * table.patch_rest[r + 1] - n * scale
         s = -1.0 / bend_stiffness(weight, alpha)
         x0 = x0 + error * (s * w0 * k0)

@@ -13,7 +13,7 @@ from nuno.constraints.mean_strain import MEAN, OWN, solve_mean
 from nuno.constraints.tetrahedron import COLUMNS, loose_bulk, solve_tetrahedron
 from nuno.constraints.viscosity import damp_tetrahedron
 from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import add, anywhere, choose, full_like, lane, mul, size_of, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, choose, full_like, lane, mul, sub  # noqa: F401
 from nuno.state.soft_state import CLUSTER, SimdClusters, Tetrahedra
 
 
@@ -115,7 +115,7 @@ def viscous_numbers(t: Any, table: Any, k: int, row: int, slot: int, time: Any, 
     """Return what `damp_tetrahedron` asks of an element."""
     own = own_viscosity(t, table, k, slot, time, eta)
     m11, m22, m33, m12, m13, m23, inverse, filled = numbers_of(table.number, row + slot)
-    return m11, m22, m33, m12, m13, m23, inverse, own * size_of(filled)
+    return m11, m22, m33, m12, m13, m23, inverse, own * absolute(filled)
 
 
 @wp.func
@@ -201,8 +201,8 @@ def solve_cluster(
     if anywhere(0.0 - mu):  # a negative filled fraction: the voxel's mean has the rest of the stiffness
         part = choose(mu, 0.0, MEAN)
         own = choose(mu, own, OWN)
-        mu = size_of(mu)
-        bulk = size_of(bulk)
+        mu = absolute(mu)
+        bulk = absolute(bulk)
         ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz = solve_mean(
             t, e, f, g, h, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, wa, wb, wc, wd,
             m11, m22, m33, m12, m13, m23, inverse, part * mu, part * bulk,

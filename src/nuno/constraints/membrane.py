@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, corner, put
-from nuno.numbers.lanes import add, div, full_like, least, most, mul, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
 
 MOST_RELAXED = wp.constant(1.45)
@@ -27,7 +27,7 @@ def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
     if rise == 0.0:
         return full_like(weight, 1.0)
     q = (weight - alpha) / alpha * 0.5
-    return least(most((root(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
+    return minimum(maximum((sqrt(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
 
 
 @wp.func
@@ -64,7 +64,7 @@ def stretch_grid_line(
         b = position(t, j)
         wb = at(t.w, j)
         edge = a - b
-        length = root(dot(edge, edge) + 1.0e-20)
+        length = sqrt(dot(edge, edge) + 1.0e-20)
         direction = edge * (1.0 / length)
         # minus the entry beside the diagonal, shared with the edge before
         coupling = wa * dot(before, direction)
@@ -141,7 +141,7 @@ def stretch_triangle(
     Returned is the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
     """
     f = weighed(t, a, b, c, ka, kb, kc)
-    length = root(dot(f, f) + 1.0e-20)
+    length = sqrt(dot(f, f) + 1.0e-20)
     wa = at(t.w, a) * ka
     wb = at(t.w, b) * kb
     wc = at(t.w, c) * kc

@@ -13,7 +13,7 @@ import warp as wp
 
 from nuno.constraints.membrane import shear_cell, shear_triangle, stretch_triangle
 from nuno.numbers.element_access import at, corner, put
-from nuno.numbers.lanes import add, div, full_like, mul, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, mul, sqrt, sub  # noqa: F401
 from nuno.state.cloth_state import Settings
 
 
@@ -81,4 +81,4 @@ def note_lengths(t: Any, table: Any, goals: Any, first: int, last: int, rank: in
         dx = at(t.x, i) - at(t.x, j)
         dy = at(t.y, i) - at(t.y, j)
         dz = at(t.z, i) - at(t.z, j)
-        put(goals, k, root(dx * dx + dy * dy + dz * dz + 1.0e-20))
+        put(goals, k, sqrt(dx * dx + dy * dy + dz * dz + 1.0e-20))

@@ -16,10 +16,10 @@ from nuno.numbers.lanes import (  # noqa: F401
     fused_subtract,
     lane,
     lane_max,
-    least,
-    most,
+    maximum,
+    minimum,
     mul,
-    root,
+    sqrt,
     sub,
 )
 from nuno.state.soft_state import INVERTED, SEEN
@@ -109,8 +109,8 @@ def element_reply(
     maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
     reply = fused(wd, factor_like(wd, m33), fused(wc, factor_like(wc, m22), fused(wb, factor_like(wb, m11), wa * maa)))
     most_stiff = CARRIED / (reply + 1.0e-30)
-    mu = least(mu, most_stiff)
-    bulk = least(bulk, most_stiff)
+    mu = minimum(mu, most_stiff)
+    bulk = minimum(bulk, most_stiff)
     pressure = (bulk * (j - one) - mu) * (1.0 / 6.0)
     k11 = mu * m11
     k22 = mu * m22
@@ -159,7 +159,7 @@ def element_reply(
     rax = rbx + rcx + rdx
     ray = rby + rcy + rdy
     raz = rbz + rcz + rdz
-    bad = most(0.0 - j, stretched - mu * STRETCHED)
+    bad = maximum(0.0 - j, stretched - mu * STRETCHED)
     return rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad
 
 
@@ -275,18 +275,18 @@ def solve_tetrahedron(
     if anywhere(bad):
         zero = full_like(one, 0.0)
         note_inverted(t.notes, choose(zero - j, one, zero))
-        far = most(
-            most(
+        far = maximum(
+            maximum(
                 ha * ha * dot(rax, ray, raz, rax, ray, raz),
                 hb * hb * dot(rbx, rby, rbz, rbx, rby, rbz),
             ),
-            most(
+            maximum(
                 hc * hc * dot(rcx, rcy, rcz, rcx, rcy, rcz),
                 hd * hd * dot(rdx, rdy, rdz, rdx, rdy, rdz),
             ),
         )
         farthest = full_like(one, limit)
-        keep = choose(bad, farthest / most(root(far), farthest), one)
+        keep = choose(bad, farthest / maximum(sqrt(far), farthest), one)
         ha = ha * keep
         hb = hb * keep
         hc = hc * keep
@@ -325,7 +325,7 @@ def solve_tetrahedron(
 @wp.func
 def loose_bulk(t: Any, mu: Any, bulk: Any):
     """The second modulus: a inverted body must rearrange, for which its volume may be too stiff."""
-    return least(bulk, choose(factor_like(mu, t.notes[INVERTED]), mu * LOOSE, bulk))
+    return minimum(bulk, choose(factor_like(mu, t.notes[INVERTED]), mu * LOOSE, bulk))
 
 
 @wp.func
@@ -333,7 +333,7 @@ def weakened(mu: Any, stretched: Any, ax: Any, ay: Any, az: Any, bx: Any, by: An
     """The shear's forces a, b and c times |F|^2 where that is below 1; ``stretched`` is |F|^2 mu."""
     if not anywhere(mu - stretched):
         return ax, ay, az, bx, by, bz, cx, cy, cz
-    small = least(stretched / mu, 1.0)
+    small = minimum(stretched / mu, 1.0)
     ax = ax * small
     ay = ay * small
     az = az * small
@@ -369,4 +369,4 @@ def note_inverted(notes: wp.array(dtype=float), inverted: lane):
 
 @wp.func
 def note_inverted(notes: wp.array(dtype=lane), inverted: lane):
-    notes[SEEN] = most(notes[SEEN], inverted)
+    notes[SEEN] = maximum(notes[SEEN], inverted)

@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.tetrahedron import add_dot, combine, dot
-from nuno.numbers.lanes import add, div, full_like, fused, fused_subtract, most, mul, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, fused, fused_subtract, maximum, mul, sub  # noqa: F401
 
 SHARE, MOST = wp.constant(0.2), wp.constant(0.9)
 """An element's reply T to its own viscosity counts as 1 + 0.2 T: what the rest of the pass does not undo is half of
@@ -144,8 +144,8 @@ def damp_tetrahedron(
     per_volume = inverse * 6.0
     maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
     reply = fused(wc, m22, fused(wb, m11, wa * maa)) + wd * m33
-    reply = eta * reply * most(one, stretched * per_volume - 2.0)
-    s = eta / most(one + reply * SHARE, reply * MOST) * per_volume
+    reply = eta * reply * maximum(one, stretched * per_volume - 2.0)
+    s = eta / maximum(one + reply * SHARE, reply * MOST) * per_volume
     n11 = s * fused(q13, m13, fused(q12, m12, q11 * m11))
     n22 = s * fused(q23, m23, fused(q22, m22, q21 * m12))
     n33 = s * fused(q33, m33, fused(q32, m23, q31 * m13))

@@ -51,28 +51,28 @@ def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) ->
     from matplotlib.patches import Rectangle
 
     on_grid = np.issubdtype(result.labels.dtype, np.integer)
-    x0, y0, x1, y1 = _window(result)
-    high, wide = y1 - y0, x1 - x0
+    x0, y0, x1, y1 = _crop(result)
+    high, columns = y1 - y0, x1 - x0
     # a panel is wider than high where the axes are, so that all fit and none is distorted
     place = axes.get_position()
     width, height = figure.get_size_inches() * (place.width, place.height)
-    down = max(high * (1.0 + TITLE), wide * n / width * height / m)
-    across = max(wide * (1.0 + GAP), down * m / height * width / n)
+    down = max(high * (1.0 + TITLE), columns * n / width * height / m)
+    across = max(columns * (1.0 + GAP), down * m / height * width / n)
     down, across = int(np.ceil(down)), int(np.ceil(across))
-    below = int(down - high), int((across - wide) / 2)
+    below = int(down - high), int((across - columns) / 2)
     image = np.ones((m * down, n * across, 3), np.float32)
     for k, label in enumerate(result.labels):
         row, column = (int(label[1]), int(label[0])) if on_grid else divmod(k, n)
         x, y = column * across + below[1], row * down + below[0]
-        image[y : y + high, x : x + wide] = _compared(result.real.mask[y0:y1, x0:x1], result.masks[k, y0:y1, x0:x1])
+        image[y : y + high, x : x + columns] = _compared(result.real.mask[y0:y1, x0:x1], result.masks[k, y0:y1, x0:x1])
         rank = int(np.nonzero(result.order == k)[0][0]) + 1
         name = f"({label[0]}, {label[1]})" if on_grid else f"({label[0]:.2f}, {label[1]:.2f})"
         axes.text(
-            x + 0.5 * wide, y - 0.03 * high, f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}",
+            x + 0.5 * columns, y - 0.03 * high, f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}",
             fontsize=6.5, weight="bold" if rank == 1 else "normal", ha="center", va="bottom",
         )  # fmt: skip
         color, line = ("#b3261e", 2.5) if rank == 1 else ("#cccccc", 0.6)
-        frame = Rectangle((x - 0.5, y - 0.5), wide, high, fill=False, edgecolor=color, linewidth=line, zorder=2)
+        frame = Rectangle((x - 0.5, y - 0.5), columns, high, fill=False, edgecolor=color, linewidth=line, zorder=2)
         axes.add_patch(frame).set_clip_on(False)
     _bare(axes)
     axes.set_frame_on(False)
@@ -88,7 +88,7 @@ def _bare(axes: Axes) -> None:
     axes.set(xticks=[], yticks=[])
 
 
-def _window(result: PickResult) -> tuple[int, int, int, int]:
+def _crop(result: PickResult) -> tuple[int, int, int, int]:
     """The part of the small image in which any silhouette is, with a margin."""
     seen = result.masks.any(axis=0) | result.real.mask
     ys, xs = np.nonzero(seen)

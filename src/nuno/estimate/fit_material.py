@@ -157,11 +157,11 @@ def _footage(
         chosen = np.unique(np.linspace(0, len(there) - 1, min(frames, len(there))).round().astype(int))
         return FoldFootage(seen, tuple(there[k] for k in chosen)), seen.material
     if isinstance(seen, PickCase):
-        return _picked(seen, pick, where)
+        return _pick_footage(seen, pick, where)
     raise InvalidInputError(f"seen must be Footage, FoldCase, FoldResult or PickCase, got {type(seen).__name__}")
 
 
-def _picked(case: PickCase, pick: Sequence[float] | None, device: str) -> tuple[Footage, Cloth]:
+def _pick_footage(case: PickCase, pick: Sequence[float] | None, device: str) -> tuple[Footage, Cloth]:
     """The image after a pick: the cloth at rest in the hand."""
     given: Any = (6, 6) if pick is None else [finite_array("pick", pick, (2,))]
     result = case.estimate(candidates=given, device=device, progress=False)
@@ -222,9 +222,9 @@ def _warnings(minimum: Minimum, bounds: Mapping[str, Any], ranges: Mapping[str, 
     for name, value in minimum.params.items():
         low, high = bounds[name]
         share = math.log(value / low) / math.log(high / low)
-        least, most = ranges[name]
+        smallest, greatest = ranges[name]
         if not AT_BOUND < share < 1.0 - AT_BOUND:
             found.append(f"{name} lies at its bound, {value:.3g} of {low:g} to {high:g}")
-        elif most / least > VAGUE:
-            found.append(f"{name} is hardly told: {least:.3g} to {most:.3g} explain what was seen about as well")
+        elif greatest / smallest > VAGUE:
+            found.append(f"{name} is hardly told: {smallest:.3g} to {greatest:.3g} explain what was seen about as well")
     return found

@@ -127,7 +127,7 @@ def replay_fold(
     times = _frame_times(frame_times, paths)
     number("rest_height", rest_height, above=0.0)
     number("hand_radius", hand_radius, low=0.0)
-    known = _materials(materials, rest_height)
+    named = _materials(materials, rest_height)
     count("cells", cells, low=4)
     count("substeps", substeps)
     device = found_device(checked_device(device))
@@ -148,7 +148,7 @@ def replay_fold(
     size = cell_counts(rectangle.long_m, rectangle.short_m, cells, (2, 2))
     world, cloth = table_world(rectangle, table, size, device=device, substeps=substeps)
     fold = imagine_fold(
-        world, cloth, paths, list(known.values()), begin=float(times[0]), end=float(times[-1]),
+        world, cloth, paths, list(named.values()), begin=float(times[0]), end=float(times[-1]),
         reach=hand_radius + REACH,
     )  # fmt: skip
     stages.end("imagine")
@@ -175,13 +175,13 @@ def replay_fold(
         drawn = draw_masks(fold.at(times[rows], w), faces, camera, hands=(spheres[0][rows], spheres[1]), **scene)
         return {k: overlap(mask, real[k], around[k]) for k, mask in zip(rows, drawn, strict=True)}
 
-    agreements = [agreement(w) for w in range(len(known))]
+    agreements = [agreement(w) for w in range(len(named))]
     scores = {
-        name: float(np.mean(list(a.values()))) if a else np.nan for name, a in zip(known, agreements, strict=True)
+        name: float(np.mean(list(a.values()))) if a else np.nan for name, a in zip(named, agreements, strict=True)
     }
     best = int(np.nanargmax(list(scores.values()))) if real else 0
     if not real:
-        warnings.append(f"no frame to compare with, so the first material, {next(iter(known))}, was kept")
+        warnings.append(f"no frame to compare with, so the first material, {next(iter(named))}, was kept")
     vertices = fold.at(times, best)
     drawn = _in_pieces(vertices, faces, camera, spheres, scene)
     low = [k for k, value in agreements[best].items() if value < LOW_AGREEMENT]
@@ -195,7 +195,7 @@ def replay_fold(
         log.warning("%s", warning)
     return FoldResult(
         times=times, vertices=vertices, faces=faces, masks=drawn, real=real, agreement=agreements[best],
-        given=frozenset(given), material_name=list(known)[best], material=list(known.values())[best], scores=scores,
+        given=frozenset(given), material_name=list(named)[best], material=list(named.values())[best], scores=scores,
         rectangle=rectangle, camera=camera, hands=paths, hands_at=at, hands_seen=there, hand_radius=hand_radius,
         seconds=stages.total(), warnings=warnings, fold=fold, best_index=best, images=seen_images, first_image=before,
     )  # fmt: skip
@@ -238,19 +238,19 @@ def _frame_times(given: Any, hands: Sequence[HandPath]) -> np.ndarray:
 
 def _materials(given: Any, rest_height: float) -> dict[str, Cloth]:
     if isinstance(given, Mapping):
-        known = dict(given)
+        named = dict(given)
     else:
         names = (given,) if isinstance(given, str) else tuple(given)
-        known = {
+        named = {
             f"{name}, air drag {drag:g}/s": replace(
                 Cloth.preset(name), stretch_stiffness=STRETCH, thickness=2.0 * rest_height, air_drag=drag
             )
             for name in names
             for drag in AIR_DRAGS
         }
-    if not known or not all(isinstance(material, Cloth) for material in known.values()):
+    if not named or not all(isinstance(material, Cloth) for material in named.values()):
         raise InvalidInputError(f"materials must be names of presets, or Cloth by name, got {given!r}")
-    return known
+    return named
 
 
 def _by_frame(name: str, given: Any, times: np.ndarray) -> list[tuple[int, Any]]:
@@ -281,7 +281,7 @@ def _hold_warnings(fold: ImaginedFold, reach: float) -> list[str]:
         f"hand {hold.hand} holds from t = {hold.begin:.2f} s, but is {hold.away:.3f} m from the cloth then (it takes "
         f"what is within {reach:.3f} m), so it moved nothing"
         for hold in fold.holds
-        if not hold.touched
+        if not hold.held_cloth
     ]
 
 

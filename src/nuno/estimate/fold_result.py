@@ -80,9 +80,9 @@ class FoldResult:
 
     def __repr__(self) -> str:
         agreement = list(self.agreement.values())
-        told = f", agreement {np.mean(agreement):.3f}" if agreement else ""
+        rated = f", agreement {np.mean(agreement):.3f}" if agreement else ""
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
-        return f"<FoldResult: {len(self.times)} frames as {self.material_name}{told}{odd}>"
+        return f"<FoldResult: {len(self.times)} frames as {self.material_name}{rated}{odd}>"
 
     @property
     def final(self) -> np.ndarray:
@@ -145,7 +145,7 @@ class FoldResult:
             ],
             "holds": [
                 {"hand": hold.hand, "begin": hold.begin, "end": _number(hold.end), "away_m": hold.away,
-                 "touched": hold.touched}
+                 "touched": hold.held_cloth}
                 for hold in self.fold.holds
             ],
             "layers": {"most": int(layers.count.max()), "area_m2": layers.area},

@@ -31,9 +31,9 @@ def fold_strip(result: FoldResult, count: int) -> Figure:
         result.vertices[chosen], result.faces, camera, table=result.world.find("table"), hands=(spheres, triangles),
         device=result.world.device,
     )  # fmt: skip
-    x0, y0, x1, y1 = _window(result)
-    wide = (x1 - x0) / (y1 - y0)
-    figure = Figure(figsize=(1.9 * len(chosen), 2 * 1.9 / wide + 0.9), layout="constrained", facecolor="white")
+    x0, y0, x1, y1 = _crop(result)
+    aspect = (x1 - x0) / (y1 - y0)
+    figure = Figure(figsize=(1.9 * len(chosen), 2 * 1.9 / aspect + 0.9), layout="constrained", facecolor="white")
     axes = figure.subplots(2, len(chosen), squeeze=False)
     for column, k in enumerate(chosen):
         above, below = axes[:, column]
@@ -57,7 +57,7 @@ def fold_strip(result: FoldResult, count: int) -> Figure:
     return figure
 
 
-def _window(result: FoldResult) -> tuple[int, int, int, int]:
+def _crop(result: FoldResult) -> tuple[int, int, int, int]:
     """The part of the image in which the cloth ever is, with a margin."""
     ever = result.masks.any(axis=0)
     for mask in result.real.values():

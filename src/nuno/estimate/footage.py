@@ -73,8 +73,8 @@ class Footage:
                 raise InvalidInputError(f"mask {k} is empty; leave out times at which no cloth was seen")
         object.__setattr__(self, "times", times)
 
-    def watch(self, known: Cloth, device: str | None) -> Callable[[Mapping[str, np.ndarray]], Scores]:
-        """Return a function from guesses at the material, (n,) by name, to scores (n, k); the rest is ``known``."""
+    def watch(self, material: Cloth, device: str | None) -> Callable[[Mapping[str, np.ndarray]], Scores]:
+        """Return a function from guesses at the material, (n,) by name, to scores (n, k); the rest is ``material``."""
         real = [
             Silhouette(mask, None if self.ignored is None else self.ignored[k]) for k, mask in enumerate(self.masks)
         ]
@@ -82,7 +82,7 @@ class Footage:
         def scores(guesses: Mapping[str, np.ndarray]) -> Scores:
             futures = self.world.imagine(_count(guesses), device=device)
             cloth = futures.find(self.cloth)
-            futures.attach(cloth, replace(known, **guesses))
+            futures.attach(cloth, replace(material, **guesses))
             self.move(futures)
             found = []
             for time, silhouette in zip(self.times, real, strict=True):
@@ -115,8 +115,8 @@ class FoldFootage:
         if not self.frames:
             raise InvalidInputError("the fold has no frame with a mask to compare with")
 
-    def watch(self, known: Cloth, device: str | None) -> Callable[[Mapping[str, np.ndarray]], Scores]:
-        """Return a function from guesses at the material, (n,) by name, to scores (n, k); the rest is ``known``."""
+    def watch(self, material: Cloth, device: str | None) -> Callable[[Mapping[str, np.ndarray]], Scores]:
+        """Return a function from guesses at the material, (n,) by name, to scores (n, k); the rest is ``material``."""
         result, rows = self.result, list(self.frames)
         there, radius = result.hands_seen[rows], max(result.hand_radius, 1e-4)
         spheres, triangles = hand_spheres(result.hands_at[rows], there, radius)
@@ -132,7 +132,7 @@ class FoldFootage:
 
         def scores(guesses: Mapping[str, np.ndarray]) -> Scores:
             count = _count(guesses)
-            materials = [replace(known, **{name: float(v[w]) for name, v in guesses.items()}) for w in range(count)]
+            materials = [replace(material, **{name: float(v[w]) for name, v in guesses.items()}) for w in range(count)]
             fold = imagine_fold(
                 world, cloth, result.hands, materials, begin=float(result.times[0]),
                 end=float(result.times[rows[-1]]), reach=result.hand_radius + REACH,

@@ -57,7 +57,7 @@ class Futures:
     @property
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool: which futures' states are numbers."""
-        return solver_of(self.body).finite().reshape(len(self.discretisation.spread), self.candidates)
+        return solver_of(self.body).finite().reshape(len(self.discretisation.hypotheses), self.candidates)
 
     @property
     def positions(self) -> wp.array:
@@ -117,11 +117,11 @@ def begin_picks(
     """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=discretisation.substeps)
-    k, spread = len(candidates), discretisation.spread
-    count = k * len(spread)
+    k, hypotheses = len(candidates), discretisation.hypotheses
+    count = k * len(hypotheses)
 
     def each(name: str) -> np.ndarray:
-        return np.repeat([getattr(h, name) for h in spread], k)
+        return np.repeat([getattr(h, name) for h in hypotheses], k)
 
     futures = world.imagine(count)
     body = futures.find(cloth.name)
@@ -135,7 +135,7 @@ def begin_picks(
             area_density=each("area_density"), bending_rigidity=each("bending_rigidity"),
             stretch_stiffness=each("stretch_stiffness"), shear_stiffness=each("shear_stiffness"),
             friction=each("friction"), air_drag=each("air_drag"),
-            thickness=np.repeat([h.thickness or 2.0 * rest_height for h in spread], k),
+            thickness=np.repeat([h.thickness or 2.0 * rest_height for h in hypotheses], k),
         ),
     )  # fmt: skip
     uv = np.array(candidates, dtype=float)
@@ -145,18 +145,18 @@ def begin_picks(
     start = np.asarray(body.vertices)[0]
     if np.abs(at - np.round(at)).max() < 1e-6:
         vertex = np.round(at[:, 1]).astype(int) * (cells[0] + 1) + np.round(at[:, 0]).astype(int)
-        where: np.ndarray | SurfacePoints = np.tile(vertex, len(spread))[:, None]
+        where: np.ndarray | SurfacePoints = np.tile(vertex, len(hypotheses))[:, None]
         begin = start[vertex]
     else:
         points = cloth.at(uv[:, 0], uv[:, 1])
         begin = points.positions(start, np.asarray(body.faces))
         where = SurfacePoints(
-            np.tile(points.faces, len(spread)), np.tile(points.barycentric, (len(spread), 1))
+            np.tile(points.faces, len(hypotheses)), np.tile(points.barycentric, (len(hypotheses), 1))
         ).per_world()
     ends = np.broadcast_to(np.asarray(hand, dtype=float), begin.shape)
     path = Path(
         np.array((0.0, lift_seconds)),
-        np.tile(np.stack([begin, ends], axis=1), (len(spread), 1, 1)),
+        np.tile(np.stack([begin, ends], axis=1), (len(hypotheses), 1, 1)),
         None,
         "minimum_jerk",
     )

@@ -24,7 +24,7 @@ NOISE = 0.35
 """[px] What the middle of a ball of a few pixels is off."""
 UNREST = 400.0
 """[px/s2] How fast a hand's speed in the image changes."""
-WINDOW = 4.0
+SEARCH_RADIUS = 4.0
 """[px] Beside three standard deviations, how far from where it is expected a hand is looked for."""
 ALIKE = 0.4
 """Share by which a disc must be more like the hand than the ring around it."""
@@ -124,33 +124,35 @@ def _follow(
 
     The filter's state is the pixel and its speed; both axes share the covariance (Rauch, Tung and Striebel 1965).
     """
-    states, spreads = np.zeros((len(times), 2, 2)), np.zeros((len(times), 2, 2))  # (k, [place, speed], [u, v])
-    expected, expected_spreads = states.copy(), spreads.copy()
+    states, covariances = np.zeros((len(times), 2, 2)), np.zeros((len(times), 2, 2))  # (k, [place, speed], [u, v])
+    expected, expected_covariances = states.copy(), covariances.copy()
     found = np.zeros(len(times), dtype=bool)
     state = np.stack([camera.project(place), np.zeros(2)])
-    spread = np.diag([1.0, 100.0**2])
+    covariance = np.diag([1.0, 100.0**2])
     for k, time in enumerate(times):
         if k:
             move, shake = _motion(time - times[k - 1])
-            state, spread = move @ state, move @ spread @ move.T + shake
-        expected[k], expected_spreads[k] = state, spread
+            state, covariance = move @ state, move @ covariance @ move.T + shake
+        expected[k], expected_covariances[k] = state, covariance
         if k in images:
             ray = camera.rays(state[0])
             origin = camera.camera_to_world[:3, 3]
             depth = (heights[k] - origin[2]) / ray[2] if abs(ray[2]) > 1e-9 else -1.0
             if depth > 0.0:
                 size = max(camera.fx, camera.fy) * radius / depth
-                measured = look_near(images[k], state[0], size, colour, WINDOW + 3.0 * float(np.sqrt(spread[0, 0])))
+                measured = find_disc(
+                    images[k], state[0], size, colour, SEARCH_RADIUS + 3.0 * float(np.sqrt(covariance[0, 0]))
+                )
                 if measured is not None:
-                    gain = spread[:, 0] / (spread[0, 0] + NOISE**2)
+                    gain = covariance[:, 0] / (covariance[0, 0] + NOISE**2)
                     state = state + gain[:, None] * (measured - state[0])
-                    spread = spread - np.outer(gain, spread[0])
+                    covariance = covariance - np.outer(gain, covariance[0])
                     found[k] = True
-        states[k], spreads[k] = state, spread
+        states[k], covariances[k] = state, covariance
     smooth = states.copy()
     for k in range(len(times) - 2, -1, -1):
         move, _ = _motion(times[k + 1] - times[k])
-        back = spreads[k] @ move.T @ np.linalg.inv(expected_spreads[k + 1])
+        back = covariances[k] @ move.T @ np.linalg.inv(expected_covariances[k + 1])
         smooth[k] = states[k] + back @ (smooth[k + 1] - expected[k + 1])
     last = int(np.flatnonzero(found).max(initial=0))
     smooth[last:] = smooth[last]  # nothing says where a hand went that is not found again
@@ -163,11 +165,13 @@ def _motion(step: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([[1.0, step], [0.0, 1.0]]), UNREST**2 * np.outer(effect, effect) + 1e-9 * np.eye(2)
 
 
-def look_near(image: np.ndarray, near: np.ndarray, size: float, colour: np.ndarray, window: float) -> np.ndarray | None:
-    """The pixel (2,) of the disc of ``size`` [px] within ``window`` [px] that is most like the hand, or None."""
-    reach = int(np.ceil(window + RING * size + 2))
-    u0, v0 = np.floor(near).astype(int) - reach
-    u1, v1 = np.ceil(near).astype(int) + reach + 1
+def find_disc(
+    image: np.ndarray, expected_at: np.ndarray, size: float, colour: np.ndarray, search: float
+) -> np.ndarray | None:
+    """The pixel (2,) of the disc of ``size`` [px] within ``search`` [px] that is most like the hand, or None."""
+    reach = int(np.ceil(search + RING * size + 2))
+    u0, v0 = np.floor(expected_at).astype(int) - reach
+    u1, v1 = np.ceil(expected_at).astype(int) + reach + 1
     height, width = image.shape[:2]
     u0, v0, u1, v1 = max(u0, 0), max(v0, 0), min(u1, width), min(v1, height)
     if u1 - u0 < 3 or v1 - v0 < 3:
@@ -181,7 +185,7 @@ def look_near(image: np.ndarray, near: np.ndarray, size: float, colour: np.ndarr
     score = cv2.filter2D(alike, -1, inner / inner.sum(), borderType=cv2.BORDER_CONSTANT)
     score = score - cv2.filter2D(alike, -1, outer / max(outer.sum(), 1.0), borderType=cv2.BORDER_REFLECT)
     v, u = np.mgrid[v0:v1, u0:u1]
-    score[np.hypot(u - near[0], v - near[1]) > window] = -1.0
+    score[np.hypot(u - expected_at[0], v - expected_at[1]) > search] = -1.0
     best = np.unravel_index(int(score.argmax()), score.shape)
     if score[best] < ALIKE:
         return None

@@ -30,7 +30,7 @@ def hands_figure(result: FoldResult) -> Figure:
         above.plot(*path[:, :2].T, color=color, linewidth=1.0, label=f"hand {hand}")
         beside.plot(result.times, 1000.0 * (path[:, 2] - table), line, color=color, linewidth=1.0)
         for hold in result.fold.holds:
-            if hold.hand == hand and hold.touched:
+            if hold.hand == hand and hold.held_cloth:
                 held = (result.times >= hold.begin) & (result.times <= hold.end)
                 above.plot(*path[held, :2].T, color=color, linewidth=2.5)
                 beside.plot(result.times[held], 1000.0 * (path[held, 2] - table), line, color=color, linewidth=2.5)

@@ -38,14 +38,14 @@ class Discretisation:
         cells: Cells along the longer side; the shorter gets as many as keep cells square, and both are rounded so
             that candidates are vertices.
         substeps: Substeps per 1/60 s.
-        spread: The hypotheses that are run on it.
+        hypotheses: The hypotheses that are run on it.
         best: It looks at so many of the candidates that are best so far at most, and at no more than are plausible
             (`nuno.estimate.ranking.SHARE`); None is all.
     """
 
     cells: int
     substeps: int
-    spread: tuple[Hypothesis, ...]
+    hypotheses: tuple[Hypothesis, ...]
     best: int | None = None
 
 
@@ -55,7 +55,7 @@ FRICTIONS = (0.25, 0.5)
 """The part on the table slides after the hand, which changes the silhouette as much as the rigidity does."""
 
 
-def spread(
+def hypotheses_with(
     stretch_stiffness: float, shear_stiffness: float, rigidities: tuple[float, ...] = RIGIDITIES
 ) -> tuple[Hypothesis, ...]:
     """One hypothesis for each friction and bending rigidity."""
@@ -66,21 +66,21 @@ def spread(
     )
 
 
-SPREAD = spread(1000.0, 300.0)
+HYPOTHESES = hypotheses_with(1000.0, 300.0)
 """Guesses for a mesh of one's own choice."""
 
 LIMP = (5e-6, 3e-5, 1e-4, 3e-4, 1e-3)
 """[N m] Lower ones, for coarse meshes that give in their plane: they stay open longer than a real cloth."""
 
-FIRM = spread(1000.0, 40.0)
+FIRM = hypotheses_with(1000.0, 40.0)
 """Guesses for a coarse mesh."""
-LOOSE = spread(150.0, 15.0, LIMP)
+LOOSE = hypotheses_with(150.0, 15.0, LIMP)
 """Guesses at a cloth that gives in its plane, for a coarse mesh.
 
 A coarse mesh that hardly stretches cannot fold in two directions at once and holds a lifted cloth open. One that gives
 falls into pleats, as a limp cloth on a finer mesh does (docs/reports/accuracy.md).
 """
-SHEARING = spread(1000.0, 10.0, LIMP)
+SHEARING = hypotheses_with(1000.0, 10.0, LIMP)
 """Guesses at a cloth that gives on the bias alone, for a coarse mesh."""
 
 
@@ -92,7 +92,7 @@ DISCRETISATIONS = (
     Discretisation(20, 14, _some(FIRM, 1, 8) + _some(LOOSE, 3, 6)),
     Discretisation(20, 14, _some(FIRM, 0, 2, 4, 6) + _some(LOOSE, 2, 4, 7, 9), best=20),
     Discretisation(20, 14, _some(FIRM, 3, 5, 7, 9) + _some(LOOSE, 0, 1, 5, 8), best=10),
-    Discretisation(25, 20, spread(3000.0, 1200.0), best=6),
+    Discretisation(25, 20, hypotheses_with(3000.0, 1200.0), best=6),
     Discretisation(20, 14, SHEARING, best=6),
 )
 """Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).

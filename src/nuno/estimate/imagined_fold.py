@@ -36,7 +36,7 @@ class Hold:
         begin: [s] of the video.
         end: [s], infinity where it was not let go.
         away: How far the cloth was from the hand as it took hold, in the world where it was nearest [m].
-        touched: Whether it held any cloth.
+        held_cloth: Whether it held any cloth.
         faces: (worlds,) int, the face that is held, -1 where the hand did not touch.
         barycentric: (worlds, 3) float, where on that face.
     """
@@ -45,7 +45,7 @@ class Hold:
     begin: float
     end: float
     away: float
-    touched: bool
+    held_cloth: bool
     faces: np.ndarray
     barycentric: np.ndarray
 
@@ -140,7 +140,7 @@ def imagine_fold(
             done.append(hold)
             if grip is not None:
                 active = sorted([*active, (b, grip)], key=lambda item: item[0])
-        if not holds and not active and not any(hold.touched for hold in done):
+        if not holds and not active and not any(hold.held_cloth for hold in done):
             nearest = min(done, key=lambda hold: hold.away)
             raise InvalidInputError(
                 f"the hands never touch the cloth: hand {nearest.hand} is nearest, {nearest.away:.3f} m away as it "
@@ -172,23 +172,23 @@ def _take(
     faces, weights = points.faces.reshape(-1, 1), points.barycentric.reshape(-1, 1, 3)
     held = SurfacePoints(faces, weights).positions(vertices, body.faces)[:, 0]
     away = np.linalg.norm(held - at, axis=-1)
-    touched = away <= reach
+    held_cloth = away <= reach
     corners = body.faces[faces[:, 0]]
     rows = np.arange(len(vertices))
     distances = np.linalg.norm(vertices[rows[:, None], corners] - held[:, None], axis=-1)
     chosen = distances.argmin(axis=1)
     where: Any
-    if (distances[rows, chosen] <= NEAR_A_VERTEX * _cell(vertices, body.faces))[touched].all():
+    if (distances[rows, chosen] <= NEAR_A_VERTEX * _cell(vertices, body.faces))[held_cloth].all():
         weights = np.eye(3)[chosen][:, None]
         vertex = corners[rows, chosen]
         held = vertices[rows, vertex]
-        where = np.where(touched, vertex, -1)[:, None]
+        where = np.where(held_cloth, vertex, -1)[:, None]
     else:
-        masked = np.where(touched[:, None], faces, -1)
+        masked = np.where(held_cloth[:, None], faces, -1)
         where = SurfacePoints(masked, weights) if len(vertices) > 1 else SurfacePoints(masked[0], weights[0])
-    faces = np.where(touched, faces[:, 0], -1)
-    hold = Hold(number, *span, float(away.min()), bool(touched.any()), faces, weights[:, 0])
-    if not hold.touched:
+    faces = np.where(held_cloth, faces[:, 0], -1)
+    hold = Hold(number, *span, float(away.min()), bool(held_cloth.any()), faces, weights[:, 0])
+    if not hold.held_cloth:
         return hold, None
     later = hand.times > span[0]
     times = np.append(span[0], hand.times[later])

@@ -59,22 +59,22 @@ class Layers:
         """Two maps: how many layers lie where, from above; and, on the cloth spread flat, how deep each part lies."""
         from matplotlib.figure import Figure
 
-        most = self.height.shape[-1]
+        deepest = self.height.shape[-1]
         figure = Figure(figsize=(9.0, 4.2), layout="constrained", facecolor="white")
         left, right = figure.subplots(1, 2)
         extent = (self.x[0], self.x[-1], self.y[0], self.y[-1])
         shown = left.imshow(
             np.where(self.count > 0, self.count, np.nan), origin="lower", extent=extent, vmin=0.5,
-            vmax=max(most, 2) + 0.5, cmap=_colours(max(most, 2)), interpolation="nearest",
+            vmax=max(deepest, 2) + 0.5, cmap=_colours(max(deepest, 2)), interpolation="nearest",
         )  # fmt: skip
-        figure.colorbar(shown, ax=left, ticks=range(1, max(most, 2) + 1), label="layers", shrink=0.7)
+        figure.colorbar(shown, ax=left, ticks=range(1, max(deepest, 2) + 1), label="layers", shrink=0.7)
         left.set(title="from above: layers over the table", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        for layer in range(most - 1, -1, -1):
+        for layer in range(deepest - 1, -1, -1):
             there = self.count > layer
             u, v = self.material[there, layer].T
             name = "seen from above" if layer == 0 else f"under {layer}"
             turned = ~self.upward[there, layer]
-            colour = _colours(max(most, 2))(layer)
+            colour = _colours(max(deepest, 2))(layer)
             right.plot(u[~turned], v[~turned], "s", markersize=2.0, color=colour, label=name)
             right.plot(u[turned], v[turned], "x", markersize=2.5, color=colour, label=f"{name}, turned over", alpha=0.8)
         right.set(title="on the cloth: which parts lie under which", xlabel="u", ylabel="v", xlim=(0, 1), ylim=(0, 1))
@@ -113,15 +113,15 @@ def find_layers(vertices: np.ndarray, faces: np.ndarray, fractions: np.ndarray, 
     cells, heights, places, ups = cells[once], heights[once], places[once], ups[once]
     count = np.bincount(cells, minlength=len(x) * len(y))
     rank = np.arange(len(cells)) - np.repeat(np.cumsum(count) - count, count)
-    most = max(int(count.max(initial=0)), 1)
-    height = np.full((len(x) * len(y), most), np.nan)
-    material = np.full((len(x) * len(y), most, 2), np.nan)
-    upward = np.zeros((len(x) * len(y), most), dtype=bool)
+    deepest = max(int(count.max(initial=0)), 1)
+    height = np.full((len(x) * len(y), deepest), np.nan)
+    material = np.full((len(x) * len(y), deepest, 2), np.nan)
+    upward = np.zeros((len(x) * len(y), deepest), dtype=bool)
     height[cells, rank], material[cells, rank], upward[cells, rank] = heights, places, ups
     shape = (len(y), len(x))
     return Layers(
-        x, y, count.reshape(shape), height.reshape(*shape, most), material.reshape(*shape, most, 2),
-        upward.reshape(*shape, most),
+        x, y, count.reshape(shape), height.reshape(*shape, deepest), material.reshape(*shape, deepest, 2),
+        upward.reshape(*shape, deepest),
     )  # fmt: skip
 
 

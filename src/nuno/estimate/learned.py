@@ -134,18 +134,18 @@ def correction(outline: Outline, futures: Futures, comparison: Comparison, table
             futures, guess * looked.shape[1] + candidate, angles, outline.camera, table, hand
         )  # fmt: skip
         pair = [values[turn, guess, candidate] for values in (comparison.chamfer, comparison.iou)]
-        of_guess = described(futures.discretisation.spread, futures.discretisation.cells)[guess]
+        of_guess = described(futures.discretisation.hypotheses, futures.discretisation.cells)[guess]
         place = np.tile(outline.place, (len(guess), 1))
         scalars = np.column_stack([np.log1p(pair[0]), pair[1], np.abs(angles), place, of_guess])
         added[guess, candidate] += LEARNED_SHARE * log_ratios(outline.picture, outline.cut(masks), scalars)
     return np.asarray(added)
 
 
-def described(spread: Sequence[Hypothesis], cells: int) -> np.ndarray:
+def described(hypotheses: Sequence[Hypothesis], cells: int) -> np.ndarray:
     """(n, 5) float, guesses as the network is told of them: rigidity, friction, stretch, shear, mesh; about -1 to 1.
 
     Args:
-        spread: The guesses.
+        hypotheses: The guesses.
         cells: Cells along the longer side of their mesh.
     """
     return np.array([
@@ -153,5 +153,5 @@ def described(spread: Sequence[Hypothesis], cells: int) -> np.ndarray:
             np.log(h.bending_rigidity) / 2 + 4.5, h.friction, np.log(h.stretch_stiffness) - 6.0,
             np.log(h.shear_stiffness) / 2 - 2.0, cells / 20 - 1.0,
         )
-        for h in spread
+        for h in hypotheses
     ])  # fmt: skip

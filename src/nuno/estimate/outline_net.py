@@ -55,8 +55,8 @@ def _forward(net: dict[str, np.ndarray], seen: np.ndarray, imagined: np.ndarray,
     for k, stride in enumerate(STRIDES):
         x = np.maximum(_convolved(x, net[f"conv{k}"], stride) + net[f"conv{k}.bias"], 0.0)
     x = np.maximum(x.reshape(len(x), -1) @ net["dense"].T + net["dense.bias"], 0.0)
-    known = ((scalars - net["mean"]) / net["deviation"]).astype(np.float32)
-    x = np.concatenate([x, known], axis=1)
+    scaled = ((scalars - net["mean"]) / net["deviation"]).astype(np.float32)
+    x = np.concatenate([x, scaled], axis=1)
     for name in ("mix", "narrow"):
         x = np.maximum(x @ net[name].T + net[f"{name}.bias"], 0.0)
     return np.asarray(x @ net["ratio"][0] + net["ratio.bias"][0], dtype=float)
@@ -66,9 +66,9 @@ def _convolved(x: np.ndarray, layer: np.ndarray, stride: int) -> np.ndarray:
     """Images (n, h, w, c) by a layer (outputs, side * side * c), the rim padded by zeros."""
     side = round(np.sqrt(layer.shape[1] / x.shape[-1]))
     padded = np.pad(x, ((0, 0), (side // 2, side // 2), (side // 2, side // 2), (0, 0)))
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (side, side), axis=(1, 2))[:, ::stride, ::stride]
-    n, height, width = windows.shape[:3]
-    return (windows.transpose(0, 1, 2, 4, 5, 3).reshape(n * height * width, -1) @ layer.T).reshape(n, height, width, -1)
+    patches = np.lib.stride_tricks.sliding_window_view(padded, (side, side), axis=(1, 2))[:, ::stride, ::stride]
+    n, height, width = patches.shape[:3]
+    return (patches.transpose(0, 1, 2, 4, 5, 3).reshape(n * height * width, -1) @ layer.T).reshape(n, height, width, -1)
 
 
 def _rounded(picture: np.ndarray) -> np.ndarray:

@@ -126,8 +126,8 @@ class PickResult:
                 f"low confidence: {second} explains the image almost as well as {self.best} "
                 f"(confidence {self.confidence:.2f})"
             )
-        listed = " and ".join(f"{self._label(k)} with {100.0 * likely[k]:.0f} %" for k in others)
-        return f"low confidence: {self.best} is right with a probability of {100.0 * self.confidence:.0f} %, {listed}"
+        rivals = " and ".join(f"{self._label(k)} with {100.0 * likely[k]:.0f} %" for k in others)
+        return f"low confidence: {self.best} is right with a probability of {100.0 * self.confidence:.0f} %, {rivals}"
 
     @property
     def world(self) -> World:

@@ -51,7 +51,7 @@ def score_futures(
     Returns:
         The scores by name, (turns, hypotheses, candidates) each; "chamfer" in pixels of ``camera``.
     """
-    shape = (len(futures.discretisation.spread), futures.candidates)
+    shape = (len(futures.discretisation.hypotheses), futures.candidates)
     device = futures.world.device
     angles = [float(angle) for angle in turns]
     positions = futures.positions

@@ -97,18 +97,18 @@ class Ranked:
         """(k,) int, candidates from best to worst."""
         return np.argsort(-self.scores, kind="stable")
 
-    def plausible(self, most: int) -> np.ndarray:
+    def plausible(self, limit: int) -> np.ndarray:
         """The best candidates, in the order of their numbers: (m,) int.
 
         Where evidence ranks, they are the fewest that hold `SHARE` of the probability, but two at least.
 
         Args:
-            most: No more than so many.
+            limit: No more than so many.
         """
         order, likely = self.order, probabilities(self.name, self.scores)
         if likely is not None:
-            most = min(most, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), SHARE))))
-        return np.sort(order[:most])
+            limit = min(limit, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), SHARE))))
+        return np.sort(order[:limit])
 
     def settled(self, sure: float) -> bool:
         """Return whether one candidate is as likely as ``sure``, below 1, so that no more guesses are needed."""

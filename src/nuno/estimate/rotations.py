@@ -20,7 +20,7 @@ from nuno.validation import finite_array
 
 TURNS = tuple(float(np.radians(angle)) for angle in (-30, -20, -10, 0, 10, 20, 30))
 """[rad] At which a future is compared, counterclockwise seen from above."""
-SPREAD = float(np.radians(20))
+DEVIATION = float(np.radians(20))
 """[rad] Standard deviation of the normal prior."""
 
 
@@ -38,7 +38,7 @@ def checked_turns(turns: Sequence[float]) -> np.ndarray:
 
 def log_prior(turns: ArrayLike) -> np.ndarray:
     """(t,) float, logarithms of the turns' probabilities, which add up to 1."""
-    logs = -0.5 * (np.asarray(turns, dtype=float) / SPREAD) ** 2
+    logs = -0.5 * (np.asarray(turns, dtype=float) / DEVIATION) ** 2
     return logs - np.log(np.exp(logs).sum())
 
 

@@ -203,7 +203,7 @@ def _real_to_simulated(
     x = points[point][0] - x0
     y = points[point][1] - y0
     column = wp.clamp(x, 0, width - 1)
-    beside = wp.abs(x - column)  # a pixel left or right of the region is that much farther from all of it
+    outside = wp.abs(x - column)  # a pixel left or right of the region is that much farther from all of it
     best = int(2 * _NONE * _NONE)
     start = wp.clamp(y, 0, height - 1)
     up = start
@@ -214,13 +214,13 @@ def _real_to_simulated(
         if up >= 0 and (up - y) * (up - y) < best:
             step = int(across[world, up, column])
             if step < _NONE:
-                best = wp.min(best, (up - y) * (up - y) + (step + beside) * (step + beside))
+                best = wp.min(best, (up - y) * (up - y) + (step + outside) * (step + outside))
             up -= 1
             searching = 1
         if down < height and (down - y) * (down - y) < best:
             step = int(across[world, down, column])
             if step < _NONE:
-                best = wp.min(best, (down - y) * (down - y) + (step + beside) * (step + beside))
+                best = wp.min(best, (down - y) * (down - y) + (step + outside) * (step + outside))
             down += 1
             searching = 1
     wp.atomic_add(sums_out, world, _TO_SIM, wp.int64(wp.rint(wp.sqrt(float(best)) * _STEPS)))

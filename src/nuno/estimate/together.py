@@ -79,7 +79,7 @@ class Part(Futures):
     @property
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool, all of them: a batch with another has no moment after it."""
-        return np.ones((len(self.discretisation.spread), self.candidates), dtype=bool)
+        return np.ones((len(self.discretisation.hypotheses), self.candidates), dtype=bool)
 
     @property
     def positions(self) -> wp.array:
@@ -119,8 +119,8 @@ class Together:
         number = next((k for k, other in enumerate(self.stages) if other is stage), None)
         if number is None or not np.isin(chosen, self.candidates).all():
             return None
-        first = sum(len(other.spread) for other in self.stages[:number])
-        hypotheses = first + np.arange(len(stage.spread))
+        first = sum(len(other.hypotheses) for other in self.stages[:number])
+        hypotheses = first + np.arange(len(stage.hypotheses))
         columns = np.array([int(np.nonzero(self.candidates == c)[0][0]) for c in chosen])
         places = (hypotheses[:, None] * len(self.candidates) + columns).ravel()
         # as `nuno.estimate.futures.imagine_picks` asks it
@@ -184,10 +184,8 @@ def imagine_together(
         lift_seconds: As `nuno.estimate.futures.imagine_picks` takes it, like the ``settings``.
         settings: The other arguments of that function.
     """
-    spread = tuple(guess for stage in stages for guess in stage.spread)
-    batch = begin_picks(
-        candidates=uv[chosen], discretisation=replace(stages[0], spread=spread), lift_seconds=lift_seconds, **settings
-    )
+    together = replace(stages[0], hypotheses=tuple(guess for stage in stages for guess in stage.hypotheses))
+    batch = begin_picks(candidates=uv[chosen], discretisation=together, lift_seconds=lift_seconds, **settings)
     world, solver = batch.world, solver_of(batch.body)
     world.run(lift_seconds, progress=False)
     moments: list[Moment] = []

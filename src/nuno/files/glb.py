@@ -63,8 +63,8 @@ def glb_bytes(meshes: list[MovingMesh], times: np.ndarray) -> bytes:
         file.meshes.append(entry)
         file.materials.append(_material(mesh))
         nodes.append({"name": mesh.name, "mesh": number})
-    root = {"name": "world", "rotation": UPRIGHT, "children": list(range(1, len(nodes) + 1))}
-    document: dict[str, Any] = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [root, *nodes]}
+    top = {"name": "world", "rotation": UPRIGHT, "children": list(range(1, len(nodes) + 1))}
+    document: dict[str, Any] = {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [top, *nodes]}
     if channels:
         document["animations"] = [{"name": "recording", "samplers": samplers, "channels": channels}]
     return file.closed(document)

@@ -113,16 +113,16 @@ class Recording:
         Raises:
             InvalidInputError: times that do not increase, no body, or another number of frames.
         """
-        known = finite_array("times", times, ("t",))
+        moments = finite_array("times", times, ("t",))
         chosen = tuple(bodies)
-        if not chosen or (np.diff(known) <= 0.0).any():
+        if not chosen or (np.diff(moments) <= 0.0).any():
             raise InvalidInputError("a recording needs at least one body, and times that increase")
         for body in chosen:
-            if len(body.vertices) not in (1, len(known)):
-                raise InvalidInputError(f"{body.name!r} has {len(body.vertices)} frames for {len(known)} times")
+            if len(body.vertices) not in (1, len(moments)):
+                raise InvalidInputError(f"{body.name!r} has {len(body.vertices)} frames for {len(moments)} times")
         recording = cls.__new__(cls)
         recording._world, recording._bodies, recording._frames = None, [], []
-        recording._times, recording._loaded = known.tolist(), chosen
+        recording._times, recording._loaded = moments.tolist(), chosen
         return recording
 
     def __len__(self) -> int:

@@ -80,11 +80,12 @@ class Grip:
     ) -> None:
         self.key = uuid.uuid4().hex
         self.body, self.target = body, target
-        self._spec: Any = spec
+        # for solvers: what they are given, and where a leader took it; not for users, who read the properties
+        self.spec: Any = spec
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
-        self._offsets = offsets
+        self.offsets = offsets
         # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame
-        self._followed: tuple[float, Pose, Pose] | None = None
+        self.followed: tuple[float, Pose, Pose] | None = None
         self._world: Simulation | None = None
         self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
 
@@ -99,7 +100,7 @@ class Grip:
     @property
     def compliance(self) -> float:
         """[m/N]; 0 is stiff."""
-        return float(self._spec.compliance)
+        return float(self.spec.compliance)
 
     @property
     def max_force(self) -> Any:
@@ -108,19 +109,19 @@ class Grip:
         Infinite for points that follow a path, a place or a static body, unless a limit was asked for; each point
         bears it.
         """
-        given = getattr(self._spec, "max_force", None)
+        given = getattr(self.spec, "max_force", None)
         limit = np.atleast_1d(np.inf if given is None else given)
         return float(limit[0]) if len(limit) == 1 else limit.copy()
 
     @property
     def ignored(self) -> tuple[str, ...]:
         """Keys of the bodies that a held rigid body passes through while it is held."""
-        return tuple(getattr(self._spec, "ignored", ()))
+        return tuple(getattr(self.spec, "ignored", ()))
 
     @property
     def is_tie(self) -> bool:
         """Return whether it joins moving bodies, holds a rigid body or has a limit: it is then solved with contacts."""
-        return not isinstance(self._spec, GripSpec) or self._spec.max_force is not None
+        return not isinstance(self.spec, GripSpec) or self.spec.max_force is not None
 
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:
@@ -149,57 +150,57 @@ class Grip:
                 if self._world is not None:
                     world._drop_grip(self)
 
-    def _spec_for(self, time: float, frame: float) -> GripSpec:
+    def spec_for(self, time: float, frame: float) -> GripSpec:
         """Return the keys for a run from ``time`` on; a leading body's last move takes one ``frame`` [s]."""
-        if self.target is None or self._offsets is None:
-            return self._spec
+        if self.target is None or self.offsets is None:
+            return self.spec
         schedule = None if self._world is None else self._world._schedule
-        last = self._spec.positions[:, :, -1]
+        last = self.spec.positions[:, :, -1]
         if schedule is not None and self.target.key in schedule.poses:
-            way = apply(schedule.poses[self.target.key], self._offsets[:, None])
-            way = np.broadcast_to(way, (len(self._offsets), len(schedule.times), *self._offsets.shape[1:]))
+            way = apply(schedule.poses[self.target.key], self.offsets[:, None])
+            way = np.broadcast_to(way, (len(self.offsets), len(schedule.times), *self.offsets.shape[1:]))
             way = np.moveaxis(way, 1, 2).copy()
             way[:, :, 0] = last
             # two frames of where it led before, which tell how what it holds accelerates
-            kept = (self._spec.times < time - 0.1 * frame) & (self._spec.times > time - 2.1 * frame)
+            kept = (self.spec.times < time - 0.1 * frame) & (self.spec.times > time - 2.1 * frame)
             keys = {
-                "times": np.append(self._spec.times[kept], schedule.times),
-                "positions": np.concatenate([self._spec.positions[:, :, kept], way], axis=2),
+                "times": np.append(self.spec.times[kept], schedule.times),
+                "positions": np.concatenate([self.spec.positions[:, :, kept], way], axis=2),
             }
-            self._spec = GripSpec(**{**self._spec.__dict__, **keys})
-            return self._spec
-        now = np.broadcast_to(apply(self.target._pose(), self._offsets), self._offsets.shape)
+            self.spec = GripSpec(**{**self.spec.__dict__, **keys})
+            return self.spec
+        now = np.broadcast_to(apply(self.target.pose(), self.offsets), self.offsets.shape)
         keys = {"times": np.array([time]), "positions": now[:, :, None].copy()}
         if not np.array_equal(last, now):
             keys = {"times": np.array([time, time + frame]), "positions": np.stack([last, now], axis=2)}
         # The keys become the grip's own, so that the next run starts from where this one led.
-        self._spec = GripSpec(**{**self._spec.__dict__, **keys})
-        return self._spec
+        self.spec = GripSpec(**{**self.spec.__dict__, **keys})
+        return self.spec
 
-    def _lead(self, time: float, worlds: int) -> tuple[Pose, Pose]:
+    def lead(self, time: float, worlds: int) -> tuple[Pose, Pose]:
         """Return from where to where a static leader takes a held rigid body in the frame from ``time`` [s] on.
 
         It starts where the body was led last, also where the leader has jumped since.
         """
         assert self.target is not None and self._world is not None
-        schedule, start = self._world._schedule, self.target._pose()
+        schedule, start = self._world._schedule, self.target.pose()
         end = start
         k = None if schedule is None else schedule.frame_at(time)
         if schedule is not None and k is not None and self.target.key in schedule.poses:
             start, end = schedule.in_frame(self.target.key, k)
 
         def held(leader: Pose) -> Pose:
-            place, turn = compose(leader, self._offsets)
+            place, turn = compose(leader, self.offsets)
             return np.broadcast_to(place, (worlds, 3)), np.broadcast_to(turn, (worlds, 4))
 
         goal = held(end)
-        if self._followed is None:
+        if self.followed is None:
             before = held(start)
-        elif self._followed[0] == time:  # a frame that it goes through twice starts in the same place
-            before = self._followed[1]
+        elif self.followed[0] == time:  # a frame that it goes through twice starts in the same place
+            before = self.followed[1]
         else:
-            before = self._followed[2]
-        self._followed = time, before, goal
+            before = self.followed[2]
+        self.followed = time, before, goal
         return before, goal
 
 
@@ -245,7 +246,7 @@ def _tell_jump(body: Body, places: np.ndarray, jump: float) -> None:
 
 
 def _stiff_vertices(grip: Grip) -> np.ndarray | None:
-    spec = grip._spec
+    spec = grip.spec
     return spec.vertices if isinstance(spec, GripSpec) and not grip.is_tie and spec.compliance == 0.0 else None
 
 
@@ -277,7 +278,7 @@ def make_grip(
     if target is not None and target._dynamics is not None:
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
-    most = None if max_force is None else force_limit(max_force, worlds)
+    limits = None if max_force is None else force_limit(max_force, worlds)
     present = body.vertices
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
@@ -294,7 +295,7 @@ def make_grip(
 
     interpolation, local, jump = "linear", None, np.zeros(3)
     if target is not None:
-        local = np.broadcast_to(apply(invert(target._pose()), held), held.shape).copy()
+        local = np.broadcast_to(apply(invert(target.pose()), held), held.shape).copy()
         times, keys = np.array([world.time]), held[:, :, None]
     elif isinstance(to, Path):
         if to.world_count not in (None, worlds):
@@ -306,10 +307,10 @@ def make_grip(
         times = np.array([world.time])
         keys = (np.broadcast_to(goal, (worlds, 3))[:, None] + offsets)[:, :, None]
         jump = goal - mean
-    if compliance == 0.0 and most is None:
+    if compliance == 0.0 and limits is None:
         jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
         _tell_jump(body, positions[0], float(jumps.max()))
-    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, most)
+    spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, limits)
     return Grip(body, spec, target, local)
 
 

@@ -23,12 +23,12 @@ def held_points(grip: Grip, index: int = 0, vertices: np.ndarray | None = None) 
         index: Which world of a batch.
         vertices: (n, 3) [m] of the body in that world, where they are known already.
     """
-    spec: Any = grip._spec
+    spec: Any = grip.spec
     if isinstance(spec, HoldSpec):
-        place = grip.body._pose()[0]
+        place = grip.body.pose()[0]
         return np.atleast_2d(place[index] if place.ndim == 2 else place)
     if isinstance(spec, JointSpec):
-        return compose(grip.body._pose(), (spec.place, spec.turn))[0][index : index + 1]
+        return compose(grip.body.pose(), (spec.place, spec.turn))[0][index : index + 1]
     if vertices is None:
         own = grip.body._vertices()
         vertices = own[index if len(own) > 1 else 0] if own.ndim == 3 else own

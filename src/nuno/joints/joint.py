@@ -78,7 +78,7 @@ class Joint(Grip):
     @property
     def kind(self) -> str:
         """The kind: "fixed", "hinge", "slider" or "ball"."""
-        return str(self._spec.kind)
+        return str(self.spec.kind)
 
     @property
     def position(self) -> Any:
@@ -102,7 +102,7 @@ class Joint(Grip):
                 sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
                 angle = 2.0 * np.arctan2(sine, turn[:, :1])
                 local = turn[:, 1:] * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
-                found = quat.rotate(self._spec.other_turn, local)
+                found = quat.rotate(self.spec.other_turn, local)
             else:
                 found = np.zeros(len(turn))
             return self._given(found)
@@ -198,23 +198,23 @@ class Joint(Grip):
         return values[0] if values.ndim > 1 else float(values[0])
 
     def _value(self, name: str) -> Any:
-        column = self._spec.drives[:, DRIVES.index(name)]
+        column = self.spec.drives[:, DRIVES.index(name)]
         return float(column[0]) if (column == column[0]).all() else column.copy()
 
     def _set(self, numbers: Callable[[str, Any], dict[str, Any]], value: Any) -> None:
         world = self._live()
         with world._change("set on a joint"):
-            drives = drive_table(world.world_count, numbers(self.kind, value), self._spec.drives)
-            self._spec = replace(self._spec, drives=drives)
+            drives = drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)
+            self.spec = replace(self.spec, drives=drives)
 
     def _poses(self) -> tuple[Any, Any]:
         """The joint's frame in the body and in the other, (worlds, 3) and (worlds, 4) each, in the world's frame."""
-        spec, worlds = self._spec, self._live().world_count
+        spec, worlds = self.spec, self._live().world_count
         poses = []
         for body, local in (
             (self.body, (spec.place, spec.turn)), (self.target, (spec.other_place, spec.other_turn)),
         ):  # fmt: skip
-            pose = local if body is None else compose(body._pose(), local)
+            pose = local if body is None else compose(body.pose(), local)
             poses.append(tuple(np.broadcast_to(a, (worlds, a.shape[-1])) for a in pose))
         return poses[0], poses[1]
 

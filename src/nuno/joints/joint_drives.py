@@ -113,10 +113,10 @@ def limit_drives(kind: str, value: Any) -> dict[str, Any]:
     if kind == "fixed":
         raise InvalidInputError("a fixed joint has no limits")
     if kind == "ball":
-        most = _checked("limit", value, low=0.0)
-        if (most >= 3.0).any():
+        upper = _checked("limit", value, low=0.0)
+        if (upper >= 3.0).any():
             raise InvalidInputError(f"limit must be below 3 rad, or None, got {value!r}")
-        return {"lower": 0.0, "upper": most}
+        return {"lower": 0.0, "upper": upper}
     try:
         lower, upper = value
     except (TypeError, ValueError) as problem:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 
-MOST_FORCE = 1e4
+MAX_FORCE = 1e4
 """[N] The most that a grip or weld bears where nothing else is asked for: ten times what a person lifts."""
-MOST_ACCELERATION = 1e3
+MAX_ACCELERATION = 1e3
 """[m/s2] What a grip or weld can give the heaviest of the rigid bodies that it holds, at least: 100 g."""
 
 
@@ -85,7 +85,7 @@ class HoldSpec:
         return self.positions[:, key], self.quaternions[:, key]
 
 
-def spread_spec(spec: Any, batched: Any) -> Any:
+def batched_spec(spec: Any, batched: Any) -> Any:
     """Return a grip's, tie's or hold's numbers with ``batched`` applied to each array that has a world axis."""
     names = (
         "vertices", "corners", "barycentric", "weights", "other_corners", "other_weights", "places", "positions",
@@ -116,7 +116,7 @@ def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
         return limit
     rigid: list[Any] = [b._dynamics for b in bodies if b is not None and b._dynamics is not None]
     masses = [np.asarray(dynamics.mass) for dynamics in rigid if dynamics.is_rigid]
-    return np.max([np.full(worlds, MOST_FORCE), *(MOST_ACCELERATION * mass for mass in masses)], axis=0)
+    return np.max([np.full(worlds, MAX_FORCE), *(MAX_ACCELERATION * mass for mass in masses)], axis=0)
 
 
 def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:
@@ -142,7 +142,7 @@ def _tie_of(
     rows = np.arange(worlds)[:, None, None]
     held = np.einsum("wkc,wkcx->wkx", np.where(corners >= 0, weights, 0.0), own[rows, np.maximum(corners, 0)])
     if other._dynamics.is_rigid:
-        places = np.broadcast_to(apply(invert(other._pose()), held), held.shape)
+        places = np.broadcast_to(apply(invert(other.pose()), held), held.shape)
         return TieSpec(corners.astype(np.int32), np.array(weights), None, None, np.array(places), compliance)
     # four particles in all: one of this body, three of the other
     heaviest = np.argmax(weights, axis=-1)[..., None]
@@ -166,7 +166,7 @@ def make_hold(
         InvalidInputError: a target that cannot be used.
     """
     worlds = world.world_count
-    place, turn = (np.broadcast_to(a, (worlds, a.shape[-1])) for a in body._pose())
+    place, turn = (np.broadcast_to(a, (worlds, a.shape[-1])) for a in body.pose())
     axis = None
     if free is not None:
         axis = finite_array("free", free, (3,))
@@ -175,9 +175,7 @@ def make_hold(
         axis = axis / np.linalg.norm(axis)
     now = np.array([world.time])
     if target is not None:
-        place, turn = (
-            np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(invert(target._pose()), (place, turn))
-        )
+        place, turn = (np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(invert(target.pose()), (place, turn)))
         spec = HoldSpec(now, place[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance)
         return spec, None if target._dynamics is not None else (place.copy(), turn.copy())
     if isinstance(to, Path):
@@ -218,7 +216,7 @@ def check_leader(leader: Body, deforms: bool, grips: Sequence[Grip]) -> None:
     Raises:
         BodyStateError: it would deform, and holds a rigid body.
     """
-    held = [grip.body.name for grip in grips if grip.target is leader and isinstance(grip._spec, HoldSpec)]
+    held = [grip.body.name for grip in grips if grip.target is leader and isinstance(grip.spec, HoldSpec)]
     if deforms and held:
         raise BodyStateError(
             f"{leader.name!r} would deform, but holds {held[0]!r}, which is rigid; release that grip first"
@@ -227,18 +225,18 @@ def check_leader(leader: Body, deforms: bool, grips: Sequence[Grip]) -> None:
 
 def tie_to_leader(grip: Grip, worlds: int) -> None:
     """Let a grip by a static body be one by a dynamic body, which that has become: it bears the force from now on."""
-    leader, spec = grip.target, grip._spec
+    leader, spec = grip.target, grip.spec
     assert leader is not None and leader._dynamics is not None
     if isinstance(spec, HoldSpec):
         # its places are in the leader's frame already
-        grip._offsets = grip._followed = None
+        grip.offsets = grip.followed = None
         return
     tie = _tie_of(grip.body, *corners_of(spec), leader, spec.compliance, worlds)
     if spec.max_force is not None:
         tie = replace(tie, max_force=spec.max_force)
     # at the very places where the leader held them
-    grip._spec = replace(tie, places=grip._offsets) if leader._dynamics.is_rigid else tie
-    grip._offsets = None
+    grip.spec = replace(tie, places=grip.offsets) if leader._dynamics.is_rigid else tie
+    grip.offsets = None
 
 
 def check_weld(a: Body, b: Body) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 log = logging.getLogger(__name__)
 
 LOADED = re.compile(r"Module (\S+) .*took ([\d.]+) ms +\((compiled|cached)\)")
-TOLD_AFTER = 2.0
+LOGGED_AFTER = 2.0
 """[s] What is quicker is not worth a word."""
 
 _here = threading.local()
@@ -100,7 +100,7 @@ class _Watch:
         if found is not None and getattr(_here, "depth", 0) > 0:
             seconds = float(found[2]) / 1000.0
             _here.seconds = _compile_seconds() + seconds
-            if seconds > TOLD_AFTER and self.level > wp.LOG_INFO:
+            if seconds > LOGGED_AFTER and self.level > wp.LOG_INFO:
                 log.warning(
                     "waited %.1f s for the kernels of %s, which are kept for later runs; nuno compile makes them ahead",
                     seconds, found[1],

@@ -21,7 +21,7 @@ from nuno.kernels.kernel_modules import KernelModule, kernel_modules
 
 def compile_kernels(
     device: str = "cpu", arch: str | None = None, *, only: Collection[str] | None = None, jobs: int | None = None,
-    told: Callable[[str, float], Any] | None = None,
+    report: Callable[[str, float], Any] | None = None,
 ) -> Path:  # fmt: skip
     """Compile kernels that are not in Warp's cache yet.
 
@@ -30,7 +30,7 @@ def compile_kernels(
         arch: CUDA's architecture, "sm_90" for an H100 or H200; None: that of this machine's devices.
         only: Names of Warp modules; None: all that the device runs.
         jobs: How many are compiled at once; None: as many as there are cores.
-        told: Called with each module's name and seconds as soon as it is there.
+        report: Called with each module's name and seconds as soon as it is there.
 
     Returns:
         The folder of the cache.
@@ -64,8 +64,8 @@ def compile_kernels(
         waiting = {pool.submit(work, module): module.name for module in chosen}
         for done in as_completed(waiting):
             seconds = done.result()
-            if told is not None:
-                told(waiting[done], seconds)
+            if report is not None:
+                report(waiting[done], seconds)
     finally:
         pool.shutdown(cancel_futures=True)
     return Path(wp.config.kernel_cache_dir or "")
@@ -90,15 +90,15 @@ def take_machine_code(device: str) -> None:
 def _architectures(arch: str | None) -> tuple[int, ...]:
     import warp as wp
 
-    known = wp.get_cuda_supported_archs()
+    supported = wp.get_cuda_supported_archs()
     if arch is None:
         here = {device.arch for device in wp.get_cuda_devices()}
         if not here:
             raise InvalidInputError("there is no CUDA device here to compile for: name its architecture, such as sm_90")
         return tuple(sorted(here))
     found = re.fullmatch(r"(?:sm_)?(\d+)", arch)
-    if not found or int(found[1]) not in known:
-        raise InvalidInputError(f"arch must be one of {', '.join(f'sm_{each}' for each in known)}, got {arch!r}")
+    if not found or int(found[1]) not in supported:
+        raise InvalidInputError(f"arch must be one of {', '.join(f'sm_{each}' for each in supported)}, got {arch!r}")
     return (int(found[1]),)
 
 

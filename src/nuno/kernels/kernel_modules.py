@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-BLOCK = 256
+BLOCK_SIZE = 256
 """Threads of a CUDA block where a launch names no other number: Warp's default, and that of most kernels."""
 
 CPU_ONLY = frozenset(
@@ -55,9 +55,9 @@ class KernelModule:
 
 def kernel_sources() -> list[str]:
     """Return the names of the Python modules that declare kernels, in order."""
-    root = Path(__file__).parents[1]
-    declaring = (path for path in root.rglob("*.py") if path != Path(__file__) and "@wp.kernel" in path.read_text())
-    return sorted(".".join((root.name, *path.relative_to(root).with_suffix("").parts)) for path in declaring)
+    package = Path(__file__).parents[1]
+    declaring = (path for path in package.rglob("*.py") if path != Path(__file__) and "@wp.kernel" in path.read_text())
+    return sorted(".".join((package.name, *path.relative_to(package).with_suffix("").parts)) for path in declaring)
 
 
 @cache
@@ -100,4 +100,4 @@ def _blocks(name: str) -> tuple[int, ...]:
         return (group_kernels.THREADS,)
     if plain.startswith("run_soft_blocks_shared"):
         return (soft_block_plan.MANY_THREADS,)
-    return (BLOCK,)
+    return (BLOCK_SIZE,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Any
 
-from nuno.kernels.compile_watch import LOADED, TOLD_AFTER
+from nuno.kernels.compile_watch import LOADED, LOGGED_AFTER
 
 log = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ class _Quiet:
     def info(self, message: str) -> None:
         """Log it, for everybody where it took long."""
         found = LOADED.search(message)
-        if found is not None and found[3] == "compiled" and float(found[2]) / 1000.0 > TOLD_AFTER:
+        if found is not None and found[3] == "compiled" and float(found[2]) / 1000.0 > LOGGED_AFTER:
             log.warning(
                 "waited %.1f s for the kernels of %s, which are kept for later runs; nuno compile makes them ahead",
                 float(found[2]) / 1000.0, found[1],

@@ -22,13 +22,13 @@ def crossing_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     touch = TOUCH * float(np.ptp(vertices, axis=0).max())
     found: list[np.ndarray] = []
     pairs = _overlapping_boxes(corners.min(axis=1), corners.max(axis=1))
-    for block in np.array_split(pairs, max(1, len(pairs) // 200_000)):
-        crosses = np.zeros(len(block), dtype=bool)
+    for batch in np.array_split(pairs, max(1, len(pairs) // 200_000)):
+        crosses = np.zeros(len(batch), dtype=bool)
         for edges_of, through in ((0, 1), (1, 0)):
             for a, b in ((0, 1), (1, 2), (2, 0)):
-                edge = faces[block[:, edges_of]][:, [a, b]]
-                crosses |= _passes(vertices, edge, faces[block[:, through]], touch)
-        found.append(block[crosses])
+                edge = faces[batch[:, edges_of]][:, [a, b]]
+                crosses |= _passes(vertices, edge, faces[batch[:, through]], touch)
+        found.append(batch[crosses])
     return np.concatenate(found)
 
 

@@ -10,16 +10,16 @@ from scipy.spatial import cKDTree
 
 from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
-from nuno.mesh.fill import inside_nodes
 from nuno.mesh.lattice import CLOSE, divided_box, whole_fraction
 from nuno.mesh.nearest import NearestOn
 from nuno.mesh.relaxed import relaxed
 from nuno.mesh.surface_targets import surface_targets
 from nuno.mesh.tetrahedra import FACES, Tetrahedra, boundary_faces, volumes, voxel_tetrahedra
+from nuno.mesh.voxel_occupancy import inside_nodes
 
 FLAT = 0.35
 """Of its volume in the lattice: what a tetrahedron must keep that has all its corners on the surface."""
-MOST_MISSING = 0.3
+MAX_MISSING = 0.3
 """Of the mesh's volume, by which the tetrahedra's may differ: a sphere of 4 cells across loses 0.15, of 2 0.297."""
 FARTHEST = 1.0
 """In cells: how far the mesh may be from the tetrahedra's boundary."""
@@ -157,7 +157,7 @@ def _check(
     faces: np.ndarray,
 ) -> None:  # fmt: skip
     """Raise where parts of the mesh are missing: by the volume, by distance, or torn off."""
-    if not 1.0 - MOST_MISSING < 1.0 / share < 1.0 + MOST_MISSING:
+    if not 1.0 - MAX_MISSING < 1.0 / share < 1.0 + MAX_MISSING:
         raise UnresolvedMeshError(f"the tetrahedra have {1.0 / share:.2f} of its volume")
     boundary = boundary_faces(tets)
     near = cKDTree(np.concatenate([placed[boundary].mean(axis=1), placed[np.unique(boundary)]]))

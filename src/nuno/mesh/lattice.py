@@ -6,11 +6,11 @@ import numpy as np
 
 from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
-from nuno.mesh.fill import filled_fraction
 from nuno.mesh.tetrahedra import Tetrahedra, volumes, voxel_tetrahedra
+from nuno.mesh.voxel_occupancy import filled_fraction
 
 FLOOR = 0.1  # least fraction: a softer and lighter voxel would ask for smaller steps than all others
-MOST_VOXELS = 2_000_000  # ten million tetrahedra: more takes gigabytes, and the size was a slip
+MAX_VOXELS = 2_000_000  # ten million tetrahedra: more takes gigabytes, and the size was a slip
 CLOSE = 1e-6  # in edges of a voxel: what is nearer to a voxel's face is on it
 
 
@@ -67,10 +67,10 @@ def divided_box(vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarr
     """
     low, extent = vertices.min(axis=0), np.ptp(vertices, axis=0)
     counts = np.maximum(np.ceil(extent / cell * (1.0 - 1e-9)), 1.0)
-    if counts.prod() > MOST_VOXELS:
+    if counts.prod() > MAX_VOXELS:
         raise MeshError(
             f"cell {cell:g} m divides the mesh's bounding box of {_metres(extent)} into {counts.prod():.3g} voxels; "
-            f"at most {MOST_VOXELS:.0e} are made, so cell must be larger (are the mesh's numbers metres?)"
+            f"at most {MAX_VOXELS:.0e} are made, so cell must be larger (are the mesh's numbers metres?)"
         )
     return low, extent / counts, (int(counts[0]), int(counts[1]), int(counts[2]))
 

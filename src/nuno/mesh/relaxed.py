@@ -11,9 +11,9 @@ ITERATIONS = 20
 DEEP = 3
 """Edges from the boundary at which vertices stay where they are in the lattice: its voxels have the same numbers, which
 are stored once."""
-ROUNDS, AGAIN = 12, 5
+ATTEMPTS, AGAIN = 12, 5
 """Rounds in which vertices of flat tetrahedra are let off their corner, edge or face, and the iterations after each."""
-LEAST_HEIGHT, WORST_HEIGHT = 0.3, 0.1
+MIN_HEIGHT, WORST_HEIGHT = 0.3, 0.1
 """Smallest height of a tetrahedron, in the shortest edge of a voxel, that is aimed at, and that is accepted; 0.58 in
 a lattice."""
 
@@ -44,8 +44,8 @@ def relaxed(
     whole = np.cbrt(_volume(shape))
     deep = _deep(tets, len(rest))
     placed = _iterated(start, tets, shape, whole, targets, deep, ITERATIONS)
-    for _ in range(ROUNDS):
-        low = heights(placed, tets) < LEAST_HEIGHT * edge
+    for _ in range(ATTEMPTS):
+        low = heights(placed, tets) < MIN_HEIGHT * edge
         if not low.any():
             break
         skin = low & (targets.kind[tets] != FREE).all(axis=1)

@@ -11,7 +11,7 @@ from nuno.mesh.nearest import NearestOn
 
 FREE, LOOSE, FACE, EDGE, CORNER = range(5)
 """Targets of a vertex: nothing; the mesh, but it moves half of the way only; the mesh, a sharp edge, a corner."""
-SHARP = np.cos(np.radians(45.0))
+CREASE = np.cos(np.radians(45.0))
 """Of the angle between the normals of two faces: where it is larger, their edge is kept."""
 NEAR_EDGE, NEAR_CORNER = 0.7, 0.9
 """In cells: how far a vertex is moved onto a sharp edge or a corner."""
@@ -70,15 +70,15 @@ def surface_targets(
         cell: Longest edge of a voxel [m].
     """
     kind, corner = np.where(bound, FACE, FREE), np.zeros_like(points)
-    sharp = _sharp_edges(vertices, faces)
-    made = SurfaceTargets(surface, NearestOn(vertices[sharp], 0.5 * cell) if len(sharp) else None, kind, corner)
+    creases = _creases(vertices, faces)
+    made = SurfaceTargets(surface, NearestOn(vertices[creases], 0.5 * cell) if len(creases) else None, kind, corner)
     names = np.flatnonzero(bound)
     if made.edges is None or not len(names):
         return made
     tree = cKDTree(surface.nearest(points[names]))
     away, which = tree.query(made.edges.centres)
     kind[names[which[away < NEAR_EDGE * cell]]] = EDGE
-    tips = vertices[_corners(vertices, sharp)]
+    tips = vertices[_corners(vertices, creases)]
     if len(tips):
         away, which = tree.query(tips)
         for tip in np.argsort(-away, kind="stable"):  # the nearest last, so that it has its vertex
@@ -87,23 +87,23 @@ def surface_targets(
     return made
 
 
-def _sharp_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _creases(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return (k, 2) int, the edges of a closed mesh at which it turns sharply."""
     normal = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     order = np.lexsort(edges.T)
     one, other = order[::2], order[1::2]
-    return edges[one][(normal[one % len(faces)] * normal[other % len(faces)]).sum(axis=1) < SHARP]
+    return edges[one][(normal[one % len(faces)] * normal[other % len(faces)]).sum(axis=1) < CREASE]
 
 
-def _corners(vertices: np.ndarray, sharp: np.ndarray) -> np.ndarray:
+def _corners(vertices: np.ndarray, creases: np.ndarray) -> np.ndarray:
     """Return (k,) int, the vertices where sharp edges end, meet or turn sharply."""
-    count = np.bincount(sharp.ravel(), minlength=len(vertices))
-    direction = vertices[sharp[:, 1]] - vertices[sharp[:, 0]]
+    count = np.bincount(creases.ravel(), minlength=len(vertices))
+    direction = vertices[creases[:, 1]] - vertices[creases[:, 0]]
     direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
     away = np.zeros_like(vertices)  # of two edges of length 1 that leave a vertex: 0 where they go on straight
-    np.add.at(away, sharp[:, 0], direction)
-    np.add.at(away, sharp[:, 1], -direction)
-    turned = (count == 2) & ((away**2).sum(axis=1) > 2.0 - 2.0 * SHARP)
+    np.add.at(away, creases[:, 0], direction)
+    np.add.at(away, creases[:, 1], -direction)
+    turned = (count == 2) & ((away**2).sum(axis=1) > 2.0 - 2.0 * CREASE)
     return np.flatnonzero(turned | ((count > 0) & (count != 2)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from nuno.mesh.crossings import crossing_faces
 
-ROUNDS = 60
+ITERATIONS = 60
 """Rounds at most."""
 STEPS = (1.0, 0.5, 0.25)
 """Of the longest step, by turns: steps of one length may go to and fro."""
@@ -34,9 +34,9 @@ def untangle(vertices: np.ndarray, faces: np.ndarray, free: np.ndarray, step: fl
     """
     best = moved = np.array(vertices, dtype=float)
     pairs = crossing_faces(best, faces)
-    left, beside = len(pairs), _faces_of_edges(faces)
-    for turn in range(ROUNDS if left else 0):
-        moved = moved + step * STEPS[turn % len(STEPS)] * _ways(moved, faces, pairs, beside, free)
+    left, faces_at = len(pairs), _faces_of_edges(faces)
+    for iteration in range(ITERATIONS if left else 0):
+        moved = moved + step * STEPS[iteration % len(STEPS)] * _ways(moved, faces, pairs, faces_at, free)
         pairs = crossing_faces(moved, faces)
         if len(pairs) <= left:
             best, left = moved, len(pairs)
@@ -46,7 +46,7 @@ def untangle(vertices: np.ndarray, faces: np.ndarray, free: np.ndarray, step: fl
 
 
 def _ways(
-    x: np.ndarray, faces: np.ndarray, pairs: np.ndarray, beside: dict[tuple[int, int], list[int]], free: np.ndarray
+    x: np.ndarray, faces: np.ndarray, pairs: np.ndarray, faces_at: dict[tuple[int, int], list[int]], free: np.ndarray
 ) -> np.ndarray:
     """Return (n, 3), where each vertex is to go: at most 1 long."""
     edges, through, shares, normals = _pierced(x, faces, pairs)
@@ -55,7 +55,7 @@ def _ways(
     steep = np.copysign(np.maximum(np.abs(ahead), FLAT), ahead)
     gradient = np.zeros_like(along)
     for k, (a, b) in enumerate(edges.tolist()):
-        for face in beside[a, b]:
+        for face in faces_at[a, b]:
             corner = x[next(v for v in faces[face] if v not in (a, b))] - x[a]
             own = np.cross(along[k], corner)
             line = np.cross(own, normals[k])
@@ -102,11 +102,11 @@ def _pierced(x: np.ndarray, faces: np.ndarray, pairs: np.ndarray) -> tuple[np.nd
 
 
 def _faces_of_edges(faces: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    beside: dict[tuple[int, int], list[int]] = {}
+    faces_at: dict[tuple[int, int], list[int]] = {}
     for k, (a, b, c) in enumerate(faces.tolist()):
         for edge in ((a, b), (b, c), (c, a)):
-            beside.setdefault((min(edge), max(edge)), []).append(k)
-    return beside
+            faces_at.setdefault((min(edge), max(edge)), []).append(k)
+    return faces_at
 
 
 def _unit(v: np.ndarray) -> np.ndarray:

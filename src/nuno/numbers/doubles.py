@@ -23,8 +23,8 @@ from nuno.numbers.lanes import (
     place,
     relative_to,
     sub,
+    subarray,
     to_float,
-    window,
 )
 
 float64 = wp.float64
@@ -269,10 +269,10 @@ def factor_like(like: double_lane, value: lane):
 
 
 @wp.func
-def window(a: wp.array(dtype=float64), first: int, count: int):
+def subarray(a: wp.array(dtype=float64), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(8), shape=(count,), dtype=float64)
 
 
 @wp.func
-def window(a: wp.array(dtype=double_lane), first: int, count: int):
+def subarray(a: wp.array(dtype=double_lane), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(8 * 16), shape=(count,), dtype=double_lane)

@@ -160,13 +160,13 @@ def fused_subtract(a: lane, b: lane, c: lane) -> lane: ...
 
 
 @wp.func
-def root(a: float):
+def sqrt(a: float):
     """The elementwise square root."""
     return wp.sqrt(a)
 
 
 @wp.func_native(_simd("__builtin_elementwise_sqrt(A)", "a"))
-def root(a: lane) -> lane: ...
+def sqrt(a: lane) -> lane: ...
 
 
 @wp.func
@@ -202,49 +202,49 @@ def choose(sign: lane, a: float, b: float) -> lane: ...
 
 
 @wp.func
-def least(a: float, b: float):
+def minimum(a: float, b: float):
     """The elementwise minimum."""
     return wp.min(a, b)
 
 
 @wp.func_native(_simd("(V)((A < B) ? (I)A : (I)B)", "a", "b"))
-def least(a: lane, b: lane) -> lane: ...
+def minimum(a: lane, b: lane) -> lane: ...
 
 
 @wp.func_native(_simd("(V)((A < b) ? (I)A : (I)((V){} + b))", "a"))
-def least(a: lane, b: float) -> lane: ...
+def minimum(a: lane, b: float) -> lane: ...
 
 
 @wp.func_native(_simd("(V)((a < B) ? (I)((V){} + a) : (I)B)", "b"))
-def least(a: float, b: lane) -> lane: ...
+def minimum(a: float, b: lane) -> lane: ...
 
 
 @wp.func
-def most(a: float, b: float):
+def maximum(a: float, b: float):
     """The elementwise maximum."""
     return wp.max(a, b)
 
 
 @wp.func_native(_simd("(V)((A > B) ? (I)A : (I)B)", "a", "b"))
-def most(a: lane, b: lane) -> lane: ...
+def maximum(a: lane, b: lane) -> lane: ...
 
 
 @wp.func_native(_simd("(V)((A > b) ? (I)A : (I)((V){} + b))", "a"))
-def most(a: lane, b: float) -> lane: ...
+def maximum(a: lane, b: float) -> lane: ...
 
 
 @wp.func_native(_simd("(V)((a > B) ? (I)((V){} + a) : (I)B)", "b"))
-def most(a: float, b: lane) -> lane: ...
+def maximum(a: float, b: lane) -> lane: ...
 
 
 @wp.func
-def size_of(a: float):
+def absolute(a: float):
     """The elementwise absolute value."""
     return wp.abs(a)
 
 
 @wp.func_native(_simd("(V)((A > 0.f) ? (I)A : (I)(-A))", "a"))
-def size_of(a: lane) -> lane: ...
+def absolute(a: lane) -> lane: ...
 
 
 @wp.func
@@ -353,23 +353,23 @@ def clipped(i: lane_int) -> lane_int: ...
 
 
 @wp.func
-def window(a: wp.array(dtype=float), first: int, count: int):
+def subarray(a: wp.array(dtype=float), first: int, count: int):
     """The ``count`` elements of ``a`` from ``first`` on, without a copy."""
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4), shape=(count,), dtype=float)
 
 
 @wp.func
-def window(a: wp.array(dtype=lane), first: int, count: int):
+def subarray(a: wp.array(dtype=lane), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane)
 
 
 @wp.func
-def window(a: wp.array(dtype=int), first: int, count: int):
+def subarray(a: wp.array(dtype=int), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4), shape=(count,), dtype=int)
 
 
 @wp.func
-def window(a: wp.array(dtype=lane_int), first: int, count: int):
+def subarray(a: wp.array(dtype=lane_int), first: int, count: int):
     return wp.array(ptr=a.ptr + wp.uint64(first) * wp.uint64(4 * 16), shape=(count,), dtype=lane_int)
 
 

@@ -16,7 +16,7 @@ from nuno.constraints.grips import hold_vertices
 from nuno.constraints.membrane import shear_cell
 from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.numbers.block_group import BlockGroup, grid_barrier
-from nuno.numbers.lanes import barrier, product, window
+from nuno.numbers.lanes import barrier, product, subarray
 from nuno.plans.cloth_substep import bend_patches, strain_triangles
 from nuno.plans.grid_lines_by_block import stretch_grid_lines_of_block
 from nuno.state.cloth_state import Settings, Topology
@@ -178,7 +178,7 @@ def set_out(t: Any, run: Settings, grips: int, first: int, last: int, rank: int,
 @wp.func
 def steps_of(work: Work, block: int):
     """The steps of one block."""
-    return window(work.step, 4 * block * work.steps, 4 * work.steps)
+    return subarray(work.step, 4 * block * work.steps, 4 * work.steps)
 
 
 @wp.func

@@ -213,7 +213,7 @@ class BaseInterface(CameraInterface):
         """Bring ``robot`` to the newest joint state, its base to where odometry has it; see ``JointInterface``."""
         if not super().update_robot_state(wait_until_update):
             return False
-        self.robot._place(*self.read_base()._pose())
+        self.robot._place(*self.read_base().pose())
         return True
 
     def footprint(self) -> Coordinates:
@@ -242,26 +242,26 @@ class BaseInterface(CameraInterface):
 
     def _frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         self.update_robot_state()
-        return self.robot.frame_pose(name)._pose()
+        return self.robot.frame_pose(name).pose()
 
     def _to_base(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return compose(invert(self.footprint()._pose()), (position, quaternion))
+        return compose(invert(self.footprint().pose()), (position, quaternion))
 
     def _in_base(self, coords: Coordinates, frame: str | None) -> tuple[np.ndarray, np.ndarray]:
         if not isinstance(coords, Coordinates):
             raise InvalidInputError(f"coords must be Coordinates or a frame's name, got {type(coords).__name__}")
         if frame is None or frame == BASE:
-            return coords._pose()
+            return coords.pose()
         if frame in WORLDS:
-            return self._to_base(*coords._pose())
-        return self._to_base(*compose(self._frame(frame), coords._pose()))
+            return self._to_base(*coords.pose())
+        return self._to_base(*compose(self._frame(frame), coords.pose()))
 
     def _in_world(self, coords: str | Coordinates, frame: str | None) -> Pose:
         """Return the pose in the world of a place as ``move_to`` takes it."""
         seen = self._to_base(*self._frame(coords)) if isinstance(coords, str) else self._in_base(coords, frame)
-        return compose(self.footprint()._pose(), seen)
+        return compose(self.footprint().pose(), seen)
 
     def _set_off_to(self, place: Pose) -> bool:
-        seen = compose(invert(self.footprint()._pose()), place)
+        seen = compose(invert(self.footprint().pose()), place)
         forward = quat.rotate(seen[1], np.array([1.0, 0.0, 0.0]))
         return self.go_pos(float(seen[0][0]), float(seen[0][1]), float(np.arctan2(forward[1], forward[0])), wait=False)

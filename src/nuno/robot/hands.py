@@ -118,7 +118,7 @@ class Hand:
         world = self.links.world
         with world.lock:
             self.open()
-            frame = Coordinates(*compose(self.body._pose(), self._offset))  # where the body is, not where it is sent
+            frame = Coordinates(*compose(self.body.pose(), self._offset))  # where the body is, not where it is sent
             chosen = [b for b in world.bodies if b.is_dynamic] if bodies is None else [world._own(b) for b in bodies]
             for body in chosen:
                 where = self._inside(body, frame, width)

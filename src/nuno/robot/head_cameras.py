@@ -86,7 +86,7 @@ class HeadCameras:
         body, offset = self._carriers[name]
         own = self.links.robot.description.cameras[name]
         ahead = (np.array((own.aside, 0.0, own.ahead)), np.array((1.0, 0.0, 0.0, 0.0)))
-        place, turn = compose(compose(body._pose(), offset), ahead)
+        place, turn = compose(compose(body.pose(), offset), ahead)
         made = self.links.robot.camera(name)
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = _matrix(turn), place
@@ -121,7 +121,7 @@ class HeadCameras:
     def _picture(self, camera: Camera) -> Picture:
         for body, others in self._instead.items():
             for each, offset in others:
-                each._position, each._quaternion = compose(body._pose(), offset)
+                each._position, each._quaternion = compose(body.pose(), offset)
         instead = {body: [each for each, _ in others] for body, others in self._instead.items()}
         self._taken += 1
         seed = self._seed * 1_000_003 + self._taken

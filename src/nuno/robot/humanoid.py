@@ -155,7 +155,7 @@ class Humanoid(Coordinates):
     def copy(self) -> Humanoid:
         """Return another such robot, at the same place and in the same posture; nothing follows it."""
         made = copy.copy(self)  # what never changes is shared: the description, the model, the meshes
-        made._position, made._quaternion = self._pose()
+        made._position, made._quaternion = self.pose()
         made._parent, made._children = None, []
         made.data, made.scratch = self.model.createData(), self.model.createData()
         made._angles, made._is_current = self._angles.copy(), False
@@ -249,7 +249,7 @@ class Humanoid(Coordinates):
         Raises:
             InvalidInputError: the robot follows a frame that has a pose for each world of a batch.
         """
-        position, quaternion = self._pose()
+        position, quaternion = self.pose()
         if position.ndim != 1 or quaternion.ndim != 1:
             raise InvalidInputError("a robot has one pose, not one for each world")
         q = self.configuration_of(self._angles, IDENTITY)

@@ -158,7 +158,7 @@ class RobotInterface(BaseInterface):
             moment += torque + np.cross(pose.position, own) + np.cross(centre, weight)
         if force[2] < LOADED:
             raise RobotModelError(f"{self.robot.name!r} does not stand: its feet bear {force[2]:.2f} N")
-        place, turn = self.footprint()._pose()
+        place, turn = self.footprint().pose()
         point = np.append(zero_moment_point(force, moment, place[2]), place[2])
         return point if wrt == "world" else quat.rotate(quat.inverse(turn), point - place)
 

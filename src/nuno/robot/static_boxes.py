@@ -40,8 +40,8 @@ class StaticBoxes:
             self._halves = 0.5 * (corners[:, 1] - corners[:, 0])
             self._middles = corners[:, 0] + self._halves
             self._radii = np.linalg.norm(np.abs(self._middles) + self._halves, axis=1)
-        where = [b._position if b._parent is None else b._pose()[0] for b in self.bodies]
-        where += [b._quaternion if b._parent is None else b._pose()[1] for b in self.bodies]
+        where = [b.pose()[0] for b in self.bodies]
+        where += [b.pose()[1] for b in self.bodies]
         # a body that moves has other arrays from then on, never other numbers in the same
         if renewed or not all(map(is_, where, self._where)):
             self._where = where

@@ -16,7 +16,7 @@ from nuno.camera.image import check_image, read_image
 from nuno.errors import InvalidInputError
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hand_sight import CORE, disc
-from nuno.estimate.hand_tracking import NOISE, WINDOW, gaps_without, look_near
+from nuno.estimate.hand_tracking import NOISE, SEARCH_RADIUS, find_disc, gaps_without
 from nuno.validation import finite_array, number
 
 log = logging.getLogger(__name__)
@@ -252,8 +252,8 @@ def _seen(
         return None
     near = camera.project(state[:3])
     slope = _slopes(camera, state[None, :3])[0]
-    reach = WINDOW + 3.0 * float(np.sqrt(np.linalg.eigvalsh(slope @ spread[:3, :3] @ slope.T)[-1]))
-    return look_near(image, near, max(camera.fx, camera.fy) * radius / depth, colour, reach)
+    reach = SEARCH_RADIUS + 3.0 * float(np.sqrt(np.linalg.eigvalsh(slope @ spread[:3, :3] @ slope.T)[-1]))
+    return find_disc(image, near, max(camera.fx, camera.fy) * radius / depth, colour, reach)
 
 
 def _agreeing(pixels: list[np.ndarray | None], cameras: list[Camera], place: np.ndarray) -> list[np.ndarray | None]:

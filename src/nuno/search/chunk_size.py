@@ -22,14 +22,14 @@ class ChunkSize:
 
     Args:
         device: "cpu" or "cuda:0" ...
-        most: At most so many; None leaves it to time and memory.
+        limit: At most so many; None leaves it to time and memory.
     """
 
-    def __init__(self, device: str, most: int | None) -> None:
-        self._device, self._most = device, most
+    def __init__(self, device: str, limit: int | None) -> None:
+        self._device, self._limit = device, limit
         full = ON_CUDA if device.startswith("cuda") else LANES * (os.cpu_count() or 1)
-        self._least = full
-        self._size = most if most is not None else LANES  # the first one tells how much memory a world takes
+        self._floor = full
+        self._size = limit if limit is not None else LANES  # the first one tells how much memory a world takes
         self._first = True
         self._before = (0, 0)
 
@@ -40,12 +40,12 @@ class ChunkSize:
 
     def end(self, world_count: int, seconds: float) -> None:
         """Learn from a batch that has run."""
-        if self._most is not None or world_count < self._size:
+        if self._limit is not None or world_count < self._size:
             return
         if self._first or seconds < SOON:
-            wanted = max(self._least if self._first else 0, 2 * self._size)
+            wanted = max(self._floor if self._first else 0, 2 * self._size)
         else:
-            wanted = max(self._size // 2, self._least) if seconds > LATE else self._size
+            wanted = max(self._size // 2, self._floor) if seconds > LATE else self._size
         self._first = False
         now, highest = self._before
         peak = used_memory(self._device)[1]
@@ -83,8 +83,8 @@ def free_memory(device: str) -> int:
     except (OSError, StopIteration):
         free = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
     try:  # a container may have less than its machine
-        used, most = (FilePath(f"/sys/fs/cgroup/memory.{name}").read_text() for name in ("current", "max"))
-        free = min(free, int(most) - int(used))
+        used, limit = (FilePath(f"/sys/fs/cgroup/memory.{name}").read_text() for name in ("current", "max"))
+        free = min(free, int(limit) - int(used))
     except (OSError, ValueError):
         pass
     return max(free, 0)

@@ -31,7 +31,7 @@ from nuno.search.world_source import WorldSource, worlds_in_worker
 
 log = logging.getLogger(__name__)
 
-WINDOW = 256
+MAX_IN_FLIGHT = 256
 """Tasks in flight where an executor does not say how many workers it has."""
 
 
@@ -74,7 +74,7 @@ class Task:
         ]  # fmt: skip
 
 
-_turn = threading.Lock()
+_lock = threading.Lock()
 _watching: set[int] = set()
 
 
@@ -82,11 +82,11 @@ def run_task(task: Task) -> list[Trial]:
     """Run a task in a worker; trials that fail are returned as such. Threads of one process take turns."""
     if os.getpid() != task.home:
         _end_with_parent()
-    with _turn:
+    with _lock:
         return run_rows(task.trial, worlds_in_worker(task.source, task.search), task.indices, task.columns)
 
 
-def over_executor(
+def run_on_executor(
     trial: Any, source: WorldSource, parameters: Parameters, indices: Sequence[int], executor: Executor, *,
     together: int, repeats: int,
 ) -> Iterator[list[Trial]]:  # fmt: skip
@@ -118,7 +118,7 @@ def over_executor(
     try:
         while waiting or suspects or flying:
             current = own or executor
-            broken = _hand_out(current, suspects or waiting, flying, 1 if suspects else _window(current))
+            broken = _hand_out(current, suspects or waiting, flying, 1 if suspects else _in_flight_limit(current))
             lost: list[tuple[Task, BaseException]] = []
             while flying and (broken or not lost):
                 for future in wait(flying, return_when=FIRST_COMPLETED).done:
@@ -162,10 +162,10 @@ def _hand_out(executor: Executor, queue: deque[Task], flying: dict[Future[list[T
     return False
 
 
-def _window(executor: Executor) -> int:
+def _in_flight_limit(executor: Executor) -> int:
     # one more than there are workers, so that none waits; not many, as all of them are suspects where one dies
     workers = getattr(executor, "_max_workers", None)
-    return workers + 1 if isinstance(workers, int) else WINDOW
+    return workers + 1 if isinstance(workers, int) else MAX_IN_FLIGHT
 
 
 def _error_of(future: Future[list[Trial]]) -> BaseException | None:

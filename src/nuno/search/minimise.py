@@ -220,8 +220,8 @@ class _Tried:
             EstimationError: every trial failed.
         """
         if self._best is None:
-            told = next(iter(self._errors), self.value)
-            raise EstimationError(f"all {len(self._rows)} trials failed; the first one said: {told}")
+            first = next(iter(self._errors), self.value)
+            raise EstimationError(f"all {len(self._rows)} trials failed; the first one said: {first}")
         params, trial = self._best
         return Minimum(
             params, self.lowest, trial.values, tuple(self.history),

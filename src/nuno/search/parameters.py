@@ -60,7 +60,7 @@ def make_parameters(given: Any, samples: int | None = None, seed: int = 0) -> Pa
         raise InvalidInputError("samples goes with a sampler; a grid or a list says itself how many trials there are")
     if isinstance(given, Mapping):
         names = _checked_names(given)
-        values = [_listed(name, given[name]) for name in names]
+        values = [_as_list(name, given[name]) for name in names]
         rows = [dict(zip(names, combination, strict=True)) for combination in itertools.product(*values)]
     elif callable(given):
         rows = _sampled(given, samples, seed)
@@ -97,7 +97,7 @@ def _checked_names(row: Mapping[Any, Any]) -> list[str]:
     return names
 
 
-def _listed(name: str, values: Any) -> list[Any]:
+def _as_list(name: str, values: Any) -> list[Any]:
     if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
         raise InvalidInputError(f"the grid's values of {name!r} must be a sequence, got {values!r}; one is [value]")
     return list(values)
@@ -106,8 +106,8 @@ def _listed(name: str, values: Any) -> list[Any]:
 def _sampled(sampler: Callable[[np.random.Generator], Any], samples: Any, seed: Any) -> list[Any]:
     if samples is None:
         raise InvalidInputError("a sampler needs samples=, how many trials it shall give")
-    number, root = count("samples", samples), count("seed", seed, low=0)
-    return [sampler(np.random.default_rng([root, k])) for k in range(number)]
+    number, entropy = count("samples", samples), count("seed", seed, low=0)
+    return [sampler(np.random.default_rng([entropy, k])) for k in range(number)]
 
 
 def _column(name: str, values: list[Any]) -> np.ndarray:

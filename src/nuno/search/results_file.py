@@ -183,7 +183,7 @@ def read_entries(data: bytes, path: FilePath) -> list[tuple[Trial, dict[str, Any
         FileFormatError: a line that is damaged, or a trial that is there twice.
     """
     entries: list[tuple[Trial, dict[str, Any]]] = []
-    known: set[int] = set()
+    seen: set[int] = set()
     for number, line in enumerate(data.split(b"\n")[1:-1], start=2):
         try:
             entry = json.loads(line)
@@ -194,9 +194,9 @@ def read_entries(data: bytes, path: FilePath) -> list[tuple[Trial, dict[str, Any
                     values |= dict(arrays)
         except (ValueError, KeyError, TypeError, AttributeError, OSError) as problem:
             raise FileFormatError(f"line {number} of {path} is no trial's result, or lacks its arrays") from problem
-        if index in known:
+        if index in seen:
             raise FileFormatError(f"trial {index} stands in {path} twice, again in line {number}")
-        known.add(index)
+        seen.add(index)
         entries.append((Trial(index, values, error), params))
     return entries
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, UnknownNameError
 from nuno.search.chunk_size import LANES, ChunkSize
-from nuno.search.dispatch import over_executor
+from nuno.search.dispatch import run_on_executor
 from nuno.search.parameters import Parameters, from_rows, make_parameters
 from nuno.search.results_file import ResultsFile, make_header, read_entries, read_header
 from nuno.search.rows import run_rows
@@ -44,8 +44,8 @@ class SweepResult:
 
     def __repr__(self) -> str:
         finished = sum(trial is not None for trial in self.trials)
-        told = f"{finished} of {len(self)} trials, {len(self.failures)} failed"
-        return f"<SweepResult: {told}; {', '.join(self.params)} -> {', '.join(self.names) or 'nothing'}>"
+        finished_text = f"{finished} of {len(self)} trials, {len(self.failures)} failed"
+        return f"<SweepResult: {finished_text}; {', '.join(self.params)} -> {', '.join(self.names) or 'nothing'}>"
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -224,7 +224,7 @@ def outcomes(
     if executor is not None:
         if isinstance(trial, Each):
             together = 1  # they would run one after another in a task too, but be recorded later
-        yield from over_executor(
+        yield from run_on_executor(
             trial, source, parameters, indices, executor, together=together or LANES, repeats=repeats
         )
         return
@@ -255,7 +255,7 @@ def _run(
             raise FileFormatError(f"the results file holds trial {old.index}; there are {len(trials)}")
         trials[old.index] = old
         stopped = stopped or (stop is not None and bool(stop(old)))
-    left = [k for k, known in enumerate(trials) if known is None]
+    left = [k for k, trial in enumerate(trials) if trial is None]
     if len(left) < len(trials):
         log.info("%d of %d trials are in the results file", len(trials) - len(left), len(trials))
     hidden = None if progress is None else not progress

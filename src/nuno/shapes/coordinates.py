@@ -16,6 +16,10 @@ Self = TypeVar("Self", bound="Coordinates")
 Frame = Literal["local", "world"]
 
 
+Pose = tuple[np.ndarray, np.ndarray]
+"""Position [m] and quaternion (w, x, y, z), (3,) and (4,), or (worlds, 3) and (worlds, 4)."""
+
+
 class Coordinates:
     """A frame in the world, which may follow a parent frame.
 
@@ -42,17 +46,17 @@ class Coordinates:
     @property
     def position(self) -> np.ndarray:
         """(3,) or (worlds, 3) float [m], a copy, in the world frame."""
-        return np.array(self._pose()[0])
+        return np.array(self.pose()[0])
 
     @property
     def quaternion(self) -> np.ndarray:
         """(4,) or (worlds, 4) float, (w, x, y, z), a copy, in the world frame."""
-        return np.array(self._pose()[1])
+        return np.array(self.pose()[1])
 
     @property
     def rotation(self) -> np.ndarray:
         """(3, 3) or (worlds, 3, 3) float, the rotation matrix from this frame to the world."""
-        return quat.to_matrix(self._pose()[1])
+        return quat.to_matrix(self.pose()[1])
 
     @property
     def parent(self) -> Coordinates | None:
@@ -71,13 +75,13 @@ class Coordinates:
             This frame, as ``translate``, ``rotate`` and ``transform`` do.
         """
         goal = finite_array("position", position, (3,), ("worlds", 3))
-        self._place(goal, self._pose()[1])
+        self._place(goal, self.pose()[1])
         return self
 
     def translate(self: Self, offset: ArrayLike, wrt: Frame = "local") -> Self:
         """Move by ``offset``, (3,) or (worlds, 3) [m], along this frame's axes or the world's."""
         step = finite_array("offset", offset, (3,), ("worlds", 3))
-        position, quaternion = self._pose()
+        position, quaternion = self.pose()
         if _checked_frame(wrt) == "local":
             step = quat.rotate(quaternion, step)
         self._place(position + step, quaternion)
@@ -104,7 +108,7 @@ class Coordinates:
         if length < 1e-12:
             raise InvalidInputError("axis must not be of length zero")
         q = quat.from_axis_angle(direction / length, turn)
-        position, quaternion = self._pose()
+        position, quaternion = self.pose()
         turned = quat.multiply(quaternion, q) if _checked_frame(wrt) == "local" else quat.multiply(q, quaternion)
         self._place(position, turned / np.linalg.norm(turned, axis=-1, keepdims=True))
         return self
@@ -117,21 +121,21 @@ class Coordinates:
         """
         if not isinstance(other, Coordinates):
             raise InvalidInputError(f"transform needs Coordinates, got {type(other).__name__}")
-        own, motion = self._pose(), other._pose()
+        own, motion = self.pose(), other.pose()
         self._place(*(compose(own, motion) if _checked_frame(wrt) == "local" else compose(motion, own)))
         return self
 
     def copy_coords(self) -> Coordinates:
         """Return new Coordinates at this pose, with no parent and no children."""
-        return Coordinates(*self._pose())
+        return Coordinates(*self.pose())
 
     def to_world(self, points: ArrayLike) -> np.ndarray:
         """Map points (n, 3) [m] of this frame to the world, (n, 3) or (worlds, n, 3)."""
-        return apply(self._pose(), finite_array("points", points, ("n", 3), ("worlds", "n", 3)))
+        return apply(self.pose(), finite_array("points", points, ("n", 3), ("worlds", "n", 3)))
 
     def to_local(self, points: ArrayLike) -> np.ndarray:
         """Map points (n, 3) [m] of the world to this frame, (n, 3) or (worlds, n, 3)."""
-        return apply(invert(self._pose()), finite_array("points", points, ("n", 3), ("worlds", "n", 3)))
+        return apply(invert(self.pose()), finite_array("points", points, ("n", 3), ("worlds", "n", 3)))
 
     def assoc(self, child: Coordinates) -> Coordinates:
         """Let ``child`` follow this frame from now on; its present pose does not change.
@@ -165,7 +169,7 @@ class Coordinates:
         """
         if not any(c is child for c in self._children):
             raise BodyStateError("this frame has no such child")
-        pose = child._pose()
+        pose = child.pose()
         self._children = [c for c in self._children if c is not child]
         child._parent = None
         child._position, child._quaternion = pose
@@ -173,17 +177,23 @@ class Coordinates:
         return child
 
     def _follow(self, parent: Coordinates) -> None:
-        relative = compose(invert(parent._pose()), self._pose())
+        relative = compose(invert(parent.pose()), self.pose())
         self._parent, (self._position, self._quaternion) = parent, relative
 
-    def _pose(self) -> tuple[np.ndarray, np.ndarray]:
-        own = (self._position, self._quaternion)
-        return own if self._parent is None else compose(self._parent._pose(), own)
+    @property
+    def relative_pose(self) -> Pose:
+        """Position [m] and quaternion in the parent's frame, or the world's where there is none; not to be changed."""
+        return self._position, self._quaternion
+
+    def pose(self) -> Pose:
+        """Return position [m] and quaternion in the world frame; neither is a copy, nor to be changed."""
+        own = self.relative_pose
+        return own if self._parent is None else compose(self._parent.pose(), own)
 
     def _place(self, position: np.ndarray, quaternion: np.ndarray) -> None:
         pose = (position, quaternion)
         if self._parent is not None:
-            pose = compose(invert(self._parent._pose()), pose)
+            pose = compose(invert(self._parent.pose()), pose)
         self._position, self._quaternion = pose
         self._moved()
 
@@ -191,9 +201,6 @@ class Coordinates:
         """Be told that the pose has changed, by ``_place`` here or in an ancestor."""
         for child in self._children:
             child._moved()
-
-
-Pose = tuple[np.ndarray, np.ndarray]
 
 
 def compose(a: Pose, b: Pose) -> Pose:

@@ -122,12 +122,12 @@ def _solid(volume: float, xx: float, yy: float, zz: float) -> MassProperties:
 
 def _capsule(radius: float, height: float) -> MassProperties:
     """A cylinder and two half balls, whose centres of mass are 3/8 of a radius beyond its ends."""
-    tube, ball = np.pi * radius**2 * height, 4.0 / 3.0 * np.pi * radius**3
-    across = (tube * radius**2 / 4.0 + ball * radius**2 / 5.0) / (tube + ball)
+    tube, ends = np.pi * radius**2 * height, 4.0 / 3.0 * np.pi * radius**3
+    across = (tube * radius**2 / 4.0 + ends * radius**2 / 5.0) / (tube + ends)
     half = 0.5 * height
     end = half**2 + 0.75 * half * radius + radius**2 / 5.0
-    along = (tube * height**2 / 12.0 + ball * end) / (tube + ball)
-    return _solid(tube + ball, across, across, along)
+    along = (tube * height**2 / 12.0 + ends * end) / (tube + ends)
+    return _solid(tube + ends, across, across, along)
 
 
 def _steiner(arm: np.ndarray) -> np.ndarray:

@@ -62,13 +62,13 @@ class Path:
 
     def at(self, time: ArrayLike) -> np.ndarray:
         """Return positions at ``time`` [s], a number or (m,): (3,) or (m, 3), or (worlds, ...) of these."""
-        first, last, s = self._between(finite_array("time", time, (), ("m",)))
+        first, last, s = self.keys_around(finite_array("time", time, (), ("m",)))
         a, b = self.positions[..., first, :], self.positions[..., last, :]
         return a + s[..., None] * (b - a)
 
     def quaternion_at(self, time: ArrayLike) -> np.ndarray:
         """Return orientations, as ``at`` returns positions; the identity where none is given."""
-        first, last, s = self._between(finite_array("time", time, (), ("m",)))
+        first, last, s = self.keys_around(finite_array("time", time, (), ("m",)))
         if self.quaternions is None:
             return np.broadcast_to(quat.IDENTITY, (*s.shape, 4)).copy()
         return quat.slerp(self.quaternions[..., first, :], self.quaternions[..., last, :], s)
@@ -79,7 +79,7 @@ class Path:
         turns = None if self.quaternions is None else self.quaternion_at(when)
         return Path(when, self.at(when), turns)
 
-    def _between(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def keys_around(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the keys before and after and the eased fraction between them."""
         k = len(self.times)
         first = np.minimum(np.maximum(np.searchsorted(self.times, t, side="right") - 1, 0), max(k - 2, 0))

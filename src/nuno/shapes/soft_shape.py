@@ -21,7 +21,7 @@ import numpy as np
 from nuno.errors import InvalidInputError, MeshError
 from nuno.mesh import primitives
 from nuno.mesh.closed import check_closed
-from nuno.mesh.lattice import MOST_VOXELS, lattice_tetrahedra
+from nuno.mesh.lattice import MAX_VOXELS, lattice_tetrahedra
 from nuno.mesh.primitives import MeshArrays
 from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra, volumes
 from nuno.shapes.shape import Shape, checked_mesh, frozen, lengths
@@ -29,7 +29,7 @@ from nuno.validation import count, finite_array, index_array, number
 
 logger = logging.getLogger(__name__)
 FITTED, LATTICE = "fitted", "lattice"
-FINE = 128  # segments around what a round shape's lattice is filled from: within 0.1 % of its volume
+SEGMENTS = 128  # segments around what a round shape's lattice is filled from: within 0.1 % of its volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,8 @@ class SoftBox(SoftShape):
         except (TypeError, ValueError) as error:
             raise MeshError(f"cells must be three whole numbers (nx, ny, nz), got {self.cells!r}") from error
         object.__setattr__(self, "cells", (count("cells[0]", nx), count("cells[1]", ny), count("cells[2]", nz)))
-        if nx * ny * nz > MOST_VOXELS:
-            raise MeshError(f"cells {self.cells} are {nx * ny * nz} voxels; at most {MOST_VOXELS} are made")
+        if nx * ny * nz > MAX_VOXELS:
+            raise MeshError(f"cells {self.cells} are {nx * ny * nz} voxels; at most {MAX_VOXELS} are made")
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ def _whole(vertices: np.ndarray, tets: np.ndarray) -> Tetrahedra:
 
 
 def _round(shape: Any, surface: Any, *sizes: float) -> Tetrahedra:
-    vertices, faces = surface(*sizes, around=FINE)
+    vertices, faces = surface(*sizes, around=SEGMENTS)
     return _voxels(shape, vertices, faces, surface(*sizes), mean=(0.0, 0.0, 0.0))
 
 

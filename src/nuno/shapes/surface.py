@@ -71,14 +71,14 @@ def closest_points(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) 
     """
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     found, weights = np.empty(len(points), dtype=np.int32), np.empty((len(points), 3))
-    block = max(1, 200_000 // len(faces))
-    for start in range(0, len(points), block):
-        p = points[start : start + block, None, :]
+    batch = max(1, 200_000 // len(faces))
+    for start in range(0, len(points), batch):
+        p = points[start : start + batch, None, :]
         w = _closest_weights(p, a, b, c)
         nearest = w[..., :1] * a + w[..., 1:2] * b + w[..., 2:] * c
         face = np.argmin(np.sum((nearest - p) ** 2, axis=-1), axis=1)
-        found[start : start + block] = face
-        weights[start : start + block] = w[np.arange(len(face)), face]
+        found[start : start + batch] = face
+        weights[start : start + batch] = w[np.arange(len(face)), face]
     return SurfacePoints(found, weights)
 
 

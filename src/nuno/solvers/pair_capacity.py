@@ -15,7 +15,7 @@ import warp as wp
 
 from nuno.numbers.warps import WARP
 from nuno.plans.block_plan import FEW_THREADS
-from nuno.state.cloth_state import MISSED_ELEMENTS, MISSED_LEAVES, MOST_NEIGHBOURS
+from nuno.state.cloth_state import MAX_NEIGHBOURS, MISSED_ELEMENTS, MISSED_LEAVES
 
 SUSPECTS = 512
 """Pairs of elements that a warp that lists pairs can note at least: more than any two blocks of neighbouring vertices
@@ -51,7 +51,7 @@ def size_lists(size: Any, particles: int, worlds: int) -> None:
 
 def find_missed(size: Any, counts: np.ndarray) -> np.ndarray:
     """Return (worlds,) bool, in which of them some pairs were passed over; counts are (worlds, `COUNTS`) int."""
-    most = np.maximum(counts[:, :2], counts[:, MOST_NEIGHBOURS : MOST_NEIGHBOURS + 2])
+    most = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2])
     missed = (most > (size.vertex_triangle, size.edge_edge)).any(axis=1) | (counts[:, MISSED_ELEMENTS:] > 0).any(axis=1)
     return np.asarray(missed)
 
@@ -66,7 +66,7 @@ def lengthen_lists(size: Any, counts: np.ndarray, worlds: int, rows: int, device
         rows: Lists in one array at most: a world's or a vector's each, or a helping block's.
         device: "cpu" or "cuda:0" ...
     """
-    most = np.maximum(counts[:, :2], counts[:, MOST_NEIGHBOURS : MOST_NEIGHBOURS + 2]).max(axis=0)
+    most = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2]).max(axis=0)
     suspects, blocks = counts[:, MISSED_ELEMENTS].max(), counts[:, MISSED_LEAVES].max()
     bytes_each = PAIR_BYTES * worlds
     memory = MOST_LISTS

@@ -153,7 +153,7 @@ class SoftSolver(ParticleSolver):
         """The static shapes that the body meets; None for none."""
         super().set_colliders(colliders)
         # a little more than what kernels take for sharp, of which none may be left undone
-        self._sharp = colliders is not None and colliders.least_radius < 1.001 * ROUND * self._side
+        self._sharp = colliders is not None and colliders.min_radius < 1.001 * ROUND * self._side
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds = self.topology, self.world_count

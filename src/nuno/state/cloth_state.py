@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
-from nuno.numbers.lanes import lane, lane_int, window
+from nuno.numbers.lanes import lane, lane_int, subarray
 
 # Per-world scalars in `State.scalars`.
 DRAG, FRICTION, DAMPING, THICKNESS, ORIGIN = 0, 1, 2, 3, 4
@@ -24,7 +24,7 @@ NOTES = 8
 # Counts of candidate pairs in `State.pair_count`: vertex-triangle and edge-edge ones of the present list, the most of
 # each in an earlier list; and where there was no room for them, pairs of elements that a warp found to look at in two
 # blocks, and pairs of near blocks.
-MOST_NEIGHBOURS, MISSED_ELEMENTS, MISSED_LEAVES = 2, 4, 5
+MAX_NEIGHBOURS, MISSED_ELEMENTS, MISSED_LEAVES = 2, 4, 5
 COUNTS = 6
 
 WORK_COUNTS = 8
@@ -163,7 +163,7 @@ class Topology:
     region_start: wp.array(dtype=int)
     columns: int
     leaf_span: wp.array(dtype=int)
-    crease_window: wp.array(dtype=int)
+    crease_corner: wp.array(dtype=int)
 
 
 @wp.struct
@@ -257,56 +257,56 @@ def view(s: Any, group: int, n: int, sizes: Sizes):
     """The part of the state that belongs to one world, or to one group of lanes."""
     t = s
     t.group = group
-    t.x = window(s.x, group * n, n)
-    t.y = window(s.y, group * n, n)
-    t.z = window(s.z, group * n, n)
-    t.px = window(s.px, group * n, n)
-    t.py = window(s.py, group * n, n)
-    t.pz = window(s.pz, group * n, n)
-    t.vx = window(s.vx, group * n, n)
-    t.vy = window(s.vy, group * n, n)
-    t.vz = window(s.vz, group * n, n)
-    t.w = window(s.w, group * n, n)
-    t.fx = window(s.fx, group * sizes.forces, sizes.forces)
-    t.fy = window(s.fy, group * sizes.forces, sizes.forces)
-    t.fz = window(s.fz, group * sizes.forces, sizes.forces)
-    t.stretch_compliance = window(s.stretch_compliance, group * sizes.stretch_compliance, sizes.stretch_compliance)
-    t.shear_compliance = window(s.shear_compliance, group * sizes.shear_compliance, sizes.shear_compliance)
-    t.bend_compliance = window(s.bend_compliance, group * sizes.bend_compliance, sizes.bend_compliance)
-    t.scalars = window(s.scalars, group * 7, 7)
-    t.notes = window(s.notes, group * NOTES, NOTES)
-    t.bounds = window(s.bounds, group * sizes.bounds, sizes.bounds)
-    t.reference = window(s.reference, group * sizes.reference, sizes.reference)
-    t.middle = window(s.middle, group * sizes.middle, sizes.middle)
-    t.box = window(s.box, group * 6, 6)
-    t.grid_line_gain = window(s.grid_line_gain, group * sizes.edges, sizes.edges)
-    t.grid_line_pull = window(s.grid_line_pull, group * sizes.edges, sizes.edges)
-    t.grid_line_inverse = window(s.grid_line_inverse, group * sizes.edges, sizes.edges)
-    t.grid_line_goal = window(s.grid_line_goal, group * sizes.goals, sizes.goals)
-    t.cell_sum = window(s.cell_sum, group * sizes.cells, sizes.cells)
-    t.triangle_sum = window(s.triangle_sum, group * sizes.triangles, sizes.triangles)
-    t.grip_x = window(s.grip_x, group * sizes.keys, sizes.keys)
-    t.grip_y = window(s.grip_y, group * sizes.keys, sizes.keys)
-    t.grip_z = window(s.grip_z, group * sizes.keys, sizes.keys)
-    t.grip_weight = window(s.grip_weight, group * 3 * sizes.grips, 3 * sizes.grips)
-    t.grip_inverse_mass = window(s.grip_inverse_mass, group * sizes.grips, sizes.grips)
-    t.grip_load = window(s.grip_load, group * LOADS * sizes.grips, LOADS * sizes.grips)
-    t.grip_corner = window(s.grip_corner, group * 3 * sizes.grips, 3 * sizes.grips)
-    t.vertex_triangle = window(s.vertex_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
-    t.edge_edge = window(s.edge_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
-    t.inner_triangle = window(s.inner_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
-    t.inner_edge = window(s.inner_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
-    t.inner_count = window(s.inner_count, group * 2, 2)
-    t.active_triangle = window(s.active_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
-    t.active_edge = window(s.active_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
-    t.active_count = window(s.active_count, group * 2, 2)
-    t.pair_count = window(s.pair_count, group * COUNTS, COUNTS)
-    t.moved = window(s.moved, group * sizes.moved, sizes.moved)
-    t.near = window(s.near, group * sizes.near, sizes.near)
-    t.feature_shapes = window(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
-    t.feature_mark = window(s.feature_mark, group * n, n)
-    t.feature_list = window(s.feature_list, group * sizes.feature_list, sizes.feature_list)
-    t.feature_due = window(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
-    t.work_counts = window(s.work_counts, group * WORK_COUNTS, WORK_COUNTS)
-    t.near_leaves = window(s.near_leaves, group * sizes.near_leaves, sizes.near_leaves)
+    t.x = subarray(s.x, group * n, n)
+    t.y = subarray(s.y, group * n, n)
+    t.z = subarray(s.z, group * n, n)
+    t.px = subarray(s.px, group * n, n)
+    t.py = subarray(s.py, group * n, n)
+    t.pz = subarray(s.pz, group * n, n)
+    t.vx = subarray(s.vx, group * n, n)
+    t.vy = subarray(s.vy, group * n, n)
+    t.vz = subarray(s.vz, group * n, n)
+    t.w = subarray(s.w, group * n, n)
+    t.fx = subarray(s.fx, group * sizes.forces, sizes.forces)
+    t.fy = subarray(s.fy, group * sizes.forces, sizes.forces)
+    t.fz = subarray(s.fz, group * sizes.forces, sizes.forces)
+    t.stretch_compliance = subarray(s.stretch_compliance, group * sizes.stretch_compliance, sizes.stretch_compliance)
+    t.shear_compliance = subarray(s.shear_compliance, group * sizes.shear_compliance, sizes.shear_compliance)
+    t.bend_compliance = subarray(s.bend_compliance, group * sizes.bend_compliance, sizes.bend_compliance)
+    t.scalars = subarray(s.scalars, group * 7, 7)
+    t.notes = subarray(s.notes, group * NOTES, NOTES)
+    t.bounds = subarray(s.bounds, group * sizes.bounds, sizes.bounds)
+    t.reference = subarray(s.reference, group * sizes.reference, sizes.reference)
+    t.middle = subarray(s.middle, group * sizes.middle, sizes.middle)
+    t.box = subarray(s.box, group * 6, 6)
+    t.grid_line_gain = subarray(s.grid_line_gain, group * sizes.edges, sizes.edges)
+    t.grid_line_pull = subarray(s.grid_line_pull, group * sizes.edges, sizes.edges)
+    t.grid_line_inverse = subarray(s.grid_line_inverse, group * sizes.edges, sizes.edges)
+    t.grid_line_goal = subarray(s.grid_line_goal, group * sizes.goals, sizes.goals)
+    t.cell_sum = subarray(s.cell_sum, group * sizes.cells, sizes.cells)
+    t.triangle_sum = subarray(s.triangle_sum, group * sizes.triangles, sizes.triangles)
+    t.grip_x = subarray(s.grip_x, group * sizes.keys, sizes.keys)
+    t.grip_y = subarray(s.grip_y, group * sizes.keys, sizes.keys)
+    t.grip_z = subarray(s.grip_z, group * sizes.keys, sizes.keys)
+    t.grip_weight = subarray(s.grip_weight, group * 3 * sizes.grips, 3 * sizes.grips)
+    t.grip_inverse_mass = subarray(s.grip_inverse_mass, group * sizes.grips, sizes.grips)
+    t.grip_load = subarray(s.grip_load, group * LOADS * sizes.grips, LOADS * sizes.grips)
+    t.grip_corner = subarray(s.grip_corner, group * 3 * sizes.grips, 3 * sizes.grips)
+    t.vertex_triangle = subarray(s.vertex_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
+    t.edge_edge = subarray(s.edge_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
+    t.inner_triangle = subarray(s.inner_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
+    t.inner_edge = subarray(s.inner_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
+    t.inner_count = subarray(s.inner_count, group * 2, 2)
+    t.active_triangle = subarray(s.active_triangle, group * 4 * sizes.vertex_triangle, 4 * sizes.vertex_triangle)
+    t.active_edge = subarray(s.active_edge, group * 4 * sizes.edge_edge, 4 * sizes.edge_edge)
+    t.active_count = subarray(s.active_count, group * 2, 2)
+    t.pair_count = subarray(s.pair_count, group * COUNTS, COUNTS)
+    t.moved = subarray(s.moved, group * sizes.moved, sizes.moved)
+    t.near = subarray(s.near, group * sizes.near, sizes.near)
+    t.feature_shapes = subarray(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
+    t.feature_mark = subarray(s.feature_mark, group * n, n)
+    t.feature_list = subarray(s.feature_list, group * sizes.feature_list, sizes.feature_list)
+    t.feature_due = subarray(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
+    t.work_counts = subarray(s.work_counts, group * WORK_COUNTS, WORK_COUNTS)
+    t.near_leaves = subarray(s.near_leaves, group * sizes.near_leaves, sizes.near_leaves)
     return t

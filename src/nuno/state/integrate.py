@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at
-from nuno.numbers.lanes import add, choose, div, full_like, most, mul, root, sub, to_float  # noqa: F401
+from nuno.numbers.lanes import add, choose, div, full_like, maximum, mul, sqrt, sub, to_float  # noqa: F401
 from nuno.numbers.vec3 import (
     dot,
     position,
@@ -49,12 +49,12 @@ def raise_speed(notes: wp.array(dtype=float), value: float, rank: int, size: int
         if leads_warp(rank, size) and high > notes[SPEED]:
             wp.atomic_max(notes, SPEED, high)
     else:
-        notes[SPEED] = most(notes[SPEED], value)
+        notes[SPEED] = maximum(notes[SPEED], value)
 
 
 @wp.func
 def raise_speed(notes: wp.array(dtype=Any), value: Any, rank: int, size: int):
-    notes[SPEED] = most(notes[SPEED], value)
+    notes[SPEED] = maximum(notes[SPEED], value)
 
 
 @wp.func
@@ -70,7 +70,7 @@ def read_velocities(t: Any, n: int, run: Settings, rank: int, size: int):
         v = velocity(t, i)
         v = v + (position(t, i) - (start_position(t, i) + v * run.dt)) * rate
         put_velocity(t, i, v)
-        top = most(top, dot(v, v))
+        top = maximum(top, dot(v, v))
     raise_speed(t.notes, top, rank, size)
 
 
@@ -105,6 +105,6 @@ def tick(t: Any, run: Settings, rank: int):
     """Advance the clock, which counts substeps, and how far anything may have gone since pairs were listed."""
     if rank == 0:
         t.notes[CLOCK] = t.notes[CLOCK] + 1.0
-        t.notes[INNER_TRAVEL] = t.notes[INNER_TRAVEL] + root(t.notes[SPEED]) * run.dt
-        t.notes[TRAVEL] = t.notes[TRAVEL] + root(t.notes[SPEED]) * run.dt
-        t.notes[FASTEST] = most(t.notes[FASTEST], t.notes[SPEED])
+        t.notes[INNER_TRAVEL] = t.notes[INNER_TRAVEL] + sqrt(t.notes[SPEED]) * run.dt
+        t.notes[TRAVEL] = t.notes[TRAVEL] + sqrt(t.notes[SPEED]) * run.dt
+        t.notes[FASTEST] = maximum(t.notes[FASTEST], t.notes[SPEED])

@@ -51,17 +51,17 @@ class Colliders:
         count: Number of shapes.
         keys: The keys of their bodies, in the table's order.
         kinematic: Bodies with a slot, in the slots' order.
-        least_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
+        min_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
     """
 
     def __init__(
         self, shapes: Shapes, keys: Sequence[str], meshes: list[Any], kinematic: Sequence[Body],
-        centres: Sequence[np.ndarray], least_radius: float,
+        centres: Sequence[np.ndarray], min_radius: float,
     ) -> None:  # fmt: skip
         self.shapes, self.count, self.keys = shapes, len(keys), tuple(keys)
-        self.kinematic, self.least_radius = tuple(kinematic), least_radius
+        self.kinematic, self.min_radius = tuple(kinematic), min_radius
         self._meshes = meshes
-        # (worlds, led, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
+        # (worlds, kinematic, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
         self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
@@ -188,7 +188,7 @@ class Colliders:
 
     @cached_property
     def _table(self) -> np.ndarray:
-        """Key poses (worlds, led, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
+        """Key poses (worlds, kinematic, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
         shape = (-1, len(self.kinematic), FRAMES, FRAME_SIZE)
         pose = self.shapes.pose
         found = pose.numpy() if pose.device.is_cpu else np.zeros(len(pose), dtype=np.float32)
@@ -258,12 +258,12 @@ def _hull(shape: Hull) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     points = shape.mesh()[0]
     low, high = points.min(axis=0), points.max(axis=0)
     middle = 0.5 * (low + high)
-    planes = spread(shape.planes)
+    planes = in_separating_order(shape.planes)
     planes[:, 3] -= planes[:, :3] @ middle
     return planes.astype(np.float32), middle, 0.5 * (high - low)
 
 
-def spread(planes: np.ndarray) -> np.ndarray:
+def in_separating_order(planes: np.ndarray) -> np.ndarray:
     """Return planes (k, 4) in an order in which each looks elsewhere than all before it.
 
     What is beside a hull is then found to be so by the first few.

@@ -101,10 +101,10 @@ def make_elements(
         vertex_body.append(np.full(len(used), body))
         triangle.append(surface.faces + first)
         triangle_body.append(np.full(len(surface.faces), body))
-        found, listed = _edges(surface.faces)
+        found, entry = _edges(surface.faces)
         edge.append(found + first)
         edge_body.append(np.full(len(found), body))
-        owner.append(np.where(listed >= 0, listed + edges_before, -1))
+        owner.append(np.where(entry >= 0, entry + edges_before, -1))
         if surface.joined is not None:
             near.append(surface.joined + first)
         first += surface.particles
@@ -181,9 +181,9 @@ def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Edges (e, 2), and which of them (m, 3) are listed with each face: those that no face before it has, else -1."""
     sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     edges, firsts = np.unique(sides, axis=0, return_index=True)
-    listed = np.full(len(sides), -1)
-    listed[firsts] = np.arange(len(edges))
-    return edges, listed.reshape(-1, 3)
+    entry = np.full(len(sides), -1)
+    entry[firsts] = np.arange(len(edges))
+    return edges, entry.reshape(-1, 3)
 
 
 def joined_particles(tets: np.ndarray) -> np.ndarray:

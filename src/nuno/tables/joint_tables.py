@@ -36,7 +36,7 @@ class CoupledJoints:
         assert scene is not None
         places, others = [], []
         for joint in joints:
-            spec: JointSpec = joint._spec
+            spec: JointSpec = joint.spec
             own: Any = joint.body._dynamics
             other: Any = None if joint.target is None else joint.target._dynamics
             places.append(spec.place - own.centre)
@@ -44,7 +44,7 @@ class CoupledJoints:
             others.append(spec.other_place - (scene.solver.origin if joint.target is None else 0.0))
             if other is not None:
                 others[-1] = spec.other_place - other.centre
-        specs: list[JointSpec] = [joint._spec for joint in joints]
+        specs: list[JointSpec] = [joint.spec for joint in joints]
         slots = [scene.slot_of(world, joint.body) for joint in joints]
         other_slots = [-1 if j.target is None else scene.slot_of(world, j.target) for j in joints]
         for name, numbers in (
@@ -68,7 +68,7 @@ class CoupledJoints:
 
     def bring(self) -> None:
         """Take over what motors, springs, friction and limits are now."""
-        specs: list[JointSpec] = [joint._spec for joint in self.joints]
+        specs: list[JointSpec] = [joint.spec for joint in self.joints]
         if len(specs) != len(self._specs) or any(a is not b for a, b in zip(specs, self._specs, strict=True)):
             self._put("drive", [spec.drives for spec in specs], float)
             self._specs = specs

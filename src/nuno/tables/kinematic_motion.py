@@ -52,7 +52,7 @@ class PathBatch:
         return made
 
     def at(self, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
-        """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path._between`` says of times."""
+        """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path.keys_around`` says of times."""
         first, last, s = between
         a, b = self.positions[:, first], self.positions[:, last]
         return a + s[..., None] * (b - a), quat.slerp(self.quaternions[:, first], self.quaternions[:, last], s)
@@ -166,10 +166,10 @@ def make_schedule(bodies: Iterable[Body], start: float, duration: float, frame: 
     # the same instants, to the bit, whether a span is gone through at once or in pieces
     times = np.round(times, 9)
     path_batches, bodies = path_batches_of(bodies)
-    moved = tuple((own.keys, *own.at(path._between(times))) for own, path in path_batches)
+    moved = tuple((own.keys, *own.at(path.keys_around(times))) for own, path in path_batches)
     if not bodies:
         return Schedule(times, {}, moved)
-    kinematic = {root.key: root for body in bodies if (root := _followed_by(body)) is not None}
+    kinematic = {leader.key: leader for body in bodies if (leader := _followed_by(body)) is not None}
     roots = dict(zip(kinematic, paths_at([body._path for body in kinematic.values()], times), strict=True))
     return Schedule(times, {body.key: _pose_of(body, roots) for body in bodies}, moved)
 
@@ -213,7 +213,7 @@ def paths_at(paths: Sequence[Path | None], times: np.ndarray) -> list[tuple[np.n
     found: list[Any] = [None] * len(paths)
     for group in groups.values():
         alike = [path for k in group if (path := paths[k]) is not None]
-        first, last, s = alike[0]._between(times)
+        first, last, s = alike[0].keys_around(times)
         places = np.stack([path.positions for path in alike])
         a, b = places[..., first, :], places[..., last, :]
         placed = a + s[..., None] * (b - a)
@@ -231,16 +231,17 @@ def _followed_by(frame: Coordinates) -> Any:
     """Return the body at or above a frame that follows a path."""
     above: Coordinates | None = frame
     while above is not None and getattr(above, "_path", None) is None:
-        above = above._parent
+        above = above.parent
     return above
 
 
 def _pose_of(frame: Any, roots: dict[str, Any]) -> Pose:
-    """Return a led frame's pose from those of the bodies with paths: parts with an axis of times, or of 1."""
+    """Return a kinematic frame's pose from those of the bodies with paths: parts with an axis of times, or of 1."""
+    own_place, own_turn = frame.relative_pose
     if getattr(frame, "_path", None) is not None:
         place, turn = roots[frame.key]
-        return place, frame._quaternion[..., None, :] if turn is None else turn
-    return compose(_pose_of(frame._parent, roots), (frame._position[..., None, :], frame._quaternion[..., None, :]))
+        return place, own_turn[..., None, :] if turn is None else turn
+    return compose(_pose_of(frame.parent, roots), (own_place[..., None, :], own_turn[..., None, :]))
 
 
 def path_for(body: Body, to: Path, world_count: int) -> Path:
@@ -254,7 +255,7 @@ def path_for(body: Body, to: Path, world_count: int) -> Path:
         raise InvalidInputError(f"a body moves along a Path, or None ends it; got {type(to).__name__}")
     if body._dynamics is not None:
         raise BodyStateError(f"{body.name!r} is dynamic and cannot follow a path; grip it instead")
-    if body._parent is not None:
+    if body.parent is not None:
         raise BodyStateError(f"{body.name!r} follows another frame; dissoc it first")
     if to.world_count not in (None, world_count):
         raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {world_count}")
@@ -278,7 +279,7 @@ def arrive(bodies: Iterable[Body], time: float) -> None:
     by_key = {body.key: body for body in bodies if body._path is not None}
     path_batches, kinematic = path_batches_of(by_key.values())
     for path_batch, path in path_batches:
-        places, turns = path_batch.at(path._between(np.array(time)))
+        places, turns = path_batch.at(path.keys_around(np.array(time)))
         path_batch.__dict__["arrived"] = (time, places, turns)
         for key, own_place, own_turn in zip(path_batch.keys, places, turns, strict=True):
             body = by_key[key]

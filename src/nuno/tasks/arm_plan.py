@@ -130,7 +130,7 @@ class _Planner:
         x, y, yaw = standing_place(self.robot)
         self.place, self.forward = np.array([x, y]), np.array([math.cos(yaw), math.sin(yaw), 0.0])
         self.outline = self.robot.support_polygon() if self.robot.description.feet else None
-        self.inside, self.largest = 0.0, 0.0
+        self.inside, self.worst_error = 0.0, 0.0
         if self.outline is not None:
             self.inside = min(MARGIN, distance_inside(self.outline, self.robot.centre_of_mass[:2]) - 1e-3)
 
@@ -140,7 +140,7 @@ class _Planner:
         Raises:
             ReachError: it cannot be done so.
         """
-        motion, self.largest = self.motion, 0.0
+        motion, self.worst_error = self.motion, 0.0
         self.holds = [self._hold(k, inward, lean, turn) for k in range(motion.hand_count)]
         self._check_holds()
         end = float(motion.times[-1])
@@ -161,7 +161,7 @@ class _Planner:
         stretch = self._stretch(carry, np.diff(times))
         return ArmPlan(
             self.hands, tuple(self.robot.joint_names[k] for k in columns), approach[:, columns], take[:, columns],
-            times * stretch, carry[:, columns], motion.releases * stretch, leave[:, columns], stretch, self.largest,
+            times * stretch, carry[:, columns], motion.releases * stretch, leave[:, columns], stretch, self.worst_error,
         )  # fmt: skip
 
     def _hold(self, hand: int, inward: float, lean: float, turn: float) -> tuple[np.ndarray, np.ndarray]:
@@ -210,7 +210,7 @@ class _Planner:
         reason = reached.reason if not reached else self._problem(robot.configuration(), links=False)
         if reason:
             raise ReachError(f"the arms of {robot.name!r} cannot go {where}: {reason}", dict(reached.position_errors))
-        self.largest = max(self.largest, *reached.position_errors.values())
+        self.worst_error = max(self.worst_error, *reached.position_errors.values())
 
     def _approach(self, points: np.ndarray) -> np.ndarray:
         """Return angles (a, n) from where the robot is to held points (1, hands, 3), straight or by one stop.
@@ -230,9 +230,9 @@ class _Planner:
         lower, upper = (limit[self.columns] for limit in self.robot.joint_limits)
         for _ in range(STOPS):
             stop = above.copy()
-            spread = np.abs(above - begin)[self.columns] + 0.3
+            extent = np.abs(above - begin)[self.columns] + 0.3
             middle = 0.5 * (above + begin)[self.columns]
-            stop[self.columns] = np.clip(random.normal(middle, 0.5 * spread), lower, upper)
+            stop[self.columns] = np.clip(random.normal(middle, 0.5 * extent), lower, upper)
             try:
                 self._check_lines(np.stack([begin, stop, above]), "to the cloth")
                 return np.stack([stop, above])

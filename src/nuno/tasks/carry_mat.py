@@ -122,11 +122,11 @@ def carry_mat(
     placed = time.perf_counter()
     room = make_room(plan, device, substeps)
     # of a batch that is killed nothing is recorded: so no more than the cores take at once, unless a device takes all
-    most = len(rows) if results is None or room.device != "cpu" else min(len(rows), 16 * (os.cpu_count() or 1))
+    batch_size = len(rows) if results is None or room.device != "cpu" else min(len(rows), 16 * (os.cpu_count() or 1))
     shared = {"carry": plan.digest(substeps)}
     found = sweep(
         CarryTrials(plan), [dict(zip(NAMES, row, strict=True)) | shared for row in rows], world=room, results=results,
-        batch=most,
+        batch=batch_size,
     )  # fmt: skip
     trials = tuple(_trial(row, outcome) for row, outcome in zip(rows, found.trials, strict=True))
     spent = {"walks": walking - begin, "arms": placed - walking, "trials": time.perf_counter() - placed}
@@ -169,7 +169,7 @@ def _trial(row: tuple[float, float, float], outcome: Any) -> CarryTrial:
     if outcome.error is not None:
         return CarryTrial(*row, None, None, outcome.error)
     value, failed_at = (float(outcome.values[name]) for name in ("value", "failed_at"))
-    return CarryTrial(*row, _known(value), _known(failed_at), str(outcome.values["reason"]))
+    return CarryTrial(*row, _or_none(value), _or_none(failed_at), str(outcome.values["reason"]))
 
 
 def _robot(robot: Any) -> Humanoid:
@@ -230,5 +230,5 @@ def _check_width(robot: Humanoid, mat: Body, arm_distances: ArrayLike, hands_at:
         robot.take_configuration(kept)
 
 
-def _known(value: float) -> float | None:
+def _or_none(value: float) -> float | None:
     return None if np.isnan(value) else float(value)

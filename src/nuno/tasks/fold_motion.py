@@ -169,8 +169,8 @@ def bent(ways: np.ndarray, *, height: Any = 1.0, shift: Any = (0.0, 0.0)) -> np.
         shift: (..., 2), what is added at the end; before, in the share of the way that is behind.
     """
     steps = np.linalg.norm(np.diff(ways[..., :2], axis=-2), axis=-1)
-    gone = np.concatenate([np.zeros_like(steps[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
-    share = gone / np.maximum(gone[..., -1:], 1e-12)
+    length = np.concatenate([np.zeros_like(steps[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
+    share = length / np.maximum(length[..., -1:], 1e-12)
     rise = ways[..., 2] - ways[..., :1, 2]
     line = rise[..., -1:] * share
     flat = ways[..., :2] + share[..., None] * np.asarray(shift)[..., None, :]

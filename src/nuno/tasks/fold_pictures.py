@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from nuno.bodies.body import Body
 
-AHEAD, ASIDE, OVER = 1.15, -0.85, 0.6
+AHEAD, ASIDE, ABOVE = 1.15, -0.85, 0.6
 """[m] From the cloth to the camera, as the robot sees it."""
 LIFTED = 0.12
 """[m] Over the cloth, what the camera looks at."""
@@ -41,7 +41,7 @@ class FoldPictures:
         yaw = standing_place(robot.robot)[2]
         middle = np.asarray(cloth.vertices).mean(axis=0)
         c, s = math.cos(yaw), math.sin(yaw)
-        eye = middle + np.array((c * AHEAD - s * ASIDE, s * AHEAD + c * ASIDE, OVER))
+        eye = middle + np.array((c * AHEAD - s * ASIDE, s * AHEAD + c * ASIDE, ABOVE))
         self.camera = look_at_camera(eye, middle + np.array((0.0, 0.0, LIFTED)), WIDTH, HEIGHT, FOCAL)
         self.pictures: dict[str, np.ndarray] = {}
 

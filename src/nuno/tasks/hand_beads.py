@@ -19,7 +19,7 @@ BEAD = 0.014
 BEAD_AT = (-0.07, 0.0, -0.1)
 """[m] A bead's middle in the frame of the hand: where Talos sees it beside the gripper."""
 BEAD_COLOR = "#e010c0"
-WINDOW = 40.0
+SEARCH_RADIUS = 40.0
 """[px] How far from where it is expected a bead is looked for."""
 ALIKE = 0.97
 """Cosine that the light from a bead's pixels and its paint have at least, as colours."""
@@ -34,7 +34,7 @@ def put_beads(links: Links) -> tuple[Body, ...]:
     beads = []
     for hand in links.robot.description.hands:
         body, offset = carrier(links, hand)
-        place = Coordinates(*body._pose()).transform(Coordinates(*offset)).to_world([BEAD_AT])[0]
+        place = Coordinates(*body.pose()).transform(Coordinates(*offset)).to_world([BEAD_AT])[0]
         bead = sphere(BEAD, name=f"{hand} bead", color=BEAD_COLOR, position=place, group=0, collides_with=0)
         beads.append(links.world.add(bead))
         body.assoc(bead)
@@ -57,7 +57,7 @@ def find_bead(image: np.ndarray, camera: Camera, expected: np.ndarray) -> np.nda
     strength = np.linalg.norm(light, axis=-1)
     alike = light @ paint / np.maximum(strength * np.linalg.norm(paint), 1e-9)
     v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-    like = (alike > ALIKE) & (strength > DARKEST) & (np.hypot(u - near[0], v - near[1]) < WINDOW + size)
+    like = (alike > ALIKE) & (strength > DARKEST) & (np.hypot(u - near[0], v - near[1]) < SEARCH_RADIUS + size)
     _, _, stats, middles = cv2.connectedComponentsWithStats(like.astype(np.uint8))
     areas = stats[1:, cv2.CC_STAT_AREA]
     share = float(areas.max(initial=0)) / (np.pi * size**2)

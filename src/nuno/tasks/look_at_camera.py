@@ -1,4 +1,4 @@
-"""Onlooker: a camera anywhere in a room that looks at a point, for pictures of what robots do."""
+"""A look-at camera: a camera anywhere in a room that looks at a point, for pictures of what robots do."""
 
 from __future__ import annotations
 

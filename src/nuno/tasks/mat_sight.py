@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from nuno.shapes.shape import Hull, Shape
-from nuno.tables.colliders import spread
+from nuno.tables.colliders import in_separating_order
 from nuno.tasks.arm_tracks import ArmTracks
 
 FAR = wp.constant(1.0e6)
@@ -84,7 +84,7 @@ class MatSight:
         worlds, frames = len(walk_of), tracks.frames
         self.every, self._device = every, device
         places, turns = (array.transpose(0, 2, 1, 3) for array in (tracks.positions, tracks.quaternions))
-        planes = [spread(_planes(part)) for part in tracks.parts]
+        planes = [in_separating_order(_planes(part)) for part in tracks.parts]
         ends = np.cumsum([0, *map(len, planes)])
         self._shapes: tuple[Any, ...] = (
             wp.array(places.astype(np.float32), dtype=wp.vec3, device=device),

@@ -35,7 +35,7 @@ class Obstacles:
             if isinstance(body.shape, Plane):
                 continue
             place = pin.SE3.Identity()
-            position, (w, x, y, z) = body._pose()
+            position, (w, x, y, z) = body.pose()
             if (shape := _primitive(coal, body)) is not None:
                 place = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), np.array(position))
             else:

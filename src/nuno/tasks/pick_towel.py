@@ -251,7 +251,7 @@ class TowelPicker:
             raise EstimationError("the towel has not been picked yet; call pick first")
         after = self.look()
         left = STEREO[0]
-        held, spread = self.see_hand(after)
+        held, deviation = self.see_hand(after)
         result = estimate_pick(
             before.images[left], after.images[left], camera=after.cameras[left], table_height=self.table.height,
             table_half_extents=self.table.half_extents, table_centre=self.table.centre,
@@ -261,7 +261,7 @@ class TowelPicker:
         )  # fmt: skip
         by_joints = self.robot.frame_pose(self._hand).to_world([PINCH])[0]
         i, j = result.best
-        return Answer((int(i), int(j)), result, held, spread, by_joints, before, after)
+        return Answer((int(i), int(j)), result, held, deviation, by_joints, before, after)
 
     def believe(self, answer: Answer) -> Body:
         """Let the towel in the robot's world hang as the answer says, and return it.
@@ -273,7 +273,7 @@ class TowelPicker:
         """
         towel, world = self._found()[0], self.world
         futures = answer.result.futures
-        likely = futures.discretisation.spread[answer.result.best_index // futures.candidates]
+        likely = futures.discretisation.hypotheses[answer.result.best_index // futures.candidates]
         for body in self._own:  # the hand is there already, before the towel comes up to it
             world.ignore_contact(towel, body)
         material = Cloth(

@@ -154,4 +154,4 @@ def _carry(
 def _held(robot: SimulatedRobot, hand: str, cloth: Body) -> int:
     """Return how many points of the cloth a hand holds."""
     grips = [grip for grip in robot.hands[hand].grips if grip.body is cloth]
-    return sum(int(np.shape(g._spec.vertices if g._spec.vertices is not None else g._spec.corners)[1]) for g in grips)
+    return sum(int(np.shape(g.spec.vertices if g.spec.vertices is not None else g.spec.corners)[1]) for g in grips)

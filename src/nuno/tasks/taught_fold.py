@@ -168,7 +168,7 @@ class TaughtFold:
         Raises:
             InvalidInputError: no sheet, or it does not lie flat.
         """
-        frame = ClothFrame.of(cloth, 0 if forward is None else self._turn(cloth, forward))
+        frame = ClothFrame.of(cloth, 0 if forward is None else self._quarter_turns(cloth, forward))
         times, releases = self.times, self.releases
         if seconds is not None:
             scale = number("seconds", seconds, above=0.0) / float(times[-1])
@@ -182,7 +182,7 @@ class TaughtFold:
         ways += (vertices[chosen] - asked)[:, None]
         return FoldMotion(frame, vertices, np.asarray(cloth.faces), chosen, times, ways, releases, self)
 
-    def _turn(self, cloth: Body, forward: ArrayLike) -> int:
+    def _quarter_turns(self, cloth: Body, forward: ArrayLike) -> int:
         """Return which corner of a sheet is to be the first for the fold to carry forward."""
         wanted = finite_array("forward", forward, (2,), (3,))[:2]
         if np.linalg.norm(wanted) < 1e-9:

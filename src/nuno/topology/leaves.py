@@ -16,7 +16,7 @@ LEAF_VERTICES = 4
 
 REGION = 16
 """Consecutive leaves whose displacements are looked at together, to tell how long a list is good."""
-WINDOW = 5
+FLAT_SIDE = 5
 """Vertices along a side of the windows of a sheet's grid that are found to be flat enough to be passed over."""
 
 
@@ -36,10 +36,10 @@ class Leaves:
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
         region_corner: (r,) int, all vertices of the elements of each region of `REGION` consecutive leaves.
         region_start: (regions + 1,) int.
-        columns: Vertices in a row of a sheet's grid, if the grid has windows of `WINDOW` vertices a side; else 0.
+        columns: Vertices in a row of a sheet's grid, if the grid has windows of `FLAT_SIDE` vertices a side; else 0.
         span: (4 w,) int, the first and last column and the first and last row of each leaf's corners on that grid,
             each of the four for all leaves, in a row of whole sixteens.
-        crease_window: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
+        crease_corner: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
     """
 
     vertex: np.ndarray
@@ -55,7 +55,7 @@ class Leaves:
     region_start: np.ndarray
     columns: int
     span: np.ndarray
-    crease_window: np.ndarray
+    crease_corner: np.ndarray
 
     @property
     def count(self) -> int:
@@ -115,7 +115,7 @@ def make_leaves(
     region = np.unique(own // count // REGION * count + own % count)
     region_start = np.searchsorted(region // count, np.arange(-(-leaves // REGION) + 1))
     corner, corner_start = own % count, np.searchsorted(own // count, starts)
-    if min(columns, count // max(1, columns)) < WINDOW:
+    if min(columns, count // max(1, columns)) < FLAT_SIDE:
         columns = 0
     return Leaves(
         order, np.searchsorted(group[order], starts), face, face_start, edge, edge_start, corner, corner_start, crease,
@@ -126,7 +126,7 @@ def make_leaves(
 def _grid(
     corner: np.ndarray, start: np.ndarray, crease: np.ndarray, columns: int, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where leaves and creases are on a sheet's grid: `Leaves.span` and `Leaves.crease_window`."""
+    """Return where leaves and creases are on a sheet's grid: `Leaves.span` and `Leaves.crease_corner`."""
     leaves = len(start) - 1
     span = np.zeros((4, -(-leaves // 16) * 16), dtype=np.int64)
     if columns == 0:

@@ -129,7 +129,7 @@ class BodyObjects:
         elif self.body._dynamics is None and self.body._parent is None:
             self._raw = (self.body._position, self.body._quaternion)
         else:
-            self._raw = self.body._pose()
+            self._raw = self.body.pose()
 
     def _vertices(self, index: int) -> np.ndarray:
         vertices = self._raw[0] if not self.is_rigid else self.body._rigid_vertices(self._raw)

@@ -28,7 +28,7 @@ def state_rows(world: Simulation, body: Body, index: int) -> list[tuple[str, str
     """Return what a page says of a body, as (label, text); the caller holds the world's lock."""
     dynamics = body._dynamics
     kind = "static" if dynamics is None else f"dynamic, {type(dynamics.material).__name__}"
-    x, y, z = of_world(body._pose()[0] if dynamics is None or dynamics.is_rigid else body.centre_of_mass, index)
+    x, y, z = of_world(body.pose()[0] if dynamics is None or dynamics.is_rigid else body.centre_of_mass, index)
     rows = [("shape", body.shape.kind), ("state", kind), ("place", f"{x:.3f}, {y:.3f}, {z:.3f} m")]
     if dynamics is not None:
         u, v, w = of_world(body.velocity, index)

@@ -263,7 +263,7 @@ class Scene:
             for place, obj in zip(self.places, self._cameras[name][1], strict=True):
                 at = source.pose
                 if source.carrier is not None:
-                    carried = self.world._bodies.get(source.carrier.key, source.carrier)._pose()
+                    carried = self.world._bodies.get(source.carrier.key, source.carrier).pose()
                     p, q = (part[place.index] if part.ndim == 2 else part for part in carried)
                     at = p + quat.rotate(q, source.pose[0]), quat.multiply(q, source.pose[1])
                 self._camera_poses.append((obj, at))

@@ -185,7 +185,7 @@ class Viewer(Orders):
         if on is not None:
             with self.world.lock:
                 carrier = self.world._own(on)
-                place, turn = carrier._pose()
+                place, turn = carrier.pose()
             if place.ndim == 2 or turn.ndim == 2:
                 raise InvalidInputError(f"{carrier.name!r} is at another place in each world; give its camera no body")
             pose = compose(invert((place, turn)), pose)

@@ -80,8 +80,8 @@ class CoupledBodies:
         elements = make_elements(
             surfaces, [self._surface(body) for body in self.rigid], *self._rules(), str(world.device)
         )
-        self._point_ties = [grip for grip in ties if isinstance(grip._spec, TieSpec | GripSpec)]
-        self._frame_holds = [grip for grip in ties if isinstance(grip._spec, HoldSpec)]
+        self._point_ties = [grip for grip in ties if isinstance(grip.spec, TieSpec | GripSpec)]
+        self._frame_holds = [grip for grip in ties if isinstance(grip.spec, HoldSpec)]
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
@@ -264,7 +264,7 @@ class CoupledBodies:
         corners, weights, slots, points, kinematic, compliance = [], [], [], [], [], []
         self._tie_counts: list[int] = []
         for grip in self._point_ties:
-            spec: TieSpec | GripSpec = grip._spec
+            spec: TieSpec | GripSpec = grip.spec
             own_corners, own_weights = corners_of(spec)
             k = own_corners.shape[1]
             self._tie_counts.append(k)
@@ -321,7 +321,7 @@ class CoupledBodies:
 
     def _tie_points(self, grip: Grip) -> np.ndarray:
         """(worlds, k, 3), where the points of the body are now."""
-        corners, weights = corners_of(grip._spec)
+        corners, weights = corners_of(grip.spec)
         worlds = self._world.world_count
         own = np.broadcast_to(grip.body._vertices(), (worlds, *grip.body._vertices().shape[-2:]))
         rows = np.arange(worlds)[:, None, None]
@@ -330,7 +330,7 @@ class CoupledBodies:
 
     def _lead_ties(self, time: float, duration: float) -> None:
         """Return where the points of grips with a limit are led when the frame begins and ends."""
-        specs: list[Any] = [grip._spec for grip in self._point_ties]
+        specs: list[Any] = [grip.spec for grip in self._point_ties]
         if any(isinstance(spec, GripSpec) for spec in specs):
             times, worlds = np.array([time, time + duration]), self._world.world_count
             nowhere = [np.zeros((worlds, count, 2, 3)) for count in self._tie_counts]
@@ -357,7 +357,7 @@ class CoupledBodies:
         holds.leader = wp.array(np.array(leaders or [-1], np.int32), dtype=int, device=device)
         compliance = [grip.compliance for grip in self._frame_holds] or [0.0]
         holds.compliance = wp.array(np.array(compliance, np.float32), dtype=float, device=device)
-        axes = [np.zeros(3) if grip._spec.free is None else grip._spec.free for grip in self._frame_holds]
+        axes = [np.zeros(3) if grip.spec.free is None else grip.spec.free for grip in self._frame_holds]
         axes = axes or [np.zeros(3)]
         holds.free = wp.array(np.tile(np.array(axes, np.float32), (worlds, 1)), dtype=wp.vec3, device=device)
         room = max(1, worlds * count)
@@ -378,10 +378,10 @@ class CoupledBodies:
         place = np.zeros((worlds, len(self._frame_holds), 2, 3))
         turn = np.zeros((worlds, len(self._frame_holds), 2, 4))
         for k, grip in enumerate(self._frame_holds):
-            spec: HoldSpec = grip._spec
+            spec: HoldSpec = grip.spec
             own: Any = grip.body._dynamics
-            if grip._offsets is not None and grip.target is not None:
-                poses: Any = grip._lead(time, worlds)
+            if grip.offsets is not None and grip.target is not None:
+                poses: Any = grip.lead(time, worlds)
             else:
                 poses = spec.at(time), spec.at(time + duration)
             leads = int(holds.leader.numpy()[k]) >= 0
@@ -401,7 +401,7 @@ class CoupledBodies:
 
 def _limits(grip: Grip, worlds: int) -> np.ndarray:
     """(worlds,) [N], what a tie or hold bears at most."""
-    return np.broadcast_to(np.asarray(grip._spec.max_force, dtype=float), (worlds,))
+    return np.broadcast_to(np.asarray(grip.spec.max_force, dtype=float), (worlds,))
 
 
 def _surface_rules(body: Body, solver: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -73,7 +73,7 @@ def find_islands(world: Simulation, moving: list[Body], duration: float, substep
 
 def holding(grip: Grip, worlds: int) -> np.ndarray:
     """Return (worlds,) bool, where a tie or hold holds anything."""
-    spec = grip._spec
+    spec = grip.spec
     held = (spec.corners >= 0).any(axis=(1, 2)) if isinstance(spec, TieSpec) else True
     return np.array(np.broadcast_to(held, (worlds,)))
 

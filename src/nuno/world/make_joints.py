@@ -145,7 +145,7 @@ def _join(
         if a._dynamics is None:
             raise BodyStateError(f"{a.name!r} is static; attach it before it is joined, or give the other body first")
         worlds = world.world_count
-        pose = tuple(np.broadcast_to(p, (worlds, p.shape[-1])) for p in a._pose())
+        pose = tuple(np.broadcast_to(p, (worlds, p.shape[-1])) for p in a.pose())
         place = pose[0] if point is None else _rows("point", point, worlds)
         if axis is None:
             axis = (0.0, 0.0, 1.0)
@@ -155,8 +155,8 @@ def _join(
         if (np.linalg.norm(direction, axis=1) < 1e-9).any():
             raise InvalidInputError(f"axis must be a direction (3,) of some length, got {axis!r}")
         frame = (place, _frames(direction))
-        local = compose(invert(a._pose()), frame)
-        others = frame if other is None else compose(invert(other._pose()), frame)
+        local = compose(invert(a.pose()), frame)
+        others = frame if other is None else compose(invert(other.pose()), frame)
         place, turn, other_place, other_turn = (
             np.array(np.broadcast_to(p, (worlds, p.shape[-1]))) for p in (*local, *others)
         )

@@ -29,7 +29,7 @@ class RunStart:
         self._resting = world._resting
         # what a grip leads from is where it led last
         grips: list[Any] = [grip for d in moving.values() for grip in d.grips]
-        self._followed = [(grip, grip._spec, grip._followed) for grip in grips]
+        self._followed = [(grip, grip.spec, grip.followed) for grip in grips]
 
     def go_back(self) -> None:
         """Set the state that it was."""
@@ -42,6 +42,6 @@ class RunStart:
             dynamics._pushing = pushing
         world._resting = self._resting
         for grip, spec, followed in self._followed:
-            grip._spec, grip._followed = spec, followed
+            grip.spec, grip.followed = spec, followed
         for own in self._moving.values():
             own.grips_changed = True

@@ -17,7 +17,7 @@ from nuno.bodies.make_dynamics import make_dynamics
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import Joint, JointSpec
-from nuno.joints.tie import HoldSpec, TieSpec, spread_spec
+from nuno.joints.tie import HoldSpec, TieSpec, batched_spec
 from nuno.materials import Material
 from nuno.shapes.coordinates import Pose, compose, invert
 from nuno.shapes.path import Path
@@ -153,7 +153,7 @@ class Snapshot:
             replace(
                 grip,
                 offsets=tuple(map(batched, grip.offsets)) if isinstance(grip.offsets, tuple) else batched(grip.offsets),
-                spec=spread_spec(grip.spec, batched),
+                spec=batched_spec(grip.spec, batched),
                 followed=_mapped_lead(grip.followed, batched),
             )
             for grip in self.grips
@@ -244,7 +244,7 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
         own = body._dynamics
         dynamics = DynamicsRecord(own.material, own.friction, own.state(), tuple(own.pushes))
     parent = body._parent if isinstance(body._parent, Body) and body._parent._world is world else None
-    pose = (body._position, body._quaternion) if parent or body._dynamics else body._pose()
+    pose = (body._position, body._quaternion) if parent or body._dynamics else body.pose()
     deformed, base = body._deformed if body._deformed is not None else (None, (None, None))
     return BodyRecord(
         key=body.key, name=body.name, shape=body.shape, color=body.color, friction=body.friction,
@@ -252,13 +252,13 @@ def _body_record(body: Body, world: Simulation) -> BodyRecord:
         quaternion=pose[1], parent=None if parent is None else parent.key, deformed=deformed,
         deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics,
         path=body._path.as_it_is() if isinstance(body._path, GroupPath) else body._path,
-        relative=None if body._parent is None or parent else (body._position, body._quaternion),
+        relative=None if body._parent is None or parent else body.relative_pose,
     )  # fmt: skip
 
 
 def _grip_record(grip: Grip) -> GripRecord:
     target = None if grip.target is None else grip.target.key
-    return GripRecord(grip.key, grip.body.key, grip._spec, target, grip._offsets, grip._followed)
+    return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed)
 
 
 def _known_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
@@ -331,7 +331,7 @@ def _fill(body: Body, record: BodyRecord) -> None:
         body._parent._children = [child for child in body._parent._children if child is not body]
         body._parent = None
     if body._parent is not None:
-        frame = body._parent._pose()
+        frame = body._parent.pose()
         kept = record.relative
         # rounding would move it where the frame has not
         same = kept is not None and all(map(np.array_equal, compose(frame, kept), pose))
@@ -352,8 +352,8 @@ def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation
         made = Joint if isinstance(spec, JointSpec) else Grip
         grip = made(bodies[record.body], spec, target, record.offsets)
         grip.key = record.key
-    grip.body, grip.target, grip._spec = bodies[record.body], target, spec
-    grip._offsets, grip._followed = record.offsets, record.followed
+    grip.body, grip.target, grip.spec = bodies[record.body], target, spec
+    grip.offsets, grip.followed = record.offsets, record.followed
     world._hold(grip)
 
 

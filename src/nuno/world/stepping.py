@@ -193,9 +193,9 @@ class Stepping:
         if dynamics.grips_changed:
             return nothing
         forces, mass = dynamics.solver.grip_forces()[known.index(grip)]
-        now, acceleration = _path_state(grip._spec, self._world.time, 1.0 / self._world.frame_rate)
+        now, acceleration = _path_state(grip.spec, self._world.time, 1.0 / self._world.frame_rate)
         forces = forces + mass[..., None] * (np.asarray(self._world.gravity) - acceleration)
-        corners = grip._spec.vertices if grip._spec.vertices is not None else grip._spec.corners[..., 0]
+        corners = grip.spec.vertices if grip.spec.vertices is not None else grip.spec.corners[..., 0]
         held = (corners >= 0)[..., None]
         count = np.maximum(held.sum(axis=1, keepdims=True), 1)
         arms = np.where(held, now - np.where(held, now, 0.0).sum(axis=1, keepdims=True) / count, 0.0)

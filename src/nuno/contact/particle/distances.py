@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import add, anywhere, choose, div, full_like, lane, least, most, mul, root, size_of, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, choose, div, full_like, lane, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, vec3
 from nuno.state.cloth_state import Shapes
 
@@ -25,26 +25,26 @@ TRACE_STEPS = wp.constant(12)
 @wp.func
 def distance_box(x: Any, y: Any, z: Any, a: Any, b: Any, c: Any):
     """Signed distance and normal of a box of half sides a, b, c around the origin."""
-    qx = size_of(x) - a
-    qy = size_of(y) - b
-    qz = size_of(z) - c
+    qx = absolute(x) - a
+    qy = absolute(y) - b
+    qz = absolute(z) - c
     zero = full_like(x, 0.0)
     one = full_like(x, 1.0)
     sx = choose(x, one, -one)
     sy = choose(y, one, -one)
     sz = choose(z, one, -one)
-    ox = most(qx, zero)
-    oy = most(qy, zero)
-    oz = most(qz, zero)
+    ox = maximum(qx, zero)
+    oy = maximum(qy, zero)
+    oz = maximum(qz, zero)
     # inside and over a face, the nearest face gives distance and normal
-    gap = most(qx, most(qy, qz))
-    fz = choose(qz - most(qx, qy), one, zero)
+    gap = maximum(qx, maximum(qy, qz))
+    fz = choose(qz - maximum(qx, qy), one, zero)
     fx = (one - fz) * choose(qx - qy, one, zero)
     fy = one - fz - fx
-    corner = ox + oy + oz - most(gap, zero)
+    corner = ox + oy + oz - maximum(gap, zero)
     if not anywhere(corner):
         return gap, sx * fx, sy * fy, sz * fz
-    outside = root(ox * ox + oy * oy + oz * oz + 1.0e-24)
+    outside = sqrt(ox * ox + oy * oy + oz * oz + 1.0e-24)
     nx = sx * choose(corner, ox / outside, fx)
     ny = sy * choose(corner, oy / outside, fy)
     nz = sz * choose(corner, oz / outside, fz)
@@ -56,13 +56,13 @@ def distance_cylinder(x: Any, y: Any, z: Any, r: Any, half: Any):
     """Signed distance and normal of a cylinder of radius r along z, between -half and half."""
     zero = full_like(x, 0.0)
     one = full_like(x, 1.0)
-    rho = root(x * x + y * y + 1.0e-24)
+    rho = sqrt(x * x + y * y + 1.0e-24)
     qr = rho - r
-    qz = size_of(z) - half
-    o = most(qr, zero)
-    oz = most(qz, zero)
-    outside = root(o * o + oz * oz + 1.0e-24)
-    inside = most(qr, qz)
+    qz = absolute(z) - half
+    o = maximum(qr, zero)
+    oz = maximum(qz, zero)
+    outside = sqrt(o * o + oz * oz + 1.0e-24)
+    inside = maximum(qr, qz)
     side = choose(qr - qz, one, zero)
     nr = choose(inside, o / outside, side)
     nz = choose(z, one, -one) * choose(inside, oz / outside, one - side)
@@ -72,8 +72,8 @@ def distance_cylinder(x: Any, y: Any, z: Any, r: Any, half: Any):
 @wp.func
 def distance_round(x: Any, y: Any, z: Any, r: Any, half: Any):
     """Signed distance and normal of a capsule along z (half > 0) or a sphere (half = 0)."""
-    d = z - most(least(z, half), -half)
-    length = root(x * x + y * y + d * d + 1.0e-24)
+    d = z - maximum(minimum(z, half), -half)
+    length = sqrt(x * x + y * y + d * d + 1.0e-24)
     return length - r, x / length, y / length, d / length
 
 
@@ -102,14 +102,14 @@ def way_in(kind: int, p: Any, u: Any, a: Any, b: Any, c: Any):
     """
     one = full_like(p.x, 1.0)
     zero = full_like(p.x, 0.0)
-    length = root(dot(u, u) + 1.0e-24)
+    length = sqrt(dot(u, u) + 1.0e-24)
     part = full_like(p.x, 0.0)  # of the way, from its start
     gap = zero
     n = vec3(zero, zero, one)
     steps = int(TRACE_STEPS)
     for _k in range(steps):
         # the shape is at least as far away as its distance says: go that far
-        part = least(part + most(gap, zero) / length, one)
+        part = minimum(part + maximum(gap, zero) / length, one)
         gap, n = distance_solid(kind, p - (one - part) * u, a, b, c)
     rest = one - part
     return gap + rest * dot(u, n), n, rest

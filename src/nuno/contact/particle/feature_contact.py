@@ -2,10 +2,10 @@
 
 Elements come colour by colour, those of one colour, which share no vertex, all at once on CUDA. Vertices come after
 them, by themselves. Of the elements that are listed for a frame few may be near within a substep, and those are known
-without a look at them: an element sleeps until anything may have come as near as it was away. Of those that are awake
+without a look at them: an element sleeps until anything may have come as near as it was away. Of those that are active
 again few are pushed.
 
-So the threads of a block first queue what is awake (`nuno.contact.particle.feature_queue`). Then a thread takes an
+So the threads of a block first queue what is active (`nuno.contact.particle.feature_queue`). Then a thread takes an
 element, at a box two do, for at two of its edges an element has two points; all find those at once, as they do not
 depend on pushes, and only then do they push, one colour after the other. What is more than the queue has room for comes
 a colour at a time, with the same bits. On the CPU a thread takes one after the other.
@@ -20,8 +20,8 @@ from nuno.contact.particle.feature_lists import DUE, EARLIEST, TRAVELLED
 from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
-from nuno.contact.particle.feature_queue import COLOUR, MOST_COLOURS, QUEUE, forget_queue, queue_active, room_of
-from nuno.numbers.lanes import add, anywhere, barrier, full_like, lane_max, mul, root, shares_work, sub  # noqa: F401
+from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
+from nuno.numbers.lanes import add, anywhere, barrier, full_like, lane_max, mul, shares_work, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import vec3
 from nuno.numbers.warps import WARP, anyone, lowest, union_of_warp
 from nuno.state.cloth_state import SPEED, Settings, Shapes
@@ -30,7 +30,7 @@ from nuno.state.cloth_state import SPEED, Settings, Shapes
 @wp.func
 def travel_of_substep(t: Any, run: Settings, shape_speed: float):
     """Return the way that vertices and shapes, up to ``shape_speed`` [m/s], may have gone in the substep before [m]."""
-    return (lane_max(root(t.notes[SPEED])) + shape_speed) * run.dt
+    return (lane_max(sqrt(t.notes[SPEED])) + shape_speed) * run.dt
 
 
 @wp.func
@@ -38,7 +38,7 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
     """Wake what may be near again of the listed elements; the others get a number below zero.
 
     Returns:
-        How many are awake of those that the thread looked at, and, if none is, when the first wakes [m].
+        How many are active of those that the thread looked at, and, if none is, when the first wakes [m].
     """
     active = int(0)
     soon = float(FAR)
@@ -72,10 +72,10 @@ def earliest_due(t: Any, soon: float, rank: int, size: int):
 
 
 @wp.func
-def push_listed(
+def push_elements(
     t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, travelled: float, queued: int, rank: int, size: int
 ):
-    """The elements that are awake against one shape: those ``queued``, or all of them in turn where that is 0."""
+    """The elements that are active against one shape: those ``queued``, or all of them in turn where that is 0."""
     like = full_like(t.x[0], 0.0)
     zero = full_like(like, 0.0)
     one = full_like(like, 1.0)
@@ -137,7 +137,7 @@ def push_listed(
                 bi = one - bj
             if shares_work(size):
                 more = 0
-                first = 1 << wp.min(c, MOST_COLOURS)
+                first = 1 << wp.min(c, MAX_COLOURS)
                 second = wp.where(points > 1, first, 0)
                 if queued > 0:
                     for which in range(points):
@@ -158,7 +158,7 @@ def push_listed(
                 while first != 0:
                     now = lowest(first)
                     for which in range(1 + ((second >> now) & 1)):
-                        if point_index == which and wp.min(colour, MOST_COLOURS) == now and anywhere(on):
+                        if point_index == which and wp.min(colour, MAX_COLOURS) == now and anywhere(on):
                             push_apart(t, h, i, j, k, bi, bj, bk, point, normal, gap, on)
                         barrier(size)
                     first = first & (first - 1)
@@ -189,7 +189,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         size: How many share the work.
 
     Returns:
-        How far these must have gone before anything is awake again [m].
+        How far these must have gone before anything is active again [m].
     """
     queued = int(0)
     active = int(0)
@@ -211,7 +211,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         soon = travelled
         for k in range(t.feature_shapes[0]):
             s = t.feature_shapes[topo.feature_colour.shape[0] + k]
-            push_listed(t, topo, run, shapes, s, travelled, queued, rank, size)
+            push_elements(t, topo, run, shapes, s, travelled, queued, rank, size)
         if queued > 0:
             forget_queue(t, topo, queued, rank, size)
     elif shares_work(size):

@@ -12,9 +12,9 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CYLINDER, FAR, PLANE
-from nuno.contact.particle.kinematic_pose import led_pose
+from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
-from nuno.numbers.lanes import add, anywhere, barrier, lane_max, least, most, mul, root, size_of, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, barrier, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import position, transposed_mul, vec3
 from nuno.state.cloth_state import CLOCK, THICKNESS, Settings, Shapes
 
@@ -28,7 +28,7 @@ TRAVELLED, EARLIEST, DUE = wp.constant(0), wp.constant(1), wp.constant(2)
 element wakes, and each, by how far anything has gone then [m]."""
 
 
-MOST_SLACK = wp.constant(100.0)
+MAX_SLACK = wp.constant(100.0)
 """[m] As far as a mark counts."""
 
 
@@ -40,7 +40,7 @@ def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
     turn = rotation_of(like, t, shapes, s * COLUMNS)
     slot = shapes.slot[s]
     if slot >= 0:
-        centre, turn = led_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+        centre, turn = kinematic_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
     return centre, turn
 
 
@@ -54,9 +54,9 @@ def stands_between(
         Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
         triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
     """
-    x = size_of(p.x)
-    y = size_of(p.y)
-    z = size_of(p.z)
+    x = absolute(p.x)
+    y = absolute(p.y)
+    z = absolute(p.z)
     # how far the box ends beyond the shape's sides: a face has two of three well inside, an edge one, a corner none
     apart = x
     along = x
@@ -65,27 +65,27 @@ def stands_between(
         qx = x + h.x - sa
         qy = y + h.y - sb
         qz = z + h.z - sc
-        apart = most(most(x - h.x - sa, y - h.y - sb), z - h.z - sc)
-        along = most(most(least(qx, qy), least(qy, qz)), least(qx, qz))
-        point = least(least(qx, qy), qz)
+        apart = maximum(maximum(x - h.x - sa, y - h.y - sb), z - h.z - sc)
+        along = maximum(maximum(minimum(qx, qy), minimum(qy, qz)), minimum(qx, qz))
+        point = minimum(minimum(qx, qy), qz)
     else:
         slim = broad - sa
-        rho = root(x * x + y * y)
-        diagonal = root(h.x * h.x + h.y * h.y)
+        rho = sqrt(x * x + y * y)
+        diagonal = sqrt(h.x * h.x + h.y * h.y)
         if kind == CYLINDER:
-            apart = most(rho - diagonal - sa, z - h.z - sb)
-            rim = least(rho + diagonal - sa, z + h.z - sb)
-            along = most(rim, slim)
-            point = least(rim, slim)
+            apart = maximum(rho - diagonal - sa, z - h.z - sb)
+            rim = minimum(rho + diagonal - sa, z + h.z - sb)
+            along = maximum(rim, slim)
+            point = minimum(rim, slim)
         else:
-            beyond = most(z - sb, 0.0)
-            size = root(diagonal * diagonal + h.z * h.z)
-            apart = root(rho * rho + beyond * beyond) - size - sa
+            beyond = maximum(z - sb, 0.0)
+            size = sqrt(diagonal * diagonal + h.z * h.z)
+            apart = sqrt(rho * rho + beyond * beyond) - size - sa
             # the outermost point is on the half ball of one end, which may stand through by half a cell
-            stands = most(sa, broad * (0.5 / ROUND) - sa)
-            point = least(slim, size + stands - root(rho * rho + (z - sb) * (z - sb)))
+            stands = maximum(sa, broad * (0.5 / ROUND) - sa)
+            point = minimum(slim, size + stands - sqrt(rho * rho + (z - sb) * (z - sb)))
             along = slim
-    return least(along, -apart), least(point, -apart)
+    return minimum(along, -apart), minimum(point, -apart)
 
 
 @wp.func
@@ -128,9 +128,9 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
             middle = (low + high) * 0.5 - centre
             w = (high - low) * 0.5
             h = vec3(
-                size_of(r.x.x) * w.x + size_of(r.y.x) * w.y + size_of(r.z.x) * w.z + grow,
-                size_of(r.x.y) * w.x + size_of(r.y.y) * w.y + size_of(r.z.y) * w.z + grow,
-                size_of(r.x.z) * w.x + size_of(r.y.z) * w.y + size_of(r.z.z) * w.z + grow,
+                absolute(r.x.x) * w.x + absolute(r.y.x) * w.y + absolute(r.z.x) * w.z + grow,
+                absolute(r.x.y) * w.x + absolute(r.y.y) * w.y + absolute(r.z.y) * w.z + grow,
+                absolute(r.x.z) * w.x + absolute(r.y.z) * w.y + absolute(r.z.z) * w.z + grow,
             )
             along, point = stands_between(kind, transposed_mul(r, middle), h, extent.x, extent.y, extent.z, broad)
             if anywhere(along):
@@ -149,7 +149,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         at_once, _point = stands_between(
                             kind, p, vec3(soon, soon, soon), extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
-                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MOST_SLACK))
+                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK))
                         mark = t.feature_mark[i]
                         if mark != 0:
                             slack = wp.min(slack, mark >> 2)
@@ -167,7 +167,7 @@ def slack_of(t: Any, topo: Any, k: int):
     """Return the way that anything must go before element k may be touched [um]; below zero for never."""
     edges = topo.side.shape[0]
     mark = int(0)
-    slack = int(1.0e6 * MOST_SLACK)
+    slack = int(1.0e6 * MAX_SLACK)
     if k < edges:
         e = topo.side[k]
         for c in range(2):

@@ -18,17 +18,17 @@ from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, SPHERE, dist
 from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
 from nuno.numbers.lanes import (  # noqa: F401
+    absolute,
     add,
     anywhere,
     choose,
     div,
     full_like,
     lane_max,
-    least,
-    most,
+    maximum,
+    minimum,
     mul,
-    root,
-    size_of,
+    sqrt,
     sub,
     to_float,
 )
@@ -38,7 +38,7 @@ STEPS = wp.constant(6)
 """Tangents looked at between two ends: the distance of a 40 mm edge from what is round by 4 mm, or from the edge of a
 box, is then found within 0.006 mm, of twenty thousand that were tried."""
 
-ROUGH = wp.constant(1.0e-5)
+EDGE_TOLERANCE = wp.constant(1.0e-5)
 """[m] What is nearer to an edge than this does not say by where it is which way is out: rounding moves it."""
 
 
@@ -48,11 +48,11 @@ def past_box_edge(a: Any, way: Any, part: Any, half: Any):
     zero = full_like(a.x, 0.0)
     one = full_like(a.x, 1.0)
     p = a + part * way
-    qx = size_of(p.x) - half.x
-    qy = size_of(p.y) - half.y
-    qz = size_of(p.z) - half.z
+    qx = absolute(p.x) - half.x
+    qy = absolute(p.y) - half.y
+    qz = absolute(p.z) - half.z
     # along the edge nothing counts
-    kx = choose(least(qy, qz) - qx, zero, one)
+    kx = choose(minimum(qy, qz) - qx, zero, one)
     kz = choose(kx * (qy - qz), zero, one)
     ky = 2.0 - kx - kz
     across = vec3(kx * way.x, ky * way.y, kz * way.z)
@@ -70,7 +70,7 @@ def past_axis(a: Any, way: Any, half: Any):
     z = a.z + part * way.z
     # beyond the axis it is nearest to its end
     end = a.z - choose(z, half, -half)
-    return choose(size_of(z) - half, (across + end * way.z) / (tiny - (flat + way.z * way.z)), part)
+    return choose(absolute(z) - half, (across + end * way.z) / (tiny - (flat + way.z * way.z)), part)
 
 
 @wp.func
@@ -91,19 +91,19 @@ def across_edge(
     zero = full_like(x, 0.0)
     one = full_like(x, 1.0)
     # outward normals f and g of the two faces that meet in the shape's edge, and the distances p and q from them
-    rho = root(x * x + y * y + 1.0e-20)
+    rho = sqrt(x * x + y * y + 1.0e-20)
     fx = x / rho
     fy = y / rho
     p = rho - a
     gy = zero
     gz = choose(z, one, -one)
-    q = size_of(z) - b
+    q = absolute(z) - b
     if kind == BOX:
-        qx = size_of(x) - a
-        qy = size_of(y) - b
-        qz = size_of(z) - c
+        qx = absolute(x) - a
+        qy = absolute(y) - b
+        qz = absolute(z) - c
         # along the edge the point is the deepest
-        kx = choose(least(qy, qz) - qx, zero, one)
+        kx = choose(minimum(qy, qz) - qx, zero, one)
         kz = choose(kx * (qy - qz), zero, one)
         gy = choose(y, one, -one)
         fx = choose(x, one, -one) * kx
@@ -115,18 +115,18 @@ def across_edge(
     # across the edge, where the shape's edge is a point
     lf = fx * way.x + fy * way.y
     lg = gy * way.y + gz * way.z
-    mf = size_of(lg)
-    mg = size_of(lf)
+    mf = absolute(lg)
+    mg = absolute(lf)
     lean = choose(mf - mg, one, -one)
     alike = lf * lg
     mf = mf * choose(alike, lean, one)
     mg = mg * choose(alike, -lean, one)
-    size = root(lf * lf + lg * lg + 1.0e-20)
+    size = sqrt(lf * lf + lg * lg + 1.0e-20)
     mf = mf / size
     mg = mg / size
     deep = mf * p + mg * q
-    on = least(least(ROUGH - gap, deep + deepest), least(mf, mg) + SLANT)
-    on = least(on, size - SLANT * root(dot(way, way)))
+    on = minimum(minimum(EDGE_TOLERANCE - gap, deep + deepest), minimum(mf, mg) + SLANT)
+    on = minimum(on, size - SLANT * sqrt(dot(way, way)))
     out = vec3(mf * fx, mf * fy + mg * gy, mg * gz)
     return choose(on, deep, gap), choose(on, out, normal)
 
@@ -151,7 +151,7 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
     one = full_like(like, 1.0)
     a = transposed_mul(h.rotation, to_float(start_position(t, i) - h.centre))
     way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
-    half = vec3(size_of(way.x) * 0.5 + h.reach, size_of(way.y) * 0.5 + h.reach, size_of(way.z) * 0.5 + h.reach)
+    half = vec3(absolute(way.x) * 0.5 + h.reach, absolute(way.y) * 0.5 + h.reach, absolute(way.z) * 0.5 + h.reach)
     on, _point = stands_between(h.kind, a + way * 0.5, half, h.size.x, h.size.y, h.size.z, h.broad)
     tiny = -full_like(like, 1.0e-12)
     part = zero
@@ -165,11 +165,11 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
         da = dot(n, way)
         fb, n = distance_solid(h.kind, a + way, h.size.x, h.size.y, h.size.z)
         db = dot(n, way)
-        part = (fb - db - fa) / least(da - db, tiny)
+        part = (fb - db - fa) / minimum(da - db, tiny)
         # nowhere is it nearer than at the lower end or, if both slopes fall inwards, where the ends' tangents cross
-        near = least(near, h.reach - least(least(fa, fb), choose(least(-da, db), fa + da * part, fa)))
+        near = minimum(near, h.reach - minimum(minimum(fa, fb), choose(minimum(-da, db), fa + da * part, fa)))
         # over a face both ends see the same slope, which one may lose within the substep
-        on = least(least(-da, db) + h.reach - h.radius, near)
+        on = minimum(minimum(-da, db) + h.reach - h.radius, near)
     due_after(t, entry, travelled, near)
     at = zero
     gap = zero
@@ -181,24 +181,24 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
         if h.kind == BOX:
             steps = 1
             part = past_box_edge(a, way, part, h.size)
-            part = most(zero, least(one, part))
+            part = maximum(zero, minimum(one, part))
             # over two edges with a face between, it lies on both: on one at a time it would rock
-            left = most(zero, least(one, past_box_edge(a, way, zero, h.size)))
-            right = most(zero, least(one, past_box_edge(a, way, one, h.size)))
+            left = maximum(zero, minimum(one, past_box_edge(a, way, zero, h.size)))
+            right = maximum(zero, minimum(one, past_box_edge(a, way, one, h.size)))
             other = choose(left + right - part - part, right, left)
-            apart = size_of(other - part) - h.radius * 2.0 / (root(dot(way, way)) - tiny)
-            if anywhere(least(on, apart)):
+            apart = absolute(other - part) - h.radius * 2.0 / (sqrt(dot(way, way)) - tiny)
+            if anywhere(minimum(on, apart)):
                 more = 1
             if point_index > 0:
                 part = other
-                on = least(on, apart)
+                on = minimum(on, apart)
         elif h.kind == SPHERE or h.kind == CAPSULE:
             steps = 1
             part = past_axis(a, way, h.size.y)
         low = zero
         high = one
         for _k in range(steps):
-            at = most(low, least(high, part))
+            at = maximum(low, minimum(high, part))
             gap, normal = distance_solid(h.kind, a + at * way, h.size.x, h.size.y, h.size.z)
             slope = dot(normal, way)
             low = choose(slope, low, at)
@@ -207,9 +207,9 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
             high = choose(slope, at, high)
             fb = choose(slope, gap, fb)
             db = choose(slope, slope, db)
-            part = (fb - db * high - fa + da * low) / least(da - db, tiny)
+            part = (fb - db * high - fa + da * low) / minimum(da - db, tiny)
         point = a + at * way
-        if (h.kind == BOX or h.kind == CYLINDER) and anywhere(ROUGH - gap):
+        if (h.kind == BOX or h.kind == CYLINDER) and anywhere(EDGE_TOLERANCE - gap):
             gap, normal = across_edge(
                 h.kind, point, way, gap, normal, h.size.x, h.size.y, h.size.z, 0.5 * cell
             )  # fmt: skip
@@ -217,11 +217,11 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
         # parts nothing
         slope = dot(normal, way) / (dot(way, way) - tiny)
         normal = normal - slope * way
-        size = root(dot(normal, normal) + 1.0e-20)
+        size = sqrt(dot(normal, normal) + 1.0e-20)
         normal = normal / size
-        gap = (gap - h.radius) / most(size, SLANT)
-        gap = gap - least(gap, zero) * PATIENCE
-        on = least(least(on, size - SLANT), least(at, one - at))
+        gap = (gap - h.radius) / maximum(size, SLANT)
+        gap = gap - minimum(gap, zero) * PATIENCE
+        on = minimum(minimum(on, size - SLANT), minimum(at, one - at))
         if point_index > 0 and more == 0:
             on = -one
     return on, more, at, point, normal, gap
@@ -243,8 +243,8 @@ def triangle_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int,
     way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
     m = transposed_mul(h.rotation, start_position(t, k) - start_position(t, i))
     o = (way + m) * third
-    far = most(dot(way - o, way - o), dot(m - o, m - o))
-    size = root(most(dot(o, o), far)) + h.reach
+    far = maximum(dot(way - o, way - o), dot(m - o, m - o))
+    size = sqrt(maximum(dot(o, o), far)) + h.reach
     _along, on = stands_between(h.kind, a + o, vec3(size, size, size), h.size.x, h.size.y, h.size.z, h.broad)
     due_after(t, entry, travelled, on)
     bj = zero
@@ -256,18 +256,18 @@ def triangle_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int,
         n = cross(way, m)
         nn = dot(n, n) + 1.0e-20
         # away from the shape's middle
-        normal = n * (choose(dot(n, a), one, -one) / root(nn))
+        normal = n * (choose(dot(n, a), one, -one) / sqrt(nn))
         point = outermost(h.kind, normal, h.size.x, h.size.y, h.size.z)
         d = point - a
         gap = -dot(d, normal)
         # weights of the vertices where the shape's point is over the triangle
         bj = dot(cross(d, m), n) / nn
         bk = dot(cross(way, d), n) / nn
-        on = least(least(one - bj - bk, least(bj, bk)), least(h.reach - gap, gap + 0.5 * cell))
+        on = minimum(minimum(one - bj - bk, minimum(bj, bk)), minimum(h.reach - gap, gap + 0.5 * cell))
         # the triangle's point
         point = point + gap * normal
         gap = gap - h.radius
-        gap = gap - least(gap, zero) * PATIENCE
+        gap = gap - minimum(gap, zero) * PATIENCE
     return on, bj, bk, point, normal, gap
 
 
@@ -283,7 +283,7 @@ def outermost(kind: int, n: Any, a: Any, b: Any, c: Any):
         y = choose(n.y, one, -one) * b
         z = choose(n.z, one, -one) * c
     elif kind == CYLINDER:
-        rho = root(n.x * n.x + n.y * n.y + 1.0e-20)
+        rho = sqrt(n.x * n.x + n.y * n.y + 1.0e-20)
         x = x / rho
         y = y / rho
     else:

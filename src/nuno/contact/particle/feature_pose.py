@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.contact.particle.feature_lists import QUICK, ROUND, pose_of
 from nuno.contact.particle.shape_contact import COLUMNS, LEAVE_SPEED, three_of
-from nuno.numbers.lanes import add, choose, full_like, lane, lane_max, mul, per_world, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, choose, full_like, lane, lane_max, mul, per_world, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import LaneMat3, LaneVec3, Mat3, Vec3
 from nuno.state.cloth_state import CLOCK, FRICTION, THICKNESS, Settings, Shapes
 
@@ -53,7 +53,7 @@ def measured(h: Any, like: Any, t: Any, run: Settings, shapes: Shapes, s: int):
         h.d = turn_after - rotation
     row = s * COLUMNS
     h.size = three_of(like, t, shapes, row + 12)
-    mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15))
+    mean = sqrt(t.scalars[FRICTION] * per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 15))
     pair = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 16)
     h.mu = choose(pair + 0.5, pair, mean)
     h.radius = t.scalars[THICKNESS] * 0.5

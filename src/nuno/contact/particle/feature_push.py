@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import add, anywhere, choose, div, full_like, least, most, mul, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, anywhere, choose, div, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, less_product, move, position, start_position
 
 PATIENCE = wp.constant(0.8)
@@ -43,7 +43,7 @@ def push_apart(
         u = less_product(u - h.e, h.d, p)
     n = h.rotation * local
     depth = gap + u.x * n.x + u.y * n.y + u.z * n.z
-    touching = least(on, -depth)
+    touching = minimum(on, -depth)
     if anywhere(touching):
         give_way(t, i, j, k, bi, bj, bk, depth, n, u, h.mu, h.leave, touching)
 
@@ -59,9 +59,9 @@ def give_way(
     """
     zero = full_like(gap, 0.0)
     un = dot(u, n)
-    push = least(most(-gap, zero), most(leave - un, zero))
+    push = minimum(maximum(-gap, zero), maximum(leave - un, zero))
     slip = u - un * n
-    hold = least(mu * push / root(dot(slip, slip) + 1.0e-24), 1.0)
+    hold = minimum(mu * push / sqrt(dot(slip, slip) + 1.0e-24), 1.0)
     way = push * n - hold * slip
     wi = bi * t.w[i]
     wj = bj * t.w[j]

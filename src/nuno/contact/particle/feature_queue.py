@@ -1,6 +1,6 @@
 """Work queue of the edges and triangles that are active at sharp shapes, filled colour by colour by a CUDA block.
 
-A warp takes a colour. All are counted first, and each warp then knows where what is awake of its colours belongs.
+A warp takes a colour. All are counted first, and each warp then knows where what is active of its colours belongs.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ QUEUE = wp.constant(35)
 """Place in it where the queue begins: places in the list, and colours."""
 COLOUR = wp.constant(1 << 24)
 """By which a colour is multiplied in the queue."""
-MOST_COLOURS = wp.constant(31)
+MAX_COLOURS = wp.constant(31)
 """Colours that fit the bits of a number, and the tally."""
 ROOM = wp.constant(2048)
 """Elements that are queued at most."""
@@ -29,7 +29,7 @@ ROOM = wp.constant(2048)
 def room_of(topo: Any):
     """Return how many elements fit into the queue; none where there are more colours than it can tell apart."""
     room = int(0)
-    if topo.feature_colour.shape[0] - 1 <= MOST_COLOURS:
+    if topo.feature_colour.shape[0] - 1 <= MAX_COLOURS:
         room = wp.clamp(4 * topo.particles - QUEUE, 0, ROOM)
     return room
 
@@ -45,7 +45,7 @@ def due_of(t: Any, k: int, last: int):
 
 @wp.func
 def enqueue(t: Any, travelled: float, due: float, place: int, c: int, k: int, lane: int):
-    """Queue entry k where it is awake; the place behind what the warp's threads queued."""
+    """Queue entry k where it is active; the place behind what the warp's threads queued."""
     yes = travelled >= due
     among = vote(yes)
     if yes:
@@ -56,7 +56,7 @@ def enqueue(t: Any, travelled: float, due: float, place: int, c: int, k: int, la
 
 @wp.func
 def queue_active(t: Any, topo: Any, travelled: float, room: int, rank: int, size: int):
-    """Queue what is awake of the listed elements, unless it is more than there is room for.
+    """Queue what is active of the listed elements, unless it is more than there is room for.
 
     Args:
         t: The state.
@@ -67,7 +67,7 @@ def queue_active(t: Any, topo: Any, travelled: float, room: int, rank: int, size
         size: How many share the work, whole warps.
 
     Returns:
-        How many are awake, and, of those that the thread looked at and if none is, when the first wakes [m].
+        How many are active, and, of those that the thread looked at and if none is, when the first wakes [m].
     """
     colours = topo.feature_colour.shape[0] - 1
     lane = rank % WARP

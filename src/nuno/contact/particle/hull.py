@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import add, anywhere, choose, div, full_like, least, most, mul, size_of, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, choose, div, full_like, maximum, minimum, mul, sub  # noqa: F401
 from nuno.state.cloth_state import Shapes
 
 FAR = wp.constant(1.0e6)
@@ -15,8 +15,8 @@ FAR = wp.constant(1.0e6)
 
 
 @wp.func
-def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
-    """Signed distance and normal of a convex hull by the planes of its faces; what is not ``near`` [m] may be nearer.
+def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, margin: Any):
+    """Signed distance and normal of a convex hull by the planes of its faces; what is not ``margin`` [m] may be nearer.
 
     Beyond an edge it is the distance from the farther plane, which is less than that from the edge.
     """
@@ -33,7 +33,7 @@ def distance_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, near: Any):
         nx = choose(above, f[0], nx)
         ny = choose(above, f[1], ny)
         nz = choose(above, f[2], nz)
-        if not anywhere(near - gap):
+        if not anywhere(margin - gap):
             break
     return gap, nx, ny, nz
 
@@ -58,14 +58,14 @@ def way_into_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, ux: Any, uy: A
         f = shapes.planes[k]
         end = x * f[0] + y * f[1] + z * f[2] - f[3]
         start = end - (ux * f[0] + uy * f[1] + uz * f[2])
-        part = size_of(start) / most(size_of(end - start), 1.0e-12)
+        part = absolute(start) / maximum(absolute(end - start), 1.0e-12)
         outside = choose(end, one, zero)
-        relative_to = most(relative_to, choose(start, outside, zero))
-        earliest = least(earliest, choose(start, one, choose(end, part, one)))
+        relative_to = maximum(relative_to, choose(start, outside, zero))
+        earliest = minimum(earliest, choose(start, one, choose(end, part, one)))
         later = choose(start, part - outside * part, zero) - latest
         latest = choose(later, part, latest)
         gap = choose(later, end, gap)
         nx = choose(later, f[0], nx)
         ny = choose(later, f[1], ny)
         nz = choose(later, f[2], nz)
-    return gap, nx, ny, nz, choose(relative_to, zero, least(latest, earliest - latest))
+    return gap, nx, ny, nz, choose(relative_to, zero, minimum(latest, earliest - latest))

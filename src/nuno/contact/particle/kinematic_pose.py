@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import add, div, full_like, mul, per_world, root, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, mul, per_world, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import mat3, vec3
 from nuno.state.cloth_state import Shapes
 
@@ -67,7 +67,7 @@ def kinematic_rotation(like: Any, shapes: Shapes, slot: int, clock: int, group: 
     y = kinematic_number(like, shapes, entry + 2, part, group, worlds)
     z = kinematic_number(like, shapes, entry + 3, part, group, worlds)
     one = full_like(w, 1.0)
-    scale = one / root(w * w + x * x + y * y + z * z)
+    scale = one / sqrt(w * w + x * x + y * y + z * z)
     w = w * scale
     x = x * scale
     y = y * scale
@@ -85,7 +85,7 @@ def kinematic_rotation(like: Any, shapes: Shapes, slot: int, clock: int, group: 
 
 
 @wp.func
-def led_pose(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, origin: Any):
+def kinematic_pose(like: Any, shapes: Shapes, slot: int, clock: int, group: int, worlds: int, origin: Any):
     """Position [m] relative to the origin, and rotation, shape to world."""
     x, y, z = kinematic_position(like, shapes, slot, clock, group, worlds, origin.x, origin.y, origin.z)
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = kinematic_rotation(like, shapes, slot, clock, group, worlds)

@@ -24,7 +24,7 @@ from nuno.contact.particle.distances import (
     way_in,
 )
 from nuno.contact.particle.hull import distance_hull, way_into_hull
-from nuno.contact.particle.kinematic_pose import kinematic_position, led_pose
+from nuno.contact.particle.kinematic_pose import kinematic_pose, kinematic_position
 from nuno.numbers.element_access import at
 from nuno.numbers.lanes import (  # noqa: F401
     add,
@@ -33,11 +33,11 @@ from nuno.numbers.lanes import (  # noqa: F401
     div,
     full_like,
     lane_max,
-    least,
-    most,
+    maximum,
+    minimum,
     mul,
     per_world,
-    root,
+    sqrt,
     sub,
     to_float,
 )
@@ -65,9 +65,9 @@ def push_out(t: Any, i: int, gap: Any, n: Any, u: Any, un: Any, mu: Any, leave: 
     shape's surface moved, un = u . n, and u_t = u - un n.
     """
     zero = full_like(gap, 0.0)
-    push = least(most(-gap, zero), most(leave - un, zero))
+    push = minimum(maximum(-gap, zero), maximum(leave - un, zero))
     slip = u - un * n
-    hold = least(mu * push / root(dot(slip, slip) + 1.0e-24), 1.0)
+    hold = minimum(mu * push / sqrt(dot(slip, slip) + 1.0e-24), 1.0)
     free = choose(at(t.w, i), 1.0, zero)
     put_position(t, i, position(t, i) + push * free * n - hold * free * slip)
 
@@ -77,14 +77,14 @@ def push_out(t: Any, i: int, gap: Any, n: Any, u: Any, un: Any, mu: Any, leave: 
 
 
 @wp.func
-def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, near: Any):
+def distance_shape(shapes: Shapes, s: int, kind: int, x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, margin: Any):
     """Signed distance and normal of shape s, of a mesh those of its bounding box."""
     if kind < SOLID_MESH:
         solid, n = distance_solid(kind, vec3(x, y, z), a, b, c)
         return solid, n.x, n.y, n.z
     gap, nx, ny, nz = distance_box(x, y, z, a, b, c)
-    if kind == HULL and anywhere(near - gap):
-        return distance_hull(shapes, s, x, y, z, near)
+    if kind == HULL and anywhere(margin - gap):
+        return distance_hull(shapes, s, x, y, z, margin)
     return gap, nx, ny, nz
 
 
@@ -141,7 +141,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
     centre = three_of(like, t, shapes, row) - origin
     r = rotation_of(like, t, shapes, row)
     extent = three_of(like, t, shapes, row + 12)
-    mean = root(t.scalars[FRICTION] * per_world(like, shapes.table, g, shapes.stride, w, row + 15))
+    mean = sqrt(t.scalars[FRICTION] * per_world(like, shapes.table, g, shapes.stride, w, row + 15))
     pair = per_world(like, shapes.table, g, shapes.stride, w, row + 16)
     mu = choose(pair + 0.5, pair, mean)
     radius = t.scalars[THICKNESS] * 0.5 + per_world(like, shapes.table, g, shapes.stride, w, row + 17)
@@ -153,26 +153,26 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
     d = r
     if slot >= 0:
         clock = int(lane_max(t.notes[CLOCK]))
-        before, turn_before = led_pose(like, shapes, slot, clock - 1, g, w, origin)
-        centre, r = led_pose(like, shapes, slot, clock, g, w, origin)
+        before, turn_before = kinematic_pose(like, shapes, slot, clock - 1, g, w, origin)
+        centre, r = kinematic_pose(like, shapes, slot, clock, g, w, origin)
         e = centre - before
         d = r - turn_before
     # what comes nearer than this may have passed through within the substep
-    near = radius + FAST * dt
+    margin = radius + FAST * dt
     for i in range(rank, n, size):
         # in the shape's frame
         p = transposed_mul(r, to_float(position(t, i) - centre))
-        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, extent.x, extent.y, extent.z, near)
-        if anywhere(near - gap):
+        gap, nx, ny, nz = distance_shape(shapes, s, kind, p.x, p.y, p.z, extent.x, extent.y, extent.z, margin)
+        if anywhere(margin - gap):
             u = less_surface(slot, position(t, i) - start_position(t, i), e, d, p)
             local = vec3(nx, ny, nz)
             normal = r * local
             un = dot(u, normal)
             # start and end on one side of a plane that touches a convex shape are on one side of the shape
-            passed = -least(gap, gap - un)
+            passed = -minimum(gap, gap - un)
             # a lane is looked at because another is near: what is swifter must not see more than it would alone
-            within = near - gap
-            passed = least(passed, within)
+            within = margin - gap
+            passed = minimum(passed, within)
             if kind == SOLID_MESH or kind == SHELL_MESH:
                 way = transposed_mul(r, u)
                 deep, ax, ay, az = gap_mesh(
@@ -182,7 +182,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
                 push_out(t, i, deep - radius, out, u, dot(u, out), mu, leave)
             elif kind != PLANE and anywhere(passed):
                 deep, entered, met = way_into(shapes, s, kind, p, transposed_mul(r, u), extent.x, extent.y, extent.z)
-                met = least(met, passed)
+                met = minimum(met, passed)
                 out = r * choose(met, entered, local)
                 push_out(t, i, choose(met, deep, gap) - radius, out, u, dot(u, out), mu, leave)
             elif anywhere(radius - gap):
@@ -210,14 +210,14 @@ def grow_box(box: wp.array(dtype=float), k: int, lo: float, hi: float, rank: int
             wp.atomic_min(box, k, low)
             wp.atomic_max(box, 3 + k, high)
     else:
-        box[k] = least(box[k], lo)
-        box[3 + k] = most(box[3 + k], hi)
+        box[k] = minimum(box[k], lo)
+        box[3 + k] = maximum(box[3 + k], hi)
 
 
 @wp.func
 def grow_box(box: wp.array(dtype=Any), k: int, lo: Any, hi: Any, rank: int, size: int):
-    box[k] = least(box[k], lo)
-    box[3 + k] = most(box[3 + k], hi)
+    box[k] = minimum(box[k], lo)
+    box[3 + k] = maximum(box[3 + k], hi)
 
 
 @wp.func
@@ -230,12 +230,12 @@ def measure_box(t: Any, n: int, rank: int, size: int):
     hy = ly
     hz = lz
     for i in range(rank, n, size):
-        lx = least(lx, at(t.x, i))
-        ly = least(ly, at(t.y, i))
-        lz = least(lz, at(t.z, i))
-        hx = most(hx, at(t.x, i))
-        hy = most(hy, at(t.y, i))
-        hz = most(hz, at(t.z, i))
+        lx = minimum(lx, at(t.x, i))
+        ly = minimum(ly, at(t.y, i))
+        lz = minimum(lz, at(t.z, i))
+        hx = maximum(hx, at(t.x, i))
+        hy = maximum(hy, at(t.y, i))
+        hz = maximum(hz, at(t.z, i))
     grow_box(t.box, 0, lx, hx, rank, size)
     grow_box(t.box, 1, ly, hy, rank, size)
     grow_box(t.box, 2, lz, hz, rank, size)
@@ -245,7 +245,7 @@ def measure_box(t: Any, n: int, rank: int, size: int):
 def along_box(t: Any, shapes: Shapes, row: int, axis: int, centre: Any):
     """The least of the box's corners along a plane's normal, by one coordinate."""
     n = per_world(centre, shapes.table, t.group, shapes.stride, t.worlds, row + 5 + 3 * axis)
-    return least(n * (t.box[axis] - centre), n * (t.box[3 + axis] - centre))
+    return minimum(n * (t.box[axis] - centre), n * (t.box[3 + axis] - centre))
 
 
 @wp.func
@@ -255,7 +255,7 @@ def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
     That is within ``ahead`` seconds.
     """
     # 1.5 times the present speed, what gravity adds in the time, and 2 cm for what constraints throw
-    grow = root(t.notes[SPEED]) * (1.5 * ahead) + (10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
+    grow = sqrt(t.notes[SPEED]) * (1.5 * ahead) + (10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
     # and as far as the fastest shape may throw it
     return grow + shapes.shape_speed[0] * ahead
 
@@ -282,10 +282,10 @@ def select_shapes(t: Any, shapes: Shapes, ahead: float, rank: int, size: int):
             ay = t.scalars[ORIGIN + 1]
             az = t.scalars[ORIGIN + 2]
             cx, cy, cz = kinematic_position(like, shapes, slot, clock, t.group, t.worlds, ax, ay, az)
-        ox = most(t.box[0] - cx, cx - t.box[3])
-        oy = most(t.box[1] - cy, cy - t.box[4])
-        oz = most(t.box[2] - cz, cz - t.box[5])
-        far = most(ox, most(oy, oz))
+        ox = maximum(t.box[0] - cx, cx - t.box[3])
+        oy = maximum(t.box[1] - cy, cy - t.box[4])
+        oz = maximum(t.box[2] - cz, cz - t.box[5])
+        far = maximum(ox, maximum(oy, oz))
         if shapes.kind[s] == PLANE and slot < 0:
             # as far as the corner of the box that is the nearest
             far = along_box(t, shapes, row, 0, cx) + along_box(t, shapes, row, 1, cy) + along_box(t, shapes, row, 2, cz)

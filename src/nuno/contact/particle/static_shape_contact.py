@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno.contact.particle.distances import BOX, PLANE, SOLID_MESH, distance_solid, way_in
 from nuno.contact.particle.shape_contact import COLUMNS, FAST, LEAVE_SPEED, origin_of, push_out, touch_shape
-from nuno.numbers.lanes import mul, sub, to_float, window  # noqa: F401 (mul, sub: Warp takes them for the operators)
+from nuno.numbers.lanes import mul, sub, subarray, to_float  # noqa: F401 (mul, sub: Warp takes them for the operators)
 from nuno.numbers.vec3 import dot, mat3, position, start_position, transposed_mul, vec3
 from nuno.state.cloth_state import FRICTION, THICKNESS, Shapes
 
@@ -18,7 +18,7 @@ from nuno.state.cloth_state import FRICTION, THICKNESS, Shapes
 @wp.func
 def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, size: int):
     """All particles against one such shape."""
-    row = window(shapes.table, t.group * shapes.stride + s * COLUMNS, COLUMNS)
+    row = subarray(shapes.table, t.group * shapes.stride + s * COLUMNS, COLUMNS)
     centre = vec3(row[0], row[1], row[2]) - origin_of(t)
     r = mat3(vec3(row[3], row[4], row[5]), vec3(row[6], row[7], row[8]), vec3(row[9], row[10], row[11]))
     sa = row[12]
@@ -29,7 +29,7 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
         mu = wp.sqrt(t.scalars[FRICTION] * row[15])
     radius = t.scalars[THICKNESS] * 0.5 + row[17]
     kind = shapes.kind[s]
-    near = radius + FAST * dt
+    margin = radius + FAST * dt
     for i in range(rank, n, size):
         # in the shape's frame
         p = transposed_mul(r, to_float(position(t, i) - centre))
@@ -41,9 +41,9 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
             nearest = 0.0
         gap = float(nearest)
         local = vec3(0.0, 0.0, 1.0)
-        if near - nearest > 0.0 and kind != PLANE:
+        if margin - nearest > 0.0 and kind != PLANE:
             gap, local = distance_solid(kind, p, sa, sb, sc)
-        if near - gap > 0.0:
+        if margin - gap > 0.0:
             u = position(t, i) - start_position(t, i)
             normal = r * local
             un = dot(u, normal)

@@ -1,18 +1,18 @@
 """Flat regions of a sheet, where nothing can be near itself, found by the threads of a CUDA block.
 
-Most pairs of blocks that are near each other are neighbours on the sheet. Those that lie in one flat region of its grid
+Most pairs of leaves that are near each other are neighbours on the sheet. Those that lie in one flat region of its grid
 are passed over. The search's flags stand in `State.moved`, which is zero between the passes over contacts.
 """
 
 import warp as wp
 
 from nuno.state.cloth_state import StateFloat, Topology
-from nuno.topology.leaves import WINDOW
+from nuno.topology.leaves import FLAT_SIDE
 
-SIDE = wp.constant(WINDOW)
-"""Vertices along a side of a window."""
+SIDE = wp.constant(FLAT_SIDE)
+"""Vertices along a side of a square."""
 ROUNDING = wp.constant(1.001)
-"""Factor by which the lines of a window must be farther apart than asked for."""
+"""Factor by which the lines of a square must be farther apart than asked for."""
 
 
 @wp.func
@@ -29,7 +29,7 @@ def vertex(t: StateFloat, k: int):
 
 @wp.func
 def uncreased(t: StateFloat, at: int, columns: int, far: float):
-    """Return whether the diagonals of the window of 3 by 3 vertices from ``at`` on keep a distance."""
+    """Return whether the diagonals of the square of 3 by 3 vertices from ``at`` on keep a distance."""
     d = vertex(t, at + 2) - vertex(t, at + 2 * columns)
     gap = float(1.0e30)
     before = float(-2.0e30)
@@ -48,7 +48,7 @@ def uncreased(t: StateFloat, at: int, columns: int, far: float):
 
 @wp.func
 def apart(t: StateFloat, at: int, step: int, other: int, far: float):
-    """Return whether the lines of a window, ``step`` from one to the next, keep a distance."""
+    """Return whether the lines of a square, ``step`` from one to the next, keep a distance."""
     side = int(SIDE)
     d = wp.vec3(0.0, 0.0, 0.0)
     for j in range(side):
@@ -70,7 +70,7 @@ def apart(t: StateFloat, at: int, step: int, other: int, far: float):
 
 @wp.func
 def mark_uncreased(t: StateFloat, topo: Topology, far: float, rank: int, size: int):
-    """Flag the lowest vertices of windows of 3 by 3 vertices that have no crease."""
+    """Flag the lowest vertices of squares of 3 by 3 vertices that have no crease."""
     columns = topo.columns
     if columns > 0:
         interior = columns - 2
@@ -110,7 +110,7 @@ def forget_flat(t: StateFloat, topo: Topology, rank: int, size: int):
 
 @wp.func
 def in_flat(t: StateFloat, topo: Topology, a: int, b: int):
-    """Return whether two blocks lie in one flat region, so that no two of their elements are near."""
+    """Return whether two leaves lie in one flat region, so that no two of their elements are near."""
     columns = topo.columns
     flat = bool(False)
     if columns > 0:

@@ -35,12 +35,12 @@ def rebuild_by_block(t: StateFloat, topo: Topology, run: Settings, rank: int, si
         dy = t.reference[3 * n + 1] + t.reference[3 * n + 4]
         dz = t.reference[3 * n + 2] + t.reference[3 * n + 5]
         travelled = t.reference[3 * n + TRAVELLED] + wp.sqrt(dx * dx + dy * dy + dz * dz)
-        # before the next measure, points of blocks that are not listed may close in by the margin once more
+        # before the next measure, points of leaves that are not listed may close in by the margin once more
         again = lost or travelled + run.margin > t.reference[3 * n + WIDTH] - run.margin
-        most = float(0.0)
+        worst = float(0.0)
         if not again:
-            most = closed_in(t, topo, run.margin, rank, size)
-        if anyone(again or most > left):
+            worst = closed_in(t, topo, run.margin, rank, size)
+        if anyone(again or worst > left):
             fresh = 1
             if rank == 0:
                 begin_list(t)
@@ -71,7 +71,7 @@ def rebuild_by_block(t: StateFloat, topo: Topology, run: Settings, rank: int, si
         else:
             if rank == 0:
                 t.notes[TRAVEL] = 0.0
-            high = warp_max(0.5 * most, size)
+            high = warp_max(0.5 * worst, size)
             barrier(size)
             if leads_warp(rank, size):
                 wp.atomic_max(t.notes, TRAVEL, high)

@@ -1,7 +1,7 @@
 """The listing of self-contact pairs by the many threads of a CUDA block.
 
-The pairs of blocks that may have near elements are queued. A warp takes a few of them at a time, and looks at four
-together, with eight threads each, for a block of a sheet has eight triangles and eight edges. It notes the pairs of
+The pairs of leaves that may have near elements are queued. A warp takes a few of them at a time, and looks at four
+together, with eight threads each, for a leaf of a sheet has eight triangles and eight edges. It notes the pairs of
 elements whose spheres meet, its suspects, and where these are enough for all its threads it lists those that are near.
 No warp waits for another. The queue and the suspects stand in the room of the picked pairs, which are picked anew once
 the list is made.
@@ -11,14 +11,14 @@ import warp as wp
 
 from nuno.contact.self.block_flat_regions import in_flat
 from nuno.contact.self.narrow_phase import append, near_edges, near_triangle
-from nuno.numbers.lanes import barrier, window
+from nuno.numbers.lanes import barrier, subarray
 from nuno.numbers.warps import WARP, claim, sync_warp, warp_broadcast
 from nuno.state.cloth_state import MISSED_ELEMENTS, StateFloat, Topology
 
 BATCH, LONG_BATCH = wp.constant(8), wp.constant(24)
-"""Pairs of blocks that a warp takes from the queue at a time, where blocks help and where none does."""
+"""Pairs of leaves that a warp takes from the queue at a time, where blocks help and where none does."""
 TOGETHER = wp.constant(4)
-"""Pairs of blocks that it looks at side by side."""
+"""Pairs of leaves that it looks at side by side."""
 ENOUGH = wp.constant(128)
 """Suspects from which on a warp examines them."""
 
@@ -63,7 +63,7 @@ for (int step = v; __any_sync(all, step - v < longest); step += 8) {
         if (step < edges) {
             const float4 s = spheres[offset + eb + step];
             const int g0 = edge.data[eb + step][0], g1 = edge.data[eb + step][1];
-            // of a block with itself each pair once
+            // of a leaf with itself each pair once
             const int stop = min(begin + 32, a == b ? step : rows);
             for (int row = begin; row < stop; ++row) {
                 const float4 r = spheres[offset + ea + row];
@@ -114,20 +114,20 @@ def suspect(
     room: wp.array(dtype=int),
     before: int,
 ) -> int:
-    """Note the elements of four pairs of blocks whose spheres meet: eight threads a pair, each an element of one.
+    """Note the elements of four pairs of leaves whose spheres meet: eight threads a pair, each an element of one.
 
-    A suspect is two numbers. The places in the blocks of a vertex and a triangle are noted in the first half of the
+    A suspect is two numbers. The places in the leaves of a vertex and a triangle are noted in the first half of the
     room, those of two edges in the second.
 
     Args:
-        queue: Pairs of blocks.
+        queue: Pairs of leaves.
         first: The first of these four.
         last: One past the last in the queue.
         x: Coordinates; so are ``y`` and ``z`` [m].
         y: See ``x``.
         z: See ``x``.
-        vertex_start: Where the vertices of each block start; so for faces and edges.
-        vertex: The blocks' vertices.
+        vertex_start: Where the vertices of each leaf start; so for faces and edges.
+        vertex: The leaves' vertices.
         face_start: See ``vertex_start``.
         face: Their triangles.
         edge_start: See ``vertex_start``.
@@ -164,7 +164,7 @@ def examine(t: StateFloat, topo: Topology, far2: float, room: wp.array(dtype=int
 
 @wp.func
 def queue_leaf_pairs(t: StateFloat, topo: Topology, far: float, rank: int, size: int):
-    """Queue the listed pairs of blocks whose boxes meet and where the cloth is not flat; how many these are."""
+    """Queue the listed pairs of leaves whose boxes meet and where the cloth is not flat; how many these are."""
     pairs = t.near_leaves[0]
     room = t.active_triangle.shape[0]
     barrier(size)
@@ -177,8 +177,8 @@ def queue_leaf_pairs(t: StateFloat, topo: Topology, far: float, rank: int, size:
         on = int(0)
         if k < pairs:
             pair = t.near_leaves[1 + k]
-            a = window(t.bounds, 6 * (pair >> 16), 6)
-            b = window(t.bounds, 6 * (pair & 0xFFFF), 6)
+            a = subarray(t.bounds, 6 * (pair >> 16), 6)
+            b = subarray(t.bounds, 6 * (pair & 0xFFFF), 6)
             gx = wp.min(a[3] - b[0], b[3] - a[0])
             gy = wp.min(a[4] - b[1], b[4] - a[1])
             gz = wp.min(a[5] - b[2], b[5] - a[2])
@@ -197,7 +197,7 @@ def search_batch(t: StateFloat, topo: Topology, far: float, first: int, last: in
     """List the near elements of the queued pairs first to last: a warp's work."""
     # two halves of pairs of numbers
     half = t.active_edge.shape[0] / (size / WARP) / 4
-    room = window(t.active_edge, rank / WARP * 4 * half, 4 * half)
+    room = subarray(t.active_edge, rank / WARP * 4 * half, 4 * half)
     counts = int(0)
     together = int(TOGETHER)
     k = int(first)
@@ -224,7 +224,7 @@ def search_batch(t: StateFloat, topo: Topology, far: float, first: int, last: in
 
 @wp.func
 def find_in_batches(t: StateFloat, topo: Topology, far: float, rank: int, size: int):
-    """List the elements of listed blocks that are nearer than ``far``; the threads are whole warps."""
+    """List the elements of listed leaves that are nearer than ``far``; the threads are whole warps."""
     queued = queue_leaf_pairs(t, topo, far, rank, size)
     barrier(size)
     if rank == 0:

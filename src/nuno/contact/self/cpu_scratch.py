@@ -4,9 +4,9 @@ import warp as wp
 
 from nuno.contact.self.simd_tests import PRELUDE
 
-# Where a world's scratch numbers stand, from `room` on: positions by fours and by coordinate, whether the windows at a
+# Where a world's scratch numbers stand, from `room` on: positions by fours and by coordinate, whether the squares at a
 # vertex are tame, spheres and corners of triangles and of edges, boxes of leaves and of groups of sixteen leaves, then
-# the spheres and corners once more of those near a block. Loads of sixteen may reach beyond a row's last number.
+# the spheres and corners once more of those near a leaf. Loads of sixteen may reach beyond a row's last number.
 ROOM = """
 const int F = face.shape[0], E = edge.shape[0];
 const int faces = (F + 15) / 16 * 16 + 16, edges = (E + 15) / 16 * 16 + 16;
@@ -78,7 +78,7 @@ for (int j = 0; j < F; j += 16) {
     V far = {};
     for (int c = 0; c < 3; ++c) {
         const V dx = px[c] - mx, dy = py[c] - my, dz = pz[c] - mz;
-        far = most(far, dx * dx + dy * dy + dz * dz);
+        far = maximum(far, dx * dx + dy * dy + dz * dz);
     }
     *(V*)(ball + j) = mx;
     *(V*)(ball + faces + j) = my;
@@ -99,7 +99,7 @@ for (int j = 0; j < E; j += 16) {
     *(V*)(rod + 3 * edges + j) = __builtin_elementwise_sqrt(dx * dx + dy * dy + dz * dz);
 }
 for (int b = 0; b < boxes; ++b) {
-    // beyond the last block stand boxes that meet nothing
+    // beyond the last leaf stand boxes that meet nothing
     Q low = (Q){} + 1e30f, high = (Q){} - 1e30f;
     if (b < leaves)
         for (int k = leaf_corner_start.data[b]; k < leaf_corner_start.data[b + 1]; ++k) {

@@ -4,7 +4,7 @@ The sixteen worlds of a lane vector fold in different places and at different ti
 it needs it: its positions are copied out of the lanes, and the vector then holds sixteen boxes, triangles or edges of
 that one world. One world alone is listed by the same code.
 
-The order of a list is that of the vertices and edges sorted by block, whatever its margin and the moment it was made.
+The order of a list is that of the vertices and edges sorted by leaf, whatever its margin and the moment it was made.
 Pairs that touch are solved one after the other on the CPU, and so in the same order in every plan.
 """
 
@@ -15,11 +15,11 @@ import warp as wp
 from nuno.contact.self.cpu_flat_regions import survey_world
 from nuno.contact.self.cpu_scratch import ROOM, bound_world, copy_world
 from nuno.contact.self.simd_tests import KEEP, NEAR_EDGES, NEAR_TRIANGLES, PRELUDE
-from nuno.state.cloth_state import MOST_NEIGHBOURS, Topology
-from nuno.topology.leaves import WINDOW
+from nuno.state.cloth_state import MAX_NEIGHBOURS, Topology
+from nuno.topology.leaves import FLAT_SIDE
 
 RANGES = 48
-"""Ranges of consecutive leaves near a block that are kept apart."""
+"""Ranges of consecutive leaves near a leaf that are kept apart."""
 
 
 @wp.func_native(
@@ -32,11 +32,11 @@ RANGES = 48
 const int spans = boxes;
 const int *face_start = leaf_face_start.data, *edge_start = leaf_edge_start.data;
 const V limit = (V){} + far * far;
-auto meet = [&](const float* rows, int count, int k, const float* low, const float* high) {
+auto overlaps = [&](const float* rows, int count, int k, const float* low, const float* high) {
     V gap = (V){} + 1e30f;
     for (int c = 0; c < 3; ++c) {
-        gap = least(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
-        gap = least(gap, high[c] - *(const V*)(rows + c * count + k));
+        gap = minimum(gap, *(const V*)(rows + (c + 3) * count + k) - low[c]);
+        gap = minimum(gap, high[c] - *(const V*)(rows + c * count + k));
     }
     return bits(gap > 0.f);
 };
@@ -51,24 +51,24 @@ auto reach = [&](const float* rows, int count, int k, const float* low, const fl
     V gap = (V){} + 1e30f;
     for (int c = 0; c < 3; ++c) {
         const V x = *(const V*)(rows + c * count + k);
-        gap = least(gap, least(x - low[c], high[c] - x));
+        gap = minimum(gap, minimum(x - low[c], high[c] - x));
     }
     return gap + r > 0.f;
 };
-// the blocks, of sixteen, that fit a tame window together with block a: no two of their elements are near
+// the leaves, of sixteen, that fit a tame square together with leaf a: no two of their elements are near
 auto safe = [&](int a, int start) ALONE {
     const int* span = leaf_span.data;
     const I left = smaller(*(const I*)(span + start), span[a]);
     const I right = larger(*(const I*)(span + spans + start), span[spans + a]);
     const I low = smaller(*(const I*)(span + 2 * spans + start), span[2 * spans + a]);
     const I high = larger(*(const I*)(span + 3 * spans + start), span[3 * spans + a]);
-    const I at = smaller(low, points / columns - WINDOW) * columns + smaller(left, columns - WINDOW);
-    return bits((right - left < WINDOW) & (high - low < WINDOW) & take_int(tame, at));
+    const I at = smaller(low, points / columns - FLAT_SIDE) * columns + smaller(left, columns - FLAT_SIDE);
+    return bits((right - left < FLAT_SIDE) & (high - low < FLAT_SIDE) & take_int(tame, at));
 };
 int* counted[2] = {(int*)pair_count, (int*)pair_count + lanes};
 for (int c = 0; c < 2; ++c) {
-    int* most_counted = counted[c] + MOST_NEIGHBOURS * lanes;
-    if (*counted[c] > *most_counted) *most_counted = *counted[c];
+    int* max_counted = counted[c] + MAX_NEIGHBOURS * lanes;
+    if (*counted[c] > *max_counted) *max_counted = *counted[c];
     *counted[c] = 0;
 }
 // suspects wait until there are sixteen
@@ -77,13 +77,13 @@ auto test_faces = [&](int count) ALONE {
     const I i = *(const I*)vertex_of, f = *(const I*)face_of;
     const I a = take_int(corner, f), b = take_int(corner + faces, f), c = take_int(corner + 2 * faces, f);
     const unsigned hit = bits(near_triangles(point, point + 1, point + 2, 4, i, a, b, c, limit, 1e9f) > 0.f);
-    keep(hit & ((1u << count) - 1), i, a, b, c, *counted[0], (int*)triangles, 1, most_triangles, most_triangles);
+    keep(hit & ((1u << count) - 1), i, a, b, c, *counted[0], (int*)triangles, 1, max_triangles, max_triangles);
 };
 auto test_edges = [&](int count) ALONE {
     const I e = *(const I*)edge_of, f = *(const I*)other_of;
     const I a = take_int(end, e), b = take_int(end + edges, e), c = take_int(end, f), d = take_int(end + edges, f);
     const unsigned hit = bits(near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f);
-    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+    keep(hit & ((1u << count) - 1), a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
 };
 for (int l = 0; l < 32; ++l) vertex_of[l] = face_of[l] = edge_of[l] = other_of[l] = 0;
 for (int a = 0; a < leaves; ++a) {
@@ -92,12 +92,12 @@ for (int a = 0; a < leaves; ++a) {
         low[c] = box[c * boxes + a] - far;
         high[c] = box[(c + 3) * boxes + a] + far;
     }
-    // ranges of consecutive blocks that meet block a; where there are too many, the last one stretches
+    // ranges of consecutive leaves that meet leaf a; where there are too many, the last one stretches
     int first[RANGES], last[RANGES], ranges = 0;
     for (int g = 0; g < leaves_16; g += 16)
-        for (unsigned some = meet(group, groups, g, low, high); some; some &= some - 1) {
+        for (unsigned some = overlaps(group, groups, g, low, high); some; some &= some - 1) {
             const int start = 16 * (g + __builtin_ctz(some));
-            unsigned near = meet(box, boxes, start, low, high);
+            unsigned near = overlaps(box, boxes, start, low, high);
             if (near && columns > 0) near &= ~safe(a, start);
             while (near) {
                 const int skip = __builtin_ctz(near), length = __builtin_ctz(~(near >> skip));
@@ -108,7 +108,7 @@ for (int a = 0; a < leaves; ++a) {
             }
         }
     if (ranges == 0) continue;
-    // the elements near the block, side by side
+    // the elements near the leaf, side by side
     int face_count = 0, edge_count = 0;
     for (int r = 0; r < ranges; ++r) {
         const int face_stop = face_start[last[r]], edge_stop = edge_start[last[r]];
@@ -180,19 +180,19 @@ if (edges_waiting) test_edges(edges_waiting);
 const int creases = crease.shape[0];
 for (int k = 0; k < creases; k += 16) {
     I near = OWN + k < creases;
-    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_window.data, smaller(OWN + k, creases - 1)));
+    if (columns > 0) near &= ~take_int(uncreased, take_int(crease_corner.data, smaller(OWN + k, creases - 1)));
     if (bits(near) == 0) continue;
     const I row = smaller(OWN + k, creases - 1) * 4;
     const int* table = (const int*)crease.data;
     const I a = take_int(table, row), b = take_int(table + 1, row);
     const I c = take_int(table + 2, row), d = take_int(table + 3, row);
     const unsigned hit = bits((near_edges(point, point + 1, point + 2, 4, a, b, c, d, limit) > 0.f) & near);
-    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, most_pairs, most_pairs);
+    keep(hit, a, b, c, d, *counted[1], (int*)pairs, 1, max_pairs, max_pairs);
 }
 #endif
 """.replace("RANGES", str(RANGES))
-    .replace("WINDOW", str(WINDOW))
-    .replace("MOST_NEIGHBOURS", str(MOST_NEIGHBOURS))
+    .replace("FLAT_SIDE", str(FLAT_SIDE))
+    .replace("MAX_NEIGHBOURS", str(MAX_NEIGHBOURS))
 )
 def search_world(
     face: wp.array(dtype=wp.vec3i),
@@ -203,7 +203,7 @@ def search_world(
     leaf_edge_start: wp.array(dtype=int),
     leaf_span: wp.array(dtype=int),
     crease: wp.array(dtype=wp.vec4i),
-    crease_window: wp.array(dtype=int),
+    crease_corner: wp.array(dtype=int),
     columns: int,
     points: int,
     leaves: int,
@@ -212,9 +212,9 @@ def search_world(
     lanes: int,
     pair_count: wp.uint64,
     triangles: wp.uint64,
-    most_triangles: int,
+    max_triangles: int,
     pairs: wp.uint64,
-    most_pairs: int,
+    max_pairs: int,
 ):
     """List the pairs that share no vertex and are nearer than ``far`` [m].
 
@@ -233,7 +233,7 @@ const float *x0 = (const float*)x, *y0 = (const float*)y, *z0 = (const float*)z;
 const V limit = (V){} + far * far;
 const int* from[2] = {(const int*)triangles, (const int*)pairs};
 int* to[2] = {(int*)near_triangles_out, (int*)near_pairs_out};
-const int room[2] = {most_triangles, most_pairs};
+const int room[2] = {max_triangles, max_pairs};
 for (int kind = 0; kind < 2; ++kind) {
     const int found = ((const int*)counts)[kind * lanes], count = found < room[kind] ? found : room[kind];
     int near_count = 0;
@@ -261,9 +261,9 @@ def filter_world(
     lanes: int,
     counts: wp.uint64,
     triangles: wp.uint64,
-    most_triangles: int,
+    max_triangles: int,
     pairs: wp.uint64,
-    most_pairs: int,
+    max_pairs: int,
     near_counts: wp.uint64,
     near_triangles_out: wp.uint64,
     near_pairs_out: wp.uint64,
@@ -314,7 +314,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
         topo.leaf_edge_start,
         topo.leaf_span,
         topo.crease,
-        topo.crease_window,
+        topo.crease_corner,
         topo.columns,
         n,
         topo.leaves,
@@ -330,7 +330,7 @@ def list_world(t: Any, topo: Topology, far: float, which: int, lanes: int):
 
 
 @wp.func
-def fill_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
+def make_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
     """Pick the listed pairs of world ``which`` of the ``lanes`` worlds in a vector that are nearer than ``far`` [m]."""
     skip = wp.uint64(4 * which)
     filter_world(

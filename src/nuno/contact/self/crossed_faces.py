@@ -15,11 +15,11 @@ def box_faces(
     point: wp.array2d(dtype=wp.vec3), face: wp.array(dtype=wp.vec3i), start: wp.array(dtype=int),
     lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3),
 ):  # fmt: skip
-    """The boxes of a block's faces, and behind all faces' that of the block."""
-    world, block = wp.tid()
+    """The boxes of a leaf's faces, and behind all faces' that of the leaf."""
+    world, leaf = wp.tid()
     low = wp.vec3(1.0e30, 1.0e30, 1.0e30)
     high = -low
-    for k in range(start[block], start[block + 1]):
+    for k in range(start[leaf], start[leaf + 1]):
         f = face[k]
         a = point[world, f[0]]
         b = point[world, f[1]]
@@ -30,12 +30,12 @@ def box_faces(
         upper[world, k] = hi
         low = wp.min(low, lo)
         high = wp.max(high, hi)
-    lower[world, face.shape[0] + block] = low
-    upper[world, face.shape[0] + block] = high
+    lower[world, face.shape[0] + leaf] = low
+    upper[world, face.shape[0] + leaf] = high
 
 
 @wp.func
-def meet(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int):
+def boxes_overlap(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int):
     """Return whether two boxes overlap."""
     a = lower[world, i]
     b = upper[world, i]
@@ -80,15 +80,15 @@ def find_crossed(
     point: wp.array2d(dtype=wp.vec3), face: wp.array(dtype=wp.vec3i), start: wp.array(dtype=int),
     lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), crossed: wp.array(dtype=int),
 ):  # fmt: skip
-    """Note the worlds in which a face of a block passes through one of it or of a later block."""
-    world, block = wp.tid()
+    """Note the worlds in which a face of a leaf passes through one of it or of a later leaf."""
+    world, leaf = wp.tid()
     faces = face.shape[0]
-    for other in range(block, start.shape[0] - 1):
-        if crossed[world] == 0 and meet(lower, upper, world, faces + block, faces + other):
-            for i in range(start[block], start[block + 1]):
-                if meet(lower, upper, world, i, faces + other):
+    for other in range(leaf, start.shape[0] - 1):
+        if crossed[world] == 0 and boxes_overlap(lower, upper, world, faces + leaf, faces + other):
+            for i in range(start[leaf], start[leaf + 1]):
+                if boxes_overlap(lower, upper, world, i, faces + other):
                     for j in range(wp.max(i + 1, start[other]), start[other + 1]):
-                        if meet(lower, upper, world, i, j) and cross(point, world, face[i], face[j]):
+                        if boxes_overlap(lower, upper, world, i, j) and cross(point, world, face[i], face[j]):
                             crossed[world] = 1
 
 
@@ -97,10 +97,10 @@ def crossed_worlds(solver: Any) -> np.ndarray:
     worlds, n, device, topology = solver.world_count, solver.particle_count, solver.device, solver._topology
     point = pack_positions(solver._state, worlds, n, solver.lanes, device)
     face, start = topology.leaf_face, topology.leaf_face_start
-    blocks = start.shape[0] - 1
-    lower = wp.empty((worlds, face.shape[0] + blocks), dtype=wp.vec3, device=device)
+    leaves = start.shape[0] - 1
+    lower = wp.empty((worlds, face.shape[0] + leaves), dtype=wp.vec3, device=device)
     upper = wp.empty_like(lower)
     crossed = wp.zeros(worlds, dtype=int, device=device)
-    wp.launch(box_faces, dim=(worlds, blocks), inputs=[point, face, start, lower, upper], device=device)
-    wp.launch(find_crossed, dim=(worlds, blocks), inputs=[point, face, start, lower, upper, crossed], device=device)
+    wp.launch(box_faces, dim=(worlds, leaves), inputs=[point, face, start, lower, upper], device=device)
+    wp.launch(find_crossed, dim=(worlds, leaves), inputs=[point, face, start, lower, upper, crossed], device=device)
     return np.asarray(crossed.numpy() != 0)

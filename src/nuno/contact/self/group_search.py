@@ -16,14 +16,14 @@ from nuno.contact.self.list_skin import (
     box_moves,
     group_count,
     join_boxes,
-    most_used_up,
+    max_used_up,
     moves_start,
     region_count,
 )
 from nuno.contact.self.narrow_phase import append, bound_leaves, middles, near_edges, near_triangle, next_place
-from nuno.contact.self.neighbour_lists import FORGET, begin_list, fill_inner_list, find_creases, swept
+from nuno.contact.self.neighbour_lists import FORGET, begin_list, find_creases, make_inner_list, swept
 from nuno.numbers.block_group import BlockGroup, grid_barrier
-from nuno.numbers.lanes import barrier, window
+from nuno.numbers.lanes import barrier, subarray
 from nuno.numbers.warps import WARP, in_warps, leads_warp, lowest, vote, warp_max
 from nuno.state.cloth_state import (
     INNER_REACH,
@@ -37,14 +37,14 @@ from nuno.state.cloth_state import (
 )
 
 ROOM = 24
-"""Pairs of blocks, over the number of blocks, that there is room to note; where they are more, all are gone through."""
+"""Pairs of leaves, over the number of leaves, that there is room to note; where they are more, all are gone through."""
 ITEMS = 32
-"""Threads that share a pair of blocks."""
+"""Threads that share a pair of leaves."""
 
 
 @wp.struct
 class Lists:
-    """Scratch arrays of the search: pairs of blocks, their number in each world, flags of flat regions."""
+    """Scratch arrays of the search: pairs of leaves, their number in each world, flags of flat regions."""
 
     noted: wp.array(dtype=int)
     pairs: wp.array(dtype=wp.vec2i)
@@ -75,16 +75,16 @@ def list_reach(t: StateFloat, run: Settings):
 @wp.func
 def measure_closing(t: StateFloat, topo: Topology, run: Settings, rank: int, size: int):
     """Raise the figure behind the listed positions to what is used up of the margin at most; whole warps come here."""
-    most = most_used_up(t, topo, t.scalars[THICKNESS] + run.margin, margin_left(t, run), rank, size)
+    worst = max_used_up(t, topo, t.scalars[THICKNESS] + run.margin, margin_left(t, run), rank, size)
     k = 3 * topo.particles
-    high = warp_max(most, size)
+    high = warp_max(worst, size)
     if leads_warp(rank, size) and high > t.reference[k]:
         wp.atomic_max(t.reference, k, high)
 
 
 @wp.func
 def keep_places(t: StateFloat, topo: Topology, run: Settings, rank: int, size: int):
-    """Store where everything is now: particles, centres of elements, boxes of blocks, windows without a crease."""
+    """Store where everything is now: particles, centres of elements, boxes of leaves, flat squares of the grid."""
     n = topo.particles
     mark_uncreased(t, topo, list_reach(t, run), rank, size)
     for i in range(rank, n, size):
@@ -97,7 +97,7 @@ def keep_places(t: StateFloat, topo: Topology, run: Settings, rank: int, size: i
 
 @wp.func
 def outside(t: StateFloat, b: int, x: float, y: float, z: float):
-    """Return how far a point is outside of a block's box, along the axis where it is most."""
+    """Return how far a point is outside of a leaf's box, along the axis where it is most."""
     k = 6 * b
     gx = wp.max(t.bounds[k] - x, x - t.bounds[k + 3])
     gy = wp.max(t.bounds[k + 1] - y, y - t.bounds[k + 4])
@@ -107,7 +107,7 @@ def outside(t: StateFloat, b: int, x: float, y: float, z: float):
 
 @wp.func
 def try_vertex(t: StateFloat, topo: Topology, k: int, j: int, b: int, far: float):
-    """List vertex k and triangle j of block b, both in the order of the blocks, where they are near."""
+    """List vertex k and triangle j of leaf b, both in the order of the leaves, where they are near."""
     i = topo.leaf_vertex[k]
     f = topo.leaf_face[j]
     centre = wp.vec3(t.middle[4 * j], t.middle[4 * j + 1], t.middle[4 * j + 2])
@@ -121,7 +121,7 @@ def try_vertex(t: StateFloat, topo: Topology, k: int, j: int, b: int, far: float
 
 @wp.func
 def try_edge(t: StateFloat, topo: Topology, j: int, k: int, far: float):
-    """List edges j and k, in the order of the blocks, where they are near."""
+    """List edges j and k, in the order of the leaves, where they are near."""
     e = topo.leaf_edge[j]
     f = topo.leaf_edge[k]
     m = 4 * (topo.leaf_face.shape[0] + j)
@@ -136,7 +136,7 @@ def try_edge(t: StateFloat, topo: Topology, j: int, k: int, far: float):
 
 @wp.func
 def search(t: StateFloat, topo: Topology, a: int, b: int, far: float, item: int, items: int):
-    """List what is near of two blocks; of ``items`` threads each looks at its share of the pairs of elements."""
+    """List what is near of two leaves; of ``items`` threads each looks at its share of the pairs of elements."""
     va = topo.leaf_vertex_start[a]
     vb = topo.leaf_vertex_start[b]
     fa = topo.leaf_face_start[a]
@@ -185,9 +185,9 @@ def are_near(t: StateFloat, a: int, b: int, far: float):
 
 @wp.func
 def note_pairs(t: StateFloat, topo: Topology, run: Settings, lists: Lists, world: int, rank: int, size: int):
-    """Note the pairs of blocks that are near each other and not flat; those without room are counted.
+    """Note the pairs of leaves that are near each other and not flat; those without room are counted.
 
-    A warp takes a block, and each lane a region, then a block of one region after the other that is near. On CUDA whole
+    A warp takes a leaf, and each lane a region, then a leaf of one region after the other that is near. On CUDA whole
     warps come here.
     """
     m = topo.leaves
@@ -249,7 +249,7 @@ def list_anew(t: StateFloat, topo: Topology, run: Settings, lists: Lists, world:
         begin_list(t)
     # the flags of flat regions where `nuno.contact.self.block_flat_regions` has them
     moved = t.moved
-    t.moved = window(lists.flat, 2 * topo.particles * world, 2 * topo.particles)
+    t.moved = subarray(lists.flat, 2 * topo.particles * world, 2 * topo.particles)
     keep_places(t, topo, run, block_group.rank, block_group.group_size)
     grid_barrier(block_group)
     join_boxes(t, topo, 0, block_group.rank, block_group.group_size)
@@ -291,14 +291,14 @@ def rebuild_by_group(t: StateFloat, topo: Topology, run: Settings, lists: Lists,
                 t.notes[INNER_TRAVEL] = FORGET
                 t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
         barrier(block_group.block_size)
-    near = swept(t, run)
-    if t.notes[INNER_TRAVEL] * 2.0 + near > t.notes[INNER_REACH]:
-        ahead = look_ahead(t, run, near)
+    approach = swept(t, run)
+    if t.notes[INNER_TRAVEL] * 2.0 + approach > t.notes[INNER_REACH]:
+        ahead = look_ahead(t, run, approach)
         if block_group.rank == 0:
             t.active_count[0] = 0
             t.active_count[1] = 0
         grid_barrier(block_group)
-        fill_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.group_size)
+        make_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.group_size)
         if block_group.rank_in_block == 0:
             t.notes[INNER_TRAVEL] = 0.0
             t.notes[INNER_REACH] = ahead

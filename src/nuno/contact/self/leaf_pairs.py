@@ -8,11 +8,11 @@ and stays true until any two points of the cloth may have come closer by the dif
 import warp as wp
 
 from nuno.contact.self.narrow_phase import GROUP, raise_to
-from nuno.numbers.lanes import barrier, window
+from nuno.numbers.lanes import barrier, subarray
 from nuno.numbers.warps import WARP, claim, lowest
 from nuno.state.cloth_state import MISSED_LEAVES, THICKNESS, StateFloat, Topology
 
-WIDE = wp.constant(5.0)
+WIDEST_SKIN = wp.constant(5.0)
 """Margin of the list of leaves over that of the list of elements."""
 TRAVELLED, WIDTH = wp.constant(6), wp.constant(7)
 """Places after the span in `State.reference`: how far any two points came closer since the leaves were listed, and the
@@ -30,7 +30,7 @@ def measure_leaves(t: StateFloat, topo: Topology, rank: int, size: int):
     """The boxes of the leaves' displacements since elements were listed, and the span of all, as `measure_span`."""
     n = topo.particles
     place = travelled(topo)
-    # the box of nothing, upside down, where a thread has no block
+    # the box of nothing, upside down, where a thread has no leaf
     hx = float(-1.0e30)
     hy = float(-1.0e30)
     hz = float(-1.0e30)
@@ -84,29 +84,29 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, rank: int, size: int
     """
     place = travelled(topo)
     far = t.scalars[THICKNESS] + margin
-    most = float(0.0)
+    worst = float(0.0)
     for k in range(rank, t.near_leaves[0], size):
         pair = t.near_leaves[1 + k]
-        a = window(t.bounds, 6 * (pair >> 16), 6)
-        b = window(t.bounds, 6 * (pair & 0xFFFF), 6)
+        a = subarray(t.bounds, 6 * (pair >> 16), 6)
+        b = subarray(t.bounds, 6 * (pair & 0xFFFF), 6)
         gx = wp.max(a[0] - b[3], b[0] - a[3])
         gy = wp.max(a[1] - b[4], b[1] - a[4])
         gz = wp.max(a[2] - b[5], b[2] - a[5])
         spare = wp.max(wp.max(gx, wp.max(gy, gz)) - far, 0.0)
-        a = window(a, place, 6)
-        b = window(b, place, 6)
+        a = subarray(a, place, 6)
+        b = subarray(b, place, 6)
         dx = wp.max(a[3] - b[0], b[3] - a[0])
         dy = wp.max(a[4] - b[1], b[4] - a[1])
         dz = wp.max(a[5] - b[2], b[5] - a[2])
-        most = wp.max(most, wp.sqrt(dx * dx + dy * dy + dz * dz) - spare)
-    return most
+        worst = wp.max(worst, wp.sqrt(dx * dx + dy * dy + dz * dz) - spare)
+    return worst
 
 
 @wp.func
 def pair_leaves(t: StateFloat, far: float, m: int, rank: int, size: int):
     """List the pairs of leaves whose boxes are nearer than ``far``, each pair once."""
     for a in range(rank / WARP, m, size / WARP):
-        own = window(t.bounds, 6 * a, 6)
+        own = subarray(t.bounds, 6 * a, 6)
         lx = own[0] - far
         ly = own[1] - far
         lz = own[2] - far
@@ -119,7 +119,7 @@ def pair_leaves(t: StateFloat, far: float, m: int, rank: int, size: int):
             for j in range(wp.min(32, (m - begin + WARP - 1) / WARP)):
                 b = begin + WARP * j + rank % WARP
                 if b < m:
-                    other = window(t.bounds, 6 * b, 6)
+                    other = subarray(t.bounds, 6 * b, 6)
                     gx = wp.min(other[3] - lx, hx - other[0])
                     gy = wp.min(other[4] - ly, hy - other[1])
                     gz = wp.min(other[5] - lz, hz - other[2])
@@ -137,7 +137,7 @@ def pair_leaves(t: StateFloat, far: float, m: int, rank: int, size: int):
 @wp.func
 def list_leaf_pairs(t: StateFloat, topo: Topology, margin: float, rank: int, size: int):
     """List the leaves that may come near: within the widest margin that there is room for."""
-    width = float(WIDE * margin)
+    width = float(WIDEST_SKIN * margin)
     count = int(-1)
     room = t.near_leaves.shape[0] - 1
     while count < 0:

@@ -5,10 +5,10 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.self.block_rebuild import rebuild_by_block
-from nuno.contact.self.cpu_search import fill_inner_list_of_world, list_world, reach_world
+from nuno.contact.self.cpu_search import list_world, make_inner_list_of_world, reach_world
 from nuno.contact.self.neighbour_lists import FORGET, INNER_AHEAD, swept
 from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import LANES, add, anywhere, full_like, least, most, mul, root, shares_work, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.numbers.lanes import LANES, add, anywhere, full_like, maximum, minimum, mul, shares_work, sqrt, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
 from nuno.state.cloth_state import (
     INNER_REACH,
     INNER_TRAVEL,
@@ -44,12 +44,12 @@ def measure_moves(t: Any, topo: Topology):
             dx = at(t.x, i) - at(t.reference, i)
             dy = at(t.y, i) - at(t.reference, n + i)
             dz = at(t.z, i) - at(t.reference, 2 * n + i)
-            lx = least(lx, dx)
-            ly = least(ly, dy)
-            lz = least(lz, dz)
-            hx = most(hx, dx)
-            hy = most(hy, dy)
-            hz = most(hz, dz)
+            lx = minimum(lx, dx)
+            ly = minimum(ly, dy)
+            lz = minimum(lz, dz)
+            hx = maximum(hx, dx)
+            hy = maximum(hy, dy)
+            hz = maximum(hz, dz)
         k = 6 * (regions + g)
         put(t.bounds, k, lx)
         put(t.bounds, k + 1, ly)
@@ -60,7 +60,7 @@ def measure_moves(t: Any, topo: Topology):
 
 
 @wp.func
-def most_closer(t: Any, topo: Topology, far: Any):
+def max_approach(t: Any, topo: Topology, far: Any):
     """Return how much of the margin is used up by two points that have come closer since the list was made [m].
 
     Points of two regions that were farther from each other than ``far`` have that much more before they matter.
@@ -75,19 +75,21 @@ def most_closer(t: Any, topo: Topology, far: Any):
             for c in range(3):
                 a = 6 * g + c
                 b = 6 * h + c
-                gap = most(gap, most(at(t.bounds, a) - at(t.bounds, b + 3), at(t.bounds, b) - at(t.bounds, a + 3)))
+                gap = maximum(
+                    gap, maximum(at(t.bounds, a) - at(t.bounds, b + 3), at(t.bounds, b) - at(t.bounds, a + 3))
+                )
                 a = a + 6 * regions
                 b = b + 6 * regions
-                span = most(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
+                span = maximum(at(t.bounds, a + 3) - at(t.bounds, b), at(t.bounds, b + 3) - at(t.bounds, a))
                 square = square + span * span
-            worst = most(worst, root(square) - most(gap - far, zero))
+            worst = maximum(worst, sqrt(square) - maximum(gap - far, zero))
     return worst
 
 
 @wp.func
-def look_ahead(t: Any, run: Settings, near: Any):
+def look_ahead(t: Any, run: Settings, approach: Any):
     """Return how far beyond its thickness a pair is picked [m]: for a few substeps, at the speed of the moment."""
-    return near + root(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
+    return approach + sqrt(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
 
 
 @wp.func
@@ -99,12 +101,12 @@ def rebuild_lists(t: StateLanes, topo: Topology, run: Settings, rank: int, size:
     lanes = int(LANES)  # variables, or Warp would unroll the loops
     # the lanes beyond the last world only repeat it, and nobody looks at them: they go without contact
     worlds = wp.min(lanes, t.worlds - lanes * t.group)
-    near = swept(t, run)
-    left = run.margin - near
+    approach = swept(t, run)
+    left = run.margin - approach
     if anywhere(t.notes[TRAVEL] * 2.0 - left):
         measure_moves(t, topo)
-        worst = most_closer(t, topo, t.scalars[THICKNESS] + run.margin)
-        worst = most(worst, t.notes[TRAVEL] - FORGET)
+        worst = max_approach(t, topo, t.scalars[THICKNESS] + run.margin)
+        worst = maximum(worst, t.notes[TRAVEL] - FORGET)
         t.notes[TRAVEL] = worst * 0.5
         late = worst - left
         for k in range(lanes):
@@ -115,16 +117,16 @@ def rebuild_lists(t: StateLanes, topo: Topology, run: Settings, rank: int, size:
                     t.notes[INNER_TRAVEL][k] = FORGET
                     t.notes[LISTINGS][k] = t.notes[LISTINGS][k] + 1.0
                     list_world(t, topo, t.scalars[THICKNESS][k] + 1.01 * run.margin, k, lanes)
-    due = t.notes[INNER_TRAVEL] * 2.0 + near - t.notes[INNER_REACH]
+    due = t.notes[INNER_TRAVEL] * 2.0 + approach - t.notes[INNER_REACH]
     if anywhere(due):
-        ahead = look_ahead(t, run, near)
+        ahead = look_ahead(t, run, approach)
         for k in range(worlds):
             if due[k] > 0.0:
                 t.notes[INNER_TRAVEL][k] = 0.0
                 t.notes[INNER_REACH][k] = ahead[k]
-                fill_inner_list_of_world(t, t.scalars[THICKNESS][k] + 1.01 * ahead[k], k, lanes)
+                make_inner_list_of_world(t, t.scalars[THICKNESS][k] + 1.01 * ahead[k], k, lanes)
     for k in range(worlds):
-        reach_world(t, t.scalars[THICKNESS][k] + SLACK * near[k], k, lanes)
+        reach_world(t, t.scalars[THICKNESS][k] + SLACK * approach[k], k, lanes)
 
 
 @wp.func
@@ -132,20 +134,20 @@ def rebuild_lists(t: StateFloat, topo: Topology, run: Settings, rank: int, size:
     if shares_work(size):
         rebuild_by_block(t, topo, run, rank, size)
     else:
-        near = swept(t, run)
-        left = run.margin - near
+        approach = swept(t, run)
+        left = run.margin - approach
         if t.notes[TRAVEL] * 2.0 > left:
             measure_moves(t, topo)
-            worst = wp.max(most_closer(t, topo, t.scalars[THICKNESS] + run.margin), t.notes[TRAVEL] - FORGET)
+            worst = wp.max(max_approach(t, topo, t.scalars[THICKNESS] + run.margin), t.notes[TRAVEL] - FORGET)
             t.notes[TRAVEL] = 0.5 * worst
             if worst > left:
                 t.notes[TRAVEL] = 0.0
                 t.notes[INNER_TRAVEL] = FORGET
                 t.notes[LISTINGS] = t.notes[LISTINGS] + 1.0
                 list_world(t, topo, t.scalars[THICKNESS] + 1.01 * run.margin, 0, 1)
-        if t.notes[INNER_TRAVEL] * 2.0 + near > t.notes[INNER_REACH]:
-            ahead = look_ahead(t, run, near)
+        if t.notes[INNER_TRAVEL] * 2.0 + approach > t.notes[INNER_REACH]:
+            ahead = look_ahead(t, run, approach)
             t.notes[INNER_TRAVEL] = 0.0
             t.notes[INNER_REACH] = ahead
-            fill_inner_list_of_world(t, t.scalars[THICKNESS] + 1.01 * ahead, 0, 1)
-        reach_world(t, t.scalars[THICKNESS] + SLACK * near, 0, 1)
+            make_inner_list_of_world(t, t.scalars[THICKNESS] + 1.01 * ahead, 0, 1)
+        reach_world(t, t.scalars[THICKNESS] + SLACK * approach, 0, 1)

@@ -101,7 +101,7 @@ def used_up(t: StateFloat, a: int, b: int, place: int, far: float):
 
 
 @wp.func
-def most_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: int, size: int):
+def max_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: int, size: int):
     """Return the margin used up at most [m] by this thread's share; all threads of a warp come here.
 
     Two regions that used up no more than is ``left`` are not looked into, nor are two groups.
@@ -116,7 +116,7 @@ def most_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: i
     lane = rank % lanes
     warps = size / lanes
     per = REGION / GROUP
-    most = float(0.0)
+    highest = float(0.0)
     for start in range(rank / lanes, regions * regions, size):
         # neighbours, which are looked into, fall to different warps
         k = start + lane * warps
@@ -125,7 +125,7 @@ def most_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: i
             worst = used_up(t, m + groups + k / regions, m + groups + k % regions, place, far)
         doubtful = vote(worst > left)
         if worst <= left:
-            most = wp.max(most, worst)
+            highest = wp.max(highest, worst)
         while doubtful != 0:
             # the lanes look together at the groups of one pair of regions after the other
             pair = start + lowest(doubtful) * warps
@@ -139,7 +139,7 @@ def most_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: i
                     worst = used_up(t, m + g, m + h, place, far)
                 inner = vote(worst > left)
                 if worst <= left:
-                    most = wp.max(most, worst)
+                    highest = wp.max(highest, worst)
                 while inner != 0:
                     r = begin + lowest(inner)
                     inner = inner & (inner - 1)
@@ -149,5 +149,5 @@ def most_used_up(t: StateFloat, topo: Topology, far: float, left: float, rank: i
                         a = g * GROUP + p / GROUP
                         b = h * GROUP + p % GROUP
                         if a < m and b < m:
-                            most = wp.max(most, used_up(t, a, b, place, far))
-    return most
+                            highest = wp.max(highest, used_up(t, a, b, place, far))
+    return highest

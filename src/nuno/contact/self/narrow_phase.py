@@ -7,13 +7,13 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import add, div, full_like, lane, lane_int, least, most, mul, root, sub  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
+from nuno.numbers.lanes import add, div, full_like, lane, lane_int, maximum, minimum, mul, sqrt, sub  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
 from nuno.numbers.vec3 import cross, dot, gather_position
 from nuno.numbers.warps import leads_warp, warp_max
 from nuno.state.cloth_state import Topology
 
 GROUP = 8
-"""Consecutive blocks that are passed over together where their common box is far."""
+"""Consecutive leaves that are passed over together where their common box is far."""
 
 
 @wp.func_native("""
@@ -108,12 +108,12 @@ def raise_to(values: wp.array(dtype=float), k: int, value: float, rank: int, siz
         if leads_warp(rank, size):
             wp.atomic_max(values, k, high)
     else:
-        values[k] = most(values[k], value)
+        values[k] = maximum(values[k], value)
 
 
 @wp.func
 def raise_to(values: wp.array(dtype=Any), k: int, value: Any, rank: int, size: int):
-    values[k] = most(values[k], value)
+    values[k] = maximum(values[k], value)
 
 
 @wp.func
@@ -129,12 +129,12 @@ def measure_span(t: Any, n: int, rank: int, size: int):
         dx = t.x[i] - t.reference[i]
         dy = t.y[i] - t.reference[n + i]
         dz = t.z[i] - t.reference[2 * n + i]
-        hx = most(hx, dx)
-        hy = most(hy, dy)
-        hz = most(hz, dz)
-        lx = most(lx, -dx)
-        ly = most(ly, -dy)
-        lz = most(lz, -dz)
+        hx = maximum(hx, dx)
+        hy = maximum(hy, dy)
+        hz = maximum(hz, dz)
+        lx = maximum(lx, -dx)
+        ly = maximum(ly, -dy)
+        lz = maximum(lz, -dz)
     raise_to(t.reference, 3 * n, hx, rank, size)
     raise_to(t.reference, 3 * n + 1, hy, rank, size)
     raise_to(t.reference, 3 * n + 2, hz, rank, size)
@@ -159,11 +159,11 @@ def middles(t: Any, topo: Topology, rank: int, size: int):
             dx = t.x[i] - mx
             dy = t.y[i] - my
             dz = t.z[i] - mz
-            r = most(r, dx * dx + dy * dy + dz * dz)
+            r = maximum(r, dx * dx + dy * dy + dz * dz)
         t.middle[4 * j] = mx
         t.middle[4 * j + 1] = my
         t.middle[4 * j + 2] = mz
-        t.middle[4 * j + 3] = root(r)
+        t.middle[4 * j + 3] = sqrt(r)
     for j in range(rank, topo.leaf_edge.shape[0], size):
         e = topo.leaf_edge[j]
         dx = (t.x[e[1]] - t.x[e[0]]) * 0.5
@@ -173,12 +173,12 @@ def middles(t: Any, topo: Topology, rank: int, size: int):
         t.middle[k] = t.x[e[0]] + dx
         t.middle[k + 1] = t.y[e[0]] + dy
         t.middle[k + 2] = t.z[e[0]] + dz
-        t.middle[k + 3] = root(dx * dx + dy * dy + dz * dz)
+        t.middle[k + 3] = sqrt(dx * dx + dy * dy + dz * dz)
 
 
 @wp.func
 def bound_leaves(t: Any, topo: Topology, rank: int, size: int):
-    """Bounding boxes of the blocks' vertices and elements: the lower corner, and the upper one."""
+    """Bounding boxes of the leaves' vertices and elements: the lower corner, and the upper one."""
     for b in range(rank, topo.leaves, size):
         first = topo.leaf_corner[topo.leaf_corner_start[b]]
         lx = t.x[first]
@@ -189,12 +189,12 @@ def bound_leaves(t: Any, topo: Topology, rank: int, size: int):
         hz = lz
         for k in range(topo.leaf_corner_start[b] + 1, topo.leaf_corner_start[b + 1]):
             i = topo.leaf_corner[k]
-            lx = least(lx, t.x[i])
-            ly = least(ly, t.y[i])
-            lz = least(lz, t.z[i])
-            hx = most(hx, t.x[i])
-            hy = most(hy, t.y[i])
-            hz = most(hz, t.z[i])
+            lx = minimum(lx, t.x[i])
+            ly = minimum(ly, t.y[i])
+            lz = minimum(lz, t.z[i])
+            hx = maximum(hx, t.x[i])
+            hy = maximum(hy, t.y[i])
+            hz = maximum(hz, t.z[i])
         t.bounds[6 * b] = lx
         t.bounds[6 * b + 1] = ly
         t.bounds[6 * b + 2] = lz
@@ -215,10 +215,10 @@ def closest_on_edges(rx: Any, ry: Any, rz: Any, ax: Any, ay: Any, az: Any, bx: A
     ar = ax * rx + ay * ry + az * rz
     br = bx * rx + by * ry + bz * rz
     det = aa * bb - ab * ab
-    s = (ab * br - ar * bb) / most(det, aa * bb * 1.0e-6)
-    s = least(most(s, zero), one)
-    q = least(most((ab * s + br) / bb, zero), one)
-    s = least(most((ab * q - ar) / aa, zero), one)
+    s = (ab * br - ar * bb) / maximum(det, aa * bb * 1.0e-6)
+    s = minimum(maximum(s, zero), one)
+    q = minimum(maximum((ab * s + br) / bb, zero), one)
+    s = minimum(maximum((ab * q - ar) / aa, zero), one)
     return s, q
 
 
@@ -239,8 +239,8 @@ def near_triangle(t: Any, i: Any, f0: Any, f1: Any, f2: Any, far2: Any):
     # weights of the corners b and a, times nn, where the vertex is over the triangle
     v = dot(cross(d, b), n)
     w = dot(cross(a, d), n)
-    outside = least(least(nn - v - w, 0.0), least(v, w))
-    longest = most(dot(a, a), most(dot(b, b), dot(c, c)))
+    outside = minimum(minimum(nn - v - w, 0.0), minimum(v, w))
+    longest = maximum(dot(a, a), maximum(dot(b, b), dot(c, c)))
     return longest * (far2 * nn - h * h) - outside * outside
 
 

@@ -1,7 +1,7 @@
 """Neighbour lists of a cloth: vertices and triangles, and pairs of edges, that may touch, and how long a list is good.
 
 A list holds all pairs nearer than the thickness and a margin, and stays valid until two points of the cloth may have
-moved towards each other by the margin. Its order is that of the blocks, whatever else is in it: pairs that do not
+moved towards each other by the margin. Its order is that of the leaves, whatever else is in it: pairs that do not
 touch change nothing, so results do not depend on when a list was made, with what margin, or together with which
 other worlds.
 """
@@ -18,17 +18,17 @@ from nuno.numbers.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them f
     choose,
     full_like,
     lane_max_int,
-    least,
-    most,
+    maximum,
+    minimum,
     mul,
-    root,
+    sqrt,
     sub,
     within,
 )
 from nuno.state.cloth_state import (
     INNER_REACH,
     INNER_TRAVEL,
-    MOST_NEIGHBOURS,
+    MAX_NEIGHBOURS,
     SPEED,
     THICKNESS,
     Settings,
@@ -46,7 +46,7 @@ FORGET = wp.constant(1.0e8)
 def begin_list(t: StateFloat):
     """Count anew, and keep what the last list came to: one thread's work."""
     for k in range(2):
-        t.pair_count[MOST_NEIGHBOURS + k] = wp.max(t.pair_count[MOST_NEIGHBOURS + k], t.pair_count[k])
+        t.pair_count[MAX_NEIGHBOURS + k] = wp.max(t.pair_count[MAX_NEIGHBOURS + k], t.pair_count[k])
         t.pair_count[k] = 0
 
 
@@ -56,7 +56,7 @@ def find_creases(t: StateFloat, topo: Topology, far2: float, rank: int, size: in
     for k in range(rank, topo.crease.shape[0], size):
         tame = bool(False)
         if topo.columns > 0:
-            tame = t.moved[topo.crease_window[k]] != 0
+            tame = t.moved[topo.crease_corner[k]] != 0
         if not tame:
             q = topo.crease[k]
             hit = near_edges(t, q[0], q[1], q[2], q[3], far2)
@@ -71,12 +71,12 @@ def swept(t: Any, run: Settings):
     could be on the other side by then.
     """
     thickness = t.scalars[THICKNESS]
-    go = root(t.notes[SPEED]) * (3.0 * run.dt) + 10.0 * run.dt * run.dt
-    return least(most(go - thickness, thickness * 0.1), run.reach)
+    go = sqrt(t.notes[SPEED]) * (3.0 * run.dt) + 10.0 * run.dt * run.dt
+    return minimum(maximum(go - thickness, thickness * 0.1), run.reach)
 
 
 @wp.func
-def fill_inner_list(t: Any, far: Any, rank: int, size: int):
+def make_inner_list(t: Any, far: Any, rank: int, size: int):
     """Add those of the listed pairs that are nearer than ``far`` to those that may touch."""
     far2 = far * far
     none = full_like(far, -1.0)
@@ -103,9 +103,9 @@ def find_active(t: Any, run: Settings, fresh: int, rank: int, size: int):
     Few of the listed pairs ever touch before the list is made anew, and solving looks at each in every substep.
     """
     like = t.x[0]
-    near = swept(t, run)
-    if fresh != 0 or anywhere(t.notes[INNER_TRAVEL] * 2.0 + near - t.notes[INNER_REACH]):
-        ahead = near + root(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
+    approach = swept(t, run)
+    if fresh != 0 or anywhere(t.notes[INNER_TRAVEL] * 2.0 + approach - t.notes[INNER_REACH]):
+        ahead = approach + sqrt(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
         barrier(size)
         if rank == 0:
             t.active_count[0] = t.active_count[0] * 0
@@ -113,5 +113,5 @@ def find_active(t: Any, run: Settings, fresh: int, rank: int, size: int):
             t.notes[INNER_TRAVEL] = full_like(like, 0.0)
             t.notes[INNER_REACH] = ahead
         barrier(size)
-        fill_inner_list(t, t.scalars[THICKNESS] + ahead * 1.01, rank, size)
+        make_inner_list(t, t.scalars[THICKNESS] + ahead * 1.01, rank, size)
         barrier(size)

@@ -1,7 +1,7 @@
 """Blocks of a CUDA launch that have no world of their own help the others list pairs.
 
 Where worlds are fewer than multiprocessors, the others would idle while the most folded world lists its pairs, which
-takes it as long as all else. Whatever warp is free takes the next batch of pairs of blocks, of a world's own block like
+takes it as long as all else. Whatever warp is free takes the next batch of pairs of leaves, of a world's own block like
 of its helpers, and the own block alone waits until all are done. It never waits for a batch that nobody has taken, so
 that a launch ends whether or not there is room for helpers. Who finds a pair does not matter: the list is a set.
 """
@@ -9,12 +9,12 @@ that a launch ends whether or not there is room for helpers. Who finds a pair do
 import warp as wp
 
 from nuno.contact.self.block_search import BATCH, queue_leaf_pairs, search_batch
-from nuno.numbers.lanes import barrier, window
+from nuno.numbers.lanes import barrier, subarray
 from nuno.numbers.warps import WARP, anyone, sync_warp, warp_broadcast
 from nuno.state.cloth_state import COUNTS, MISSED_ELEMENTS, THICKNESS, Settings, Sizes, StateFloat, Topology, view
 
 FOUND, QUEUED = wp.constant(2), wp.constant(5)
-"""Places in `State.work_counts` of the counts of listed pairs, and of how many pairs of blocks are queued. Before them
+"""Places in `State.work_counts` of the counts of listed pairs, and of how many pairs of leaves are queued. Before them
 are the batches left and those done, between them whether the world's launch is over. Counts are read from place 2 on,
 so that what warps had no room for comes to stand at 6."""
 
@@ -121,10 +121,10 @@ def search_batches(t: StateFloat, topo: Topology, far: float, rank: int, size: i
 
 @wp.func
 def search_with_spare_blocks(t: StateFloat, topo: Topology, far: float, rank: int, size: int):
-    """List the elements of listed blocks that are nearer than ``far``, with whoever helps."""
+    """List the elements of listed leaves that are nearer than ``far``, with whoever helps."""
     queued = queue_leaf_pairs(t, topo, far, rank, size)
     own = t.pair_count
-    t.pair_count = window(t.work_counts, FOUND, COUNTS)
+    t.pair_count = subarray(t.work_counts, FOUND, COUNTS)
     barrier(size)
     if rank == 0:
         open_queue(t.work_counts, queued, BATCH, own[0], own[1])
@@ -148,11 +148,11 @@ def search_for_others(
     n = topo.particles
     t = view(s, spare_block % s.worlds, n, sizes)
     # the positions that are listed, for the world's own go on in another block's memory
-    t.x = window(t.reference, 0, n)
-    t.y = window(t.reference, n, n)
-    t.z = window(t.reference, 2 * n, n)
-    t.pair_count = window(t.work_counts, FOUND, COUNTS)
-    t.active_edge = window(s.work_queue, spare_block * t.active_edge.shape[0], t.active_edge.shape[0])
+    t.x = subarray(t.reference, 0, n)
+    t.y = subarray(t.reference, n, n)
+    t.z = subarray(t.reference, 2 * n, n)
+    t.pair_count = subarray(t.work_counts, FOUND, COUNTS)
+    t.active_edge = subarray(s.work_queue, spare_block * t.active_edge.shape[0], t.active_edge.shape[0])
     far = t.scalars[THICKNESS] + 1.01 * run.margin
     while anyone(rank == 0 and wait_for_batch(t.work_counts)):
         search_batches(t, topo, far, rank, size)

@@ -1,6 +1,6 @@
 """Cloth against itself: thin contact of vertices with triangles and of edges with edges.
 
-Candidates come from blocks of neighbouring vertices whose bounding boxes meet, and stay valid until something may
+Candidates come from groups of neighbouring vertices whose bounding boxes meet, and stay valid until something may
 have moved by half the margin. A contact's normal and weights are taken where the substep began, when nothing crossed:
 that tells the side, so that a pair pressed through within a substep is put back, and what is done depends
 on the present state alone, not on when the list was made.
@@ -14,6 +14,7 @@ from nuno.contact.self.narrow_phase import closest_on_edges
 from nuno.contact.self.neighbour_lists import swept
 from nuno.numbers.element_access import at
 from nuno.numbers.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes them for the operators)
+    absolute,
     add,
     anywhere,
     choose,
@@ -21,13 +22,12 @@ from nuno.numbers.lanes import (  # noqa: F401 (add, div, mul, sub: Warp takes t
     full_like,
     gather,
     lane_max_int,
-    least,
-    most,
+    maximum,
+    minimum,
     mul,
     place,
     relative_to,
-    root,
-    size_of,
+    sqrt,
     sub,
     within,
 )
@@ -37,7 +37,7 @@ LEAVE_SPEED = wp.constant(0.5)
 """[m/s] Layers found too close part no faster than this."""
 UNIT = wp.constant(1.0e-8)
 """[m] Step of the fixed-point sums: integers add up to the same whatever the order of threads."""
-MOST_WEIGHT = wp.constant(63.0)
+MAX_WEIGHT = wp.constant(63.0)
 """The greatest weight of a pair in the mean over a particle's contacts, where one that barely touches has 1."""
 
 
@@ -74,7 +74,7 @@ def contact_weight(t: Any, gap: float):
     through, and it is.
     """
     deep = wp.clamp(-gap / t.scalars[THICKNESS], 0.0, 1.0)
-    return 1 + int(MOST_WEIGHT * deep * deep * deep)
+    return 1 + int(MAX_WEIGHT * deep * deep * deep)
 
 
 @wp.func
@@ -94,7 +94,7 @@ def note_depth(notes: wp.array(dtype=float), far: float, size: int):
 
 @wp.func
 def note_depth(notes: wp.array(dtype=Any), far: Any, size: int):
-    notes[DEEPEST] = most(notes[DEEPEST], far)
+    notes[DEEPEST] = maximum(notes[DEEPEST], far)
 
 
 @wp.func
@@ -133,23 +133,23 @@ def part(
     gy = span(t.y, a, b, c, d, ka, kb, kc, kd)
     gz = span(t.z, a, b, c, d, ka, kb, kc, kd)
     gap = gx * nx + gy * ny + gz * nz - t.scalars[THICKNESS]
-    on = least(on, -gap)
+    on = minimum(on, -gap)
     if anywhere(on):
         note_depth(t.notes, choose(on, -gap, zero), size)
         ux = gx - pxs
         uy = gy - pys
         uz = gz - pzs
         un = ux * nx + uy * ny + uz * nz
-        away = most(-un, zero) + leave
+        away = maximum(-un, zero) + leave
         if size > 1:
             # what an earlier pass did counts
-            away = most(leave - un, zero)
-        push = least(-gap, away)
+            away = maximum(leave - un, zero)
+        push = minimum(-gap, away)
         tx = ux - un * nx
         ty = uy - un * ny
         tz = uz - un * nz
-        slip = root(tx * tx + ty * ty + tz * tz + 1.0e-24)
-        hold = least(t.scalars[FRICTION] * push / slip, 1.0)
+        slip = sqrt(tx * tx + ty * ty + tz * tz + 1.0e-24)
+        hold = minimum(t.scalars[FRICTION] * push / slip, 1.0)
         dx = push * nx - hold * tx
         dy = push * ny - hold * ty
         dz = push * nz - hold * tz
@@ -196,15 +196,15 @@ def touch_vertex_triangle(t: Any, n: int, run: Settings, rank: int, size: int):
         ny = ez * fx - ex * fz
         nz = ex * fy - ey * fx
         nn = nx * nx + ny * ny + nz * nz + 1.0e-20
-        length = root(nn)
+        length = sqrt(nn)
         h = (rx * nx + ry * ny + rz * nz) / length
-        on = within(like, k, t.active_count[0]) * (reach - size_of(h))
+        on = within(like, k, t.active_count[0]) * (reach - absolute(h))
         if anywhere(on):
             v = ((ry * fz - rz * fy) * nx + (rz * fx - rx * fz) * ny + (rx * fy - ry * fx) * nz) / nn
             w = ((ey * rz - ez * ry) * nx + (ez * rx - ex * rz) * ny + (ex * ry - ey * rx) * nz) / nn
             u = one - v - w
             # edges of the triangle belong to the edge contacts; a little overlap does no harm
-            on = least(on, least(u, least(v, w)) + 1.0e-3)
+            on = minimum(on, minimum(u, minimum(v, w)) + 1.0e-3)
             s = choose(h, one, -one) / length
             part(t, n, a, b, c, d, one, -u, -v, -w, nx * s, ny * s, nz * s, on, leave, size)
 
@@ -245,7 +245,7 @@ def touch_edge_edge(t: Any, n: int, run: Settings, rank: int, size: int):
         cc = cx * cx + cy * cy + cz * cz
         on = within(like, k, t.active_count[1]) * (reach2 - cc)
         if anywhere(on):
-            inv = one / root(cc + 1.0e-20)
+            inv = one / sqrt(cc + 1.0e-20)
             part(
                 t,
                 n,

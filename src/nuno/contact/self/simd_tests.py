@@ -14,8 +14,8 @@ typedef bool B __attribute__((ext_vector_type(16)));
 #define ALONE __attribute__((noinline))
 #define ROLLED _Pragma("nounroll")
 const I OWN = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-auto least = [](V a, V b) { return (V)((a < b) ? (I)a : (I)b); };
-auto most = [](V a, V b) { return (V)((a > b) ? (I)a : (I)b); };
+auto minimum = [](V a, V b) { return (V)((a < b) ? (I)a : (I)b); };
+auto maximum = [](V a, V b) { return (V)((a > b) ? (I)a : (I)b); };
 auto smaller = [](I a, int b) { return (a < b) ? a : (I){} + b; };
 auto larger = [](I a, int b) { return (a > b) ? a : (I){} + b; };
 auto bits = [](I mask) {
@@ -70,9 +70,9 @@ auto near_triangles = [&](const float* x, const float* y, const float* z, int st
     const V high = dx * nx + dy * ny + dz * nz, nn = nx * nx + ny * ny + nz * nz;
     const V v = (dy * bz - dz * by) * nx + (dz * bx - dx * bz) * ny + (dx * by - dy * bx) * nz;
     const V w = (ay * dz - az * dy) * nx + (az * dx - ax * dz) * ny + (ax * dy - ay * dx) * nz;
-    const V outside = least(least(nn - v - w, (V){}), least(v, w));
+    const V outside = minimum(minimum(nn - v - w, (V){}), minimum(v, w));
     const V aa = ax * ax + ay * ay + az * az, bb = bx * bx + by * by + bz * bz, cc = cx * cx + cy * cy + cz * cz;
-    return least(most(aa, most(bb, cc)) * (far2 * nn - high * high) - outside * outside, outside + rim * nn);
+    return minimum(maximum(aa, maximum(bb, cc)) * (far2 * nn - high * high) - outside * outside, outside + rim * nn);
 };
 """
 
@@ -87,10 +87,10 @@ auto near_edges = [&](const float* x, const float* y, const float* z, int step, 
     const V zero = {}, one = zero + 1.f;
     const V aa = ax * ax + ay * ay + az * az + 1e-16f, bb = bx * bx + by * by + bz * bz + 1e-16f;
     const V ab = ax * bx + ay * by + az * bz, ar = ax * rx + ay * ry + az * rz, br = bx * rx + by * ry + bz * rz;
-    V s = (ab * br - ar * bb) / most(aa * bb - ab * ab, aa * bb * 1e-6f);
-    s = least(most(s, zero), one);
-    const V q = least(most((ab * s + br) / bb, zero), one);
-    s = least(most((ab * q - ar) / aa, zero), one);
+    V s = (ab * br - ar * bb) / maximum(aa * bb - ab * ab, aa * bb * 1e-6f);
+    s = minimum(maximum(s, zero), one);
+    const V q = minimum(maximum((ab * s + br) / bb, zero), one);
+    s = minimum(maximum((ab * q - ar) / aa, zero), one);
     const V cx = rx + s * ax - q * bx, cy = ry + s * ay - q * by, cz = rz + s * az - q * bz;
     return far2 - cx * cx - cy * cy - cz * cz;
 };

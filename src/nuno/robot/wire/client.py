@@ -236,7 +236,7 @@ class WireRobot(RobotInterface):
         if self._has_odometry is None:
             self._has_odometry = topic in (self._newest.listed("topics", topic) or ())
         if not self._has_odometry:
-            return self._newest.peek(topic, ros.ODOMETRY, _read_odometry) or Coordinates(*self.robot._pose())
+            return self._newest.peek(topic, ros.ODOMETRY, _read_odometry) or Coordinates(*self.robot.pose())
         place: Coordinates = self._newest.read(topic, ros.ODOMETRY, _read_odometry)
         return place
 

@@ -233,7 +233,7 @@ class Commands:
         frame, given = ros.read_pose(ros.field(fields, "pose", Mapping))
         if frame not in ("", BASE, "odom"):
             raise MessageError(f"pose.header.frame_id must be '{BASE}' or 'odom', got {frame!r}")
-        place = given._pose() if frame != "odom" else compose(invert(self.robot.footprint()._pose()), given._pose())
+        place = given.pose() if frame != "odom" else compose(invert(self.robot.footprint().pose()), given.pose())
         forward = quat.rotate(place[1], np.array([1.0, 0.0, 0.0]))
         x, y, yaw = float(place[0][0]), float(place[0][1]), float(np.arctan2(forward[1], forward[0]))
         goal = self.robot.send_base(x, y, yaw, None, True)

@@ -25,9 +25,9 @@ def filled_fraction(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int
     """
     total, overlaps = np.zeros(cells), []
     for axis in range(3):
-        turn = [(axis + 1) % 3, (axis + 2) % 3, axis]
-        part, crossed = _along_last_axis(points[:, turn], faces, (cells[turn[0]], cells[turn[1]], cells[turn[2]]))
-        total += np.transpose(part, np.argsort(turn))
+        axes = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        part, crossed = _along_last_axis(points[:, axes], faces, (cells[axes[0]], cells[axes[1]], cells[axes[2]]))
+        total += np.transpose(part, np.argsort(axes))
         overlaps.append(crossed)
     # Rounding may turn the order of two crossings of one line around, but not along all axes.
     return np.clip(total / 3.0, 0.0, 1.0), sum(overlaps) if min(overlaps) else 0
@@ -46,9 +46,9 @@ def inside_nodes(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int, i
     """
     votes = np.zeros([count + 1 for count in cells], dtype=int)
     for axis in range(3):
-        turn = [(axis + 1) % 3, (axis + 2) % 3, axis]
-        nx, ny, nz = (cells[t] + 1 for t in turn)
-        moved = points[:, turn].copy()
+        axes = [(axis + 1) % 3, (axis + 2) % 3, axis]
+        nx, ny, nz = (cells[t] + 1 for t in axes)
+        moved = points[:, axes].copy()
         moved[:, :2] = (moved[:, :2] + 0.5) / SAMPLES  # a line of the pattern through every node
         line, height, sign = _crossings(moved, faces, (nx, ny))
         sound = np.bincount(line, sign, minlength=nx * ny) == 0
@@ -56,7 +56,7 @@ def inside_nodes(points: np.ndarray, faces: np.ndarray, cells: tuple[int, int, i
         depth = np.bincount(line * (nz + 1) + above, sign, minlength=nx * ny * (nz + 1)).reshape(-1, nz + 1)
         inside = np.cumsum(depth, axis=1)[:, :nz] > 0.5
         vote = np.where(sound[:, None], np.where(inside, 1, -1), 0).reshape(nx, ny, nz)
-        votes += np.transpose(vote, np.argsort(turn))
+        votes += np.transpose(vote, np.argsort(axes))
     return votes > 0
 
 
@@ -93,9 +93,9 @@ def _crossings(points: np.ndarray, faces: np.ndarray, lines: tuple[int, int]) ->
     low, high = np.maximum(low, 0), np.minimum(high, np.array(lines) - 1)
     span = np.maximum(high - low + 1, 0)
     found: list[tuple[np.ndarray, ...]] = []
-    for block in _blocks(span.prod(axis=1)):
-        count = span[block].prod(axis=1)
-        face = np.repeat(block, count)
+    for batch in _batches(span.prod(axis=1)):
+        count = span[batch].prod(axis=1)
+        face = np.repeat(batch, count)
         within = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
         i = low[face, 0] + within // span[face, 1]
         j = low[face, 1] + within % span[face, 1]
@@ -114,7 +114,7 @@ def _crossings(points: np.ndarray, faces: np.ndarray, lines: tuple[int, int]) ->
     return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
 
 
-def _blocks(count: np.ndarray, size: int = 1_000_000) -> list[np.ndarray]:
+def _batches(count: np.ndarray, size: int = 1_000_000) -> list[np.ndarray]:
     """Return the indices of faces with something to do, in blocks of bounded work."""
     busy = np.flatnonzero(count)
     return [part for part in np.split(busy, np.flatnonzero(np.diff(np.cumsum(count[busy]) // size)) + 1) if len(part)]

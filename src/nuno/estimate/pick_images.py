@@ -1,0 +1,89 @@
+"""The images of an estimate of a pick: read, checked, and the cloth found in the one before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.camera import Camera
+from nuno.camera.image import check_image, check_mask, read_image
+from nuno.camera.rectangle import ClothRectangle, fit_rectangle
+from nuno.camera.segmentation import segment_before
+from nuno.errors import InvalidInputError
+from nuno.estimate.pick_settings import PickSettings
+
+
+@dataclass(frozen=True, eq=False)
+class PickImages:
+    """Images (h, w, 3) uint8 and masks (h, w) bool before and after a pick; None is what was not given.
+
+    Attributes:
+        before: The cloth on the table.
+        after: The cloth in the hand.
+        mask_before: The cloth before.
+        mask_after: The cloth after.
+        hidden: What the image after shows before the cloth.
+    """
+
+    before: np.ndarray | None
+    after: np.ndarray | None
+    mask_before: np.ndarray | None
+    mask_after: np.ndarray | None
+    hidden: np.ndarray | None
+
+
+def read_images(
+    before: Any, after: Any, mask_before: ArrayLike | None, mask_after: ArrayLike | None, hidden: ArrayLike | None,
+    camera: Camera,
+) -> PickImages:  # fmt: skip
+    """Read and check images, given as arrays or paths, and masks.
+
+    Raises:
+        ImageError: an image that cannot be read, or one that is not of the camera's size.
+        InvalidInputError: two images that are the same.
+    """
+
+    def mask(name: str, value: ArrayLike | None) -> np.ndarray | None:
+        return None if value is None else check_mask(value, camera, name)
+
+    images = PickImages(
+        _image(before, camera, "before"), _image(after, camera, "after"), mask("before_mask", mask_before),
+        mask("after_mask", mask_after), mask("hidden", hidden),
+    )  # fmt: skip
+    if images.before is not None and images.after is not None and np.array_equal(images.before, images.after):
+        raise InvalidInputError("the image after is the image before: nothing was picked up between them")
+    return images
+
+
+def find_cloth_before(
+    images: PickImages, rectangle: ClothRectangle | None, hint: ArrayLike | None, settings: PickSettings
+) -> tuple[PickImages, ClothRectangle]:
+    """Find the cloth's mask and rectangle in the image before, as far as they are needed and not given.
+
+    Raises:
+        InvalidInputError: too little is given to find the cloth before or after.
+        ClothNotFoundError: no cloth in the image.
+    """
+    camera, table = settings.camera, settings.table
+    if images.mask_before is None and (rectangle is None or images.mask_after is None):
+        if images.before is None:
+            raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
+        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
+    if rectangle is None:
+        assert images.mask_before is not None
+        rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
+    if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
+        raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
+    return images, rectangle
+
+
+def _image(image: Any, camera: Camera, name: str) -> np.ndarray | None:
+    if image is None:
+        return None
+    if isinstance(image, str | FilePath):
+        image = read_image(image)
+    return check_image(image, camera, f"the image {name}")

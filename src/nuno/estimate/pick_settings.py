@@ -1,0 +1,141 @@
+"""The settings of an estimate of a pick, checked once: camera, table, hand, candidates and ways of comparing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.camera.camera import Camera
+from nuno.camera.table import Table, table_margin
+from nuno.errors import InvalidInputError
+from nuno.estimate.hypotheses import Discretisation
+from nuno.estimate.ranking import EVIDENCE, RANKINGS
+from nuno.estimate.rotations import checked_turns
+from nuno.validation import finite_array, number
+from nuno.world.device import checked_device, found_device
+
+MAX_CANDIDATES = 1024
+"""Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PickSettings:
+    """Valid arguments of `nuno.estimate_pick` that are no images, under its names where nothing else is said.
+
+    Attributes:
+        table: The table.
+        hand: (3,) float [m].
+        labels: (k, 2) the candidates: (i, j) of a grid, or the (u, v) that were given.
+        uv: (k, 2) float, the candidates as fractions of the sides.
+        grid: Candidates along both sides; (2, 2) where points were given.
+        turns: (t,) float [rad]; 0 alone where something else than evidence ranks.
+        device: "cpu" or "cuda:0" ...
+    """
+
+    camera: Camera
+    table: Table
+    hand: np.ndarray
+    labels: np.ndarray
+    uv: np.ndarray
+    grid: tuple[int, int]
+    rest_height: float
+    hand_radius: float
+    lift_seconds: float
+    discretisations: Sequence[Discretisation]
+    sure: float
+    turns: np.ndarray
+    learned: bool
+    sideways: float | None
+    score: str
+    device: str
+    progress: bool | None
+
+    @property
+    def with_evidence(self) -> bool:
+        """True where evidence ranks, of which the network and the prior of the lift are parts."""
+        return self.score in EVIDENCE
+
+
+def check_settings(
+    *, camera: Camera | Mapping[str, Any], table: Table, hand: ArrayLike, candidates: tuple[int, int] | ArrayLike,
+    discretisations: Sequence[Discretisation], turns: Sequence[float], score: str, device: str, rest_height: float,
+    lift_seconds: float, sure: float, sideways: float | None, **others: Any,
+) -> PickSettings:  # fmt: skip
+    """Check the arguments of `nuno.estimate_pick` that are no images.
+
+    Raises:
+        InvalidInputError: as `nuno.estimate_pick`.
+    """
+    camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
+    hand = finite_array("hand", hand, (3,))
+    _check_hand(camera, hand, table)
+    labels, uv, grid = _candidates(candidates)
+    number("rest_height", rest_height, above=0.0)
+    number("lift_seconds", lift_seconds, above=0.0)
+    number("sure", sure, above=0.0, high=1.0)
+    if sideways is not None:
+        number("sideways", sideways, above=0.0)
+    if score not in RANKINGS:
+        raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
+    if not discretisations or discretisations[0].best is not None:
+        raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
+    angles = checked_turns(turns)
+    return PickSettings(
+        camera=camera, table=table, hand=hand, labels=labels, uv=uv, grid=grid, rest_height=rest_height,
+        lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
+        turns=angles if score in EVIDENCE else np.zeros(1), sideways=sideways, score=score,
+        device=found_device(checked_device(device)), **others,
+    )  # fmt: skip
+
+
+def check_table(
+    height: float, half_extents: Sequence[float] | None, centre: Sequence[float] | None, thickness: float
+) -> Table:
+    """Return the table that the arguments of `nuno.estimate_pick` describe, each under ``table_`` in messages."""
+    return Table(
+        number("table_height", height),
+        None if half_extents is None else _pair("table_half_extents", half_extents),
+        None if centre is None else _pair("table_centre", centre),
+        number("table_thickness", thickness, above=0.0),
+    )
+
+
+def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+    a, b = finite_array(name, value, (2,))
+    return float(a), float(b)
+
+
+def _check_hand(camera: Camera, hand: np.ndarray, table: Table) -> None:
+    depth = float(camera.depth_of(hand))
+    if depth <= 0:
+        raise InvalidInputError(f"the hand at {hand.tolist()} m is {-depth:.3f} m behind the camera")
+    u, v = camera.project(hand)
+    if not (-camera.width < u < 2 * camera.width and -camera.height < v < 2 * camera.height):
+        raise InvalidInputError(
+            f"the hand at {hand.tolist()} m projects to pixel ({u:.0f}, {v:.0f}), far outside of the "
+            f"{camera.width} x {camera.height} image"
+        )
+    if hand[2] < table.height and (table.half_extents is None or float(table_margin(table, hand[:2])) > 0.0):
+        raise InvalidInputError(f"the hand at {hand.tolist()} m is below the table's top, z = {table.height:g} m")
+
+
+def _candidates(candidates: Any) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+    """Labels (k, 2), fractions (k, 2) of the sides, and the grid that the mesh's vertices should lie on."""
+    if isinstance(candidates, tuple) and len(candidates) == 2 and all(isinstance(c, int) for c in candidates):
+        n, m = candidates
+        if n < 2 or m < 2:
+            raise InvalidInputError(f"a grid of candidates needs at least 2 x 2 points, got {n} x {m}")
+        if n * m > MAX_CANDIDATES:
+            raise InvalidInputError(f"a grid of candidates has at most {MAX_CANDIDATES} points, got {n} x {m}")
+        ij = np.stack(np.meshgrid(np.arange(n), np.arange(m), indexing="ij"), axis=-1).reshape(-1, 2)
+        return ij, ij / (n - 1, m - 1), (n, m)
+    uv = finite_array("candidates", candidates, ("k", 2))
+    if len(uv) > MAX_CANDIDATES or uv.min() < 0 or uv.max() > 1:
+        raise InvalidInputError(
+            f"candidates must be up to {MAX_CANDIDATES} fractions (u, v) of the cloth's sides, each from 0 to 1"
+        )
+    return uv, uv, (2, 2)

@@ -1,0 +1,128 @@
+"""Picks imagined on one mesh after the other and compared with what was seen, until one candidate is sure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nuno.camera.rectangle import ClothRectangle
+from nuno.errors import EstimationError
+from nuno.estimate.futures import Futures, imagine_picks
+from nuno.estimate.learned import Outline, correction, outline_of
+from nuno.estimate.lift_prior import log_prior_of_lift
+from nuno.estimate.pick_settings import PickSettings
+from nuno.estimate.pick_sight import masks_of_turned, score_futures
+from nuno.estimate.ranking import Comparison, Ranked, rank
+from nuno.estimate.seeing import IMAGE_SCALE, Seen
+from nuno.estimate.together import Ahead, has_room
+from nuno.kernels.compile_watch import Stages
+from nuno.world.progress import with_bar
+
+
+@dataclass(frozen=True, eq=False)
+class PickTrials:
+    """Imagined picks of all meshes that were gone through.
+
+    Attributes:
+        comparisons: Scores by mesh.
+        batches: The futures that they are of.
+        ranked: The ranking by all of them.
+        seen: The image after.
+    """
+
+    comparisons: list[Comparison]
+    batches: list[Futures]
+    ranked: Ranked
+    seen: Seen
+
+    def best_match(self, candidate: int, score: str) -> tuple[int, int, float]:
+        """Return the batch, the world in it, and its turn [rad], in which a candidate looks most like the image."""
+        found: list[tuple[float, int, int, float]] = []
+        for k, comparison in enumerate(self.comparisons):
+            at = np.nonzero(comparison.candidates == candidate)[0]
+            if len(at):
+                error = comparison.error(score)[..., at[0]]
+                turn, guess = np.unravel_index(int(error.argmin()), error.shape)
+                world = int(guess) * len(comparison.candidates) + int(at[0])
+                found.append((float(error[turn, guess]), k, world, float(comparison.turns[turn])))
+        return min(found)[1:]
+
+    def masks(self, settings: PickSettings) -> np.ndarray:
+        """Return (k, h, w) bool, every candidate's silhouette where it looks most like the image."""
+        count, small = len(settings.uv), self.seen.camera
+        alike = (self.best_match(candidate, settings.score) for candidate in range(count))
+        batch, world, turn = map(np.array, zip(*alike, strict=True))
+        masks = np.zeros((count, small.height, small.width), dtype=bool)
+        for k in np.unique(batch):
+            of = batch == k
+            masks[of] = masks_of_turned(self.batches[k], world[of], turn[of], small, settings.table, settings.hand)
+        return masks
+
+
+def try_picks(
+    settings: PickSettings, rectangle: ClothRectangle, wait_for_seen: Callable[[], Seen], stages: Stages
+) -> PickTrials:
+    """Imagine and compare picks on one mesh after the other, until a candidate is as likely as ``settings.sure``.
+
+    Args:
+        settings: All that is asked for.
+        rectangle: The cloth before.
+        wait_for_seen: Returns the image after, once it has been looked at.
+        stages: Gets the seconds of "imagine", "see" and "compare".
+
+    Raises:
+        EstimationError: no candidate gave a finite future.
+    """
+    uv, table, hand = settings.uv, settings.table, settings.hand
+    arguments: dict[str, Any] = dict(
+        rectangle=rectangle, grid=settings.grid, table=table, hand=hand, rest_height=settings.rest_height,
+        device=settings.device, lift_seconds=settings.lift_seconds,
+    )  # fmt: skip
+    prior = None if settings.sideways is None else log_prior_of_lift(rectangle, uv, hand, settings.sideways)
+    comparisons: list[Comparison] = []
+    batches: list[Futures] = []
+    ranked: Ranked | None = None
+    outline: Outline | None = None
+    ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
+    meshes = settings.discretisations
+    for k, discretisation in enumerate(with_bar(meshes, "imagining", settings.progress, "mesh")):
+        chosen = np.arange(len(uv))
+        if ranked is not None and discretisation.best is not None:
+            chosen = ranked.plausible(discretisation.best)
+        futures: Futures | None = None if ahead is None else ahead.part(meshes[k:], chosen)
+        if futures is None:
+            futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)
+        stages.end("imagine")
+        seen = wait_for_seen()
+        stages.end("see")
+        comparison = compare(futures, chosen, seen, settings)
+        if settings.learned and settings.with_evidence:
+            if k == 0:
+                outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
+            if outline is not None:
+                comparison = replace(comparison, correction=correction(outline, futures, comparison, table, hand))
+        comparisons.append(comparison)
+        batches.append(futures)
+        ranked = rank(comparisons, settings.score, len(uv), prior)
+        stages.end("compare")
+        if ranked.settled(settings.sure):
+            break
+    assert ranked is not None
+    if not np.isfinite(ranked.scores).any():
+        raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
+    return PickTrials(comparisons, batches, ranked, seen)
+
+
+def compare(futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings) -> Comparison:
+    """Compare the futures of chosen candidates with the image after, at every turn about the hand's vertical."""
+    values = score_futures(
+        futures, seen.camera, seen.silhouette, settings.table, pattern=seen.pattern, turns=settings.turns,
+        hand=settings.hand, coarse=seen.coarse,
+    )  # fmt: skip
+    return Comparison(
+        chosen, settings.turns, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
+        None if seen.pattern is None else values["pattern"],
+    )  # fmt: skip

@@ -1,0 +1,65 @@
+"""Settings and images of an estimate of a pick, checked before anything is imagined."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.estimate.hypotheses import DISCRETISATIONS
+from nuno.estimate.pick_images import find_cloth_before, read_images
+from nuno.estimate.pick_settings import check_settings, check_table
+
+LOOKING_DOWN = np.array([[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1], [0, 0, 0, 1]], float)
+CAMERA = nuno.Camera(64, 48, 60.0, 60.0, 31.5, 23.5, camera_to_world=LOOKING_DOWN)
+
+
+def settings(**changes):
+    """Settings of a pick over an endless table at z = 0, with changes."""
+    given = dict(
+        camera=CAMERA, table=check_table(0.0, None, None, 0.04), hand=(0.0, 0.0, 0.2), candidates=(3, 2),
+        discretisations=DISCRETISATIONS, turns=(0.0, 0.1), score="evidence", device="cpu", rest_height=0.0025,
+        hand_radius=0.014, lift_seconds=1.5, sure=0.98, sideways=0.5, learned=True, progress=False,
+    )  # fmt: skip
+    return check_settings(**given | changes)
+
+
+def test_a_grid_names_its_candidates():
+    """A grid of 3 x 2 has labels (i, j) and fractions i / 2, j / 1 of the sides; points are their own labels."""
+    found = settings()
+    assert found.labels.tolist() == [[0, 0], [0, 1], [1, 0], [1, 1], [2, 0], [2, 1]]
+    np.testing.assert_array_equal(found.uv, found.labels / (2, 1))
+    points = settings(candidates=[[0.25, 1.0]])
+    assert points.labels.tolist() == points.uv.tolist() == [[0.25, 1.0]] and points.grid == (2, 2)
+
+
+def test_scores_without_evidence_are_not_turned():
+    """Only evidence is averaged over angles; the others are compared at 0 alone."""
+    assert settings().turns.tolist() == [0.0, 0.1] and settings().with_evidence
+    iou = settings(score="iou")
+    assert iou.turns.tolist() == [0.0] and not iou.with_evidence
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (dict(score="best"), "score must be one of evidence, silhouette, chamfer, iou, eq1, got 'best'"),
+        (dict(hand=(0.0, 0.0, -0.1)), "below the table's top"),
+        (dict(hand=(2.0, 0.0, 2.0)), "behind the camera"),
+        (dict(candidates=(1, 4)), "at least 2 x 2"),
+        (dict(turns=(0.1,)), "0 among them"),
+        (dict(discretisations=()), "must begin with one that looks at all candidates"),
+    ],
+)
+def test_bad_settings_are_named(changes, message):
+    """A setting that cannot be used is refused, with what is valid."""
+    with pytest.raises(nuno.InvalidInputError, match=message):
+        settings(**changes)
+
+
+def test_images_that_are_needed_are_asked_for():
+    """Without an image before, a mask or a rectangle nothing can be found; two images that are the same are no pick."""
+    image = np.zeros((48, 64, 3), np.uint8)
+    with pytest.raises(nuno.InvalidInputError, match="nothing was picked up"):
+        read_images(image, image.copy(), None, None, None, CAMERA)
+    nothing = read_images(None, image, None, None, None, CAMERA)
+    with pytest.raises(nuno.InvalidInputError, match="the image before is needed"):
+        find_cloth_before(nothing, None, None, settings())

@@ -1,0 +1,95 @@
+"""The field's words: none of those that this project once used instead names a thing, but in a plain sense."""
+
+import ast
+import re
+from pathlib import Path
+
+import nuno
+
+PACKAGE = Path(nuno.__file__).parent
+FOLDERS = (
+    "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
+    "numbers",
+)  # fmt: skip
+"""Where nothing is left; `tests/test_imports.py` looks for the first of the words in all folders."""
+
+# Word: what it is called now.
+REPLACED = {
+    "roll": "residency", "gate": "grid barrier", "helping": "spare blocks", "listed": "neighbour list",
+    "picked": "inner list", "touched": "active", "window": "region, subarray", "windows": "regions",
+    "wide": "SIMD", "fine": "double precision", "rough": "float", "times": "*", "over": "/", "root": "sqrt",
+    "most": "maximum", "least": "minimum", "fill": "full_like", "spread": "broadcast", "largest": "lane_max",
+    "known": "mask", "told": "measured, reported", "beside": "relative_to", "press": "resolve",
+    "pulls": "attachments", "layers": "self-contact", "idle": "position correction", "sharp": "feature",
+    "gone": "motion bound",
+    "rod": "capsule", "ball": "sphere", "drum": "cylinder", "rounds": "colours, iterations", "cast": "scene objects",
+    "led": "kinematic", "meet": "overlap", "turn": "rank, rotation",
+}  # fmt: skip
+
+# What an identifier may be in spite of its word, and why.
+ALLOWED = {
+    r"(frame_|key_|_frame_)?times|_times": "points in time [s]",
+    r"(\w+_)?turn(s|_\w+)?|TURNS?|checked_turns": "a rotation, as quaternion or angle [rad]",
+    r"roll|fill_?|sliding_window_view|ListedColormap": "names of NumPy, Warp, Matplotlib",
+    r"query_ball_point|fillConvexPoly|_least_squares": "names of SciPy and OpenCV; the field's least squares",
+    r"fill_(doubtful_)?holes": "morphology's hole filling",
+    r"(taught_|find_)?[lL]ayers": "the layers of a folded cloth, public names",
+    r"over": "what lies over a point, public: `Layers.over`",
+    r"known": "public argument of `nuno.fit_material`: the rest of the material",
+    r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",
+    r"least_(force|squeeze)|most|rounds": "public names of `nuno.tasks.lift`: what a search found, and how far it goes",
+}
+
+
+def identifiers(path):
+    """Yield every identifier of a file, its own name among them."""
+    yield path.stem
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for field in ("id", "attr", "arg", "name"):
+            if isinstance(value := getattr(node, field, None), str):
+                yield value
+
+
+def words_of(name):
+    """Return the words of an identifier, in lower case."""
+    return {part.lower() for part in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z0-9]+", name)}
+
+
+def found(folders):
+    """Return the replaced words that identifiers have, as ``place: name: what it is called now``."""
+    allowed = re.compile("|".join(f"(?:{pattern})" for pattern in ALLOWED))
+    return sorted(
+        f"{path.relative_to(PACKAGE).as_posix()}: {name}: {REPLACED[word]}"
+        for folder in folders
+        for path in sorted((PACKAGE / folder).rglob("*.py"))
+        for name in set(identifiers(path))
+        for word in words_of(name) & REPLACED.keys()
+        if not allowed.fullmatch(name)
+    )
+
+
+def test_replaced_words_name_no_concept():
+    """No identifier and no file name has a replaced word, but those that are allowed with a reason."""
+    assert not found(FOLDERS)
+
+
+def test_every_exception_is_used():
+    """An allowed name that nothing has is no exception."""
+    names = {name for folder in FOLDERS for path in (PACKAGE / folder).rglob("*.py") for name in identifiers(path)}
+    assert not [pattern for pattern in ALLOWED if not any(re.fullmatch(pattern, name) for name in names)]
+
+
+def test_docstrings_begin_without_invented_words():
+    """No docstring's first line has a word that this project had made up where the field has one."""
+    invented = re.compile(
+        r"\b(yarns?|star|party|parties|convoys?|teams?|verdict|lessened|heed|haste|swift|crumpled|wardrobe|actors?|"
+        r"onlooker|ghost|awake|soonest|led (frame|body|bodies)|flat windows?|taking turns|idle motion)\b", re.IGNORECASE
+    )  # fmt: skip
+    lines = [
+        f"{path.relative_to(PACKAGE).as_posix()}: {text}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        and invented.search(text := (ast.get_docstring(node) or "").partition("\n")[0])
+    ]
+    assert not lines
