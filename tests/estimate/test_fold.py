@@ -178,7 +178,7 @@ def test_the_hands_paths_are_drawn(result):
         whole = next(line for line in above.lines if line.get_label() == f"hand {hand}")
         np.testing.assert_array_equal(whole.get_xydata(), result.hands_at[:, hand, :2])
     thick = [line for line in beside.lines if line.get_linewidth() > 2]
-    assert len(thick) == sum(hold.touched for hold in result.fold.holds) > 0
+    assert len(thick) == sum(hold.held_cloth for hold in result.fold.holds) > 0
     for line, hold in zip(thick, result.fold.holds, strict=True):
         times = line.get_xdata()
         assert hold.begin <= times.min() and times.max() <= hold.end
@@ -191,7 +191,7 @@ def test_one_hand_away_is_a_warning(folded):
     result = nuno.replay_fold(None, [near, far], **options(folded, masks=None, materials={"true": TRUE}))
     assert any("hand 1 holds" in warning and "moved nothing" in warning for warning in result.warnings)
     assert any("no frame to compare" in warning for warning in result.warnings)
-    assert [hold.touched for hold in result.fold.holds] == [True, False]
+    assert [hold.held_cloth for hold in result.fold.holds] == [True, False]
 
 
 def test_a_hold_that_begins_later(folded):
@@ -204,7 +204,7 @@ def test_a_hold_that_begins_later(folded):
     )
     result = nuno.replay_fold(None, [early], **options(folded, masks=None, materials={"true": TRUE}))
     (hold,) = result.fold.holds
-    assert hold.begin == pytest.approx(0.45) and hold.end == np.inf and hold.touched
+    assert hold.begin == pytest.approx(0.45) and hold.end == np.inf and hold.held_cloth
     np.testing.assert_allclose(result.vertices[4], result.vertices[0], atol=2e-4)  # it settles on the table
     assert result.final[:, 2].max() > TOP + 0.01
 

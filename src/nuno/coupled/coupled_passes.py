@@ -7,6 +7,7 @@ from nuno.coupled.contact_rows import Rows, drag_row, forget_sharers, join_row, 
 from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint, projections_of, settle_spins, sum_joint
 from nuno.coupled.joint_contacts import press_entries, press_others
 from nuno.coupled.joint_response import Joints
+from nuno.coupled.joint_tree import Trees, project_trees
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, island_of, note_wrong
 from nuno.coupled.tie_constraints import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
 from nuno.numbers.lanes import barrier
@@ -113,7 +114,7 @@ def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
 @wp.kernel(enable_backward=False)
 def solve(
     particles: Particles, rigid: RigidState, parts: Parts, manifolds: Contacts, rows: Rows, ties: Ties, holds: Holds,
-    joints: Joints, passing: Passing, dt: float, fraction: float, passes: int, at_once: int, size: int,
+    joints: Joints, trees: Trees, passing: Passing, dt: float, fraction: float, passes: int, at_once: int, size: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
@@ -174,8 +175,15 @@ def solve(
                         off = project_hold(rigid, holds, world, k, dt, fraction)
                         note_wrong(passing, island, off, size)
                         wrong = wp.max(wrong, off)
-                for at in range(projections_of(joints)):
-                    k = joint_at(joints, at)
+                project_trees(rigid, joints, trees, passing, world, dt)
+                for t in range(trees.count):
+                    off = trees.wrong[world * trees.count + t]
+                    island = island_of(passing, world, joints.body[trees.joint[t]])
+                    if goes_on(passing, island):
+                        note_wrong(passing, island, off, size)
+                        wrong = wp.max(wrong, off)
+                for at in range(projections_of(trees.lone)):
+                    k = trees.alone[joint_at(trees.lone, at)]
                     island = island_of(passing, world, joints.body[k])
                     if goes_on(passing, island):
                         off = project_joint(rigid, joints, world, k, dt)

@@ -55,14 +55,17 @@ def wrapped(angle: float):
 
 @wp.func
 def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, free: float, dt: float):
-    """Return how far the free direction comes from ``free``, where it ends without what acts along it.
+    """Return how far the free direction comes from ``free``, and the slope there of what acts along it.
+
+    The slope is what a unit more of way takes of the multiplier; it is infinite where a stop, friction or a motor that
+    keeps its velocity hold it.
 
     Args:
         drive: What acts along it.
         first: Where its numbers begin.
         w: How far a unit of multiplier moves it.
         start: Where the substep began.
-        free: See above.
+        free: Where it ends without what acts along it.
         dt: Of the substep [s].
     """
     h2 = dt * dt
@@ -71,9 +74,9 @@ def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, fre
     k = drive[first + SPRING] * h2
     late = wp.max(0.0, 1.0 - 1.0 / wp.max(k * w, 1.0))
     damp = drive[first + SPRING_DAMPING] * dt
-    slope = k * late + damp
+    passive = k * late + damp
     force = k * (drive[first + REST] - start) + k * late * back + damp * back
-    stiff = 1.0 / w + slope
+    stiff = 1.0 / w + passive
     # motor
     most = drive[first + EFFORT] * h2
     kd = drive[first + DAMPING]
@@ -95,16 +98,26 @@ def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, fre
     needed = stiff * back - force - held
     rub = drive[first + FRICTION] * h2
     went = back
+    slope = float(passive + a)
+    if rub > 0.0 or exact:
+        slope = wp.inf
     if wp.abs(needed) > rub:
         sum = force + wp.sign(needed) * rub
-        effort = wp.clamp(b - a * ((sum + b) / (stiff + a)), -most, most)
+        effort = b - a * ((sum + b) / (stiff + a))
+        slope = passive + a
         if exact:
-            effort = wp.clamp(stiff * aim - sum, -most, most)
+            effort = stiff * aim - sum
+            slope = wp.inf
+        if wp.abs(effort) > most:
+            effort = wp.sign(effort) * most
+            slope = passive
         went = (sum + effort) / stiff
     # stops; what starts beyond one comes back no faster than other joints mend
     low = wp.min(drive[first + LOWER] - free, back + CATCH_UP * dt)
     high = wp.max(drive[first + UPPER] - free, back - CATCH_UP * dt)
-    return wp.clamp(went, low, high)
+    if went < low or went > high:
+        slope = wp.inf
+    return wp.clamp(went, low, high), slope
 
 
 @wp.func
@@ -138,7 +151,7 @@ def project_axis(
         w = wp.dot(axis, block.push * axis) + wp.dot(block.push * axis, pull) + wp.dot(turns, twist)
         pull = pull + axis
     old = joints.axial[r]
-    went = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt)
+    went, _slope = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt)
     change = went / w - old
     joints.axial[r] = old + change
     joints.pull[r] = joints.pull[r] + pull * change

@@ -28,8 +28,7 @@ from nuno.coupled.tie_constraints import CATCH_UP, UNMET, left_over, stand_on, w
 from nuno.rigid.rigid_body import RigidState, in_world, point_before, point_of, rotation_between
 
 JOINT_SWEEPS = wp.constant(8)
-"""Times that joints are gone through in a pass, where there are several: a chain of six links of 20 g on which 5 kg
-swing comes apart by 0.09 mm, with one sweep by 0.43, with 16 by 0.03."""
+"""Times that joints outside of trees are gone through in a pass, where there are several."""
 ROUNDING = wp.constant(2.0e-7)
 """[m], [rad] What rounding of coordinates leaves of a joint, at a metre from the origin."""
 
@@ -109,17 +108,17 @@ def joint_apart(rigid: RigidState, joints: Joints, world: int, k: int, dt: float
 
 
 @wp.func
-def projections_of(joints: Joints):
-    """Return how many projections of joints a pass has; one joint by itself needs no more than one."""
-    return wp.where(joints.count > 1, JOINT_SWEEPS * joints.count, joints.count)
+def projections_of(count: int):
+    """Return how many projections a pass has of ``count`` joints; one by itself needs no more than one."""
+    return wp.where(count > 1, JOINT_SWEEPS * count, count)
 
 
 @wp.func
-def joint_at(joints: Joints, at: int):
-    """The joint whose turn it is: to and fro, so that both ends of a chain are heard alike."""
-    k = at % joints.count
-    if (at / joints.count) % 2 == 1:
-        k = joints.count - 1 - k
+def joint_at(count: int, at: int):
+    """Return which of ``count`` joints a projection is of: to and fro, so that both ends of a loop are heard alike."""
+    k = at % count
+    if (at / count) % 2 == 1:
+        k = count - 1 - k
     return k
 
 

@@ -14,6 +14,7 @@ from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import IMPULSE_UNIT, Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.joint_response import Joints
+from nuno.coupled.joint_tree import Trees
 from nuno.coupled.pass_progress import Passing
 from nuno.coupled.shape_bounds import Surroundings, bound_particles
 from nuno.coupled.tie_constraints import Holds, Ties
@@ -55,6 +56,7 @@ class Coupling:
         ties: Points that stay together.
         holds: Rigid bodies that are held in a frame.
         joints: Rigid bodies that are joined.
+        trees: The trees that joints make.
 
     Attributes:
         kinematic: Slots of rigid bodies that others lead.
@@ -71,9 +73,11 @@ class Coupling:
         ties: Ties,
         holds: Holds,
         joints: Joints,
+        trees: Trees,
     ) -> None:
         self._solvers, self._rigid, self._slots = list(solvers), rigid, list(slots)
         self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
+        self._trees = trees
         self._scale = self._rate = 0.0
         self._listed = 0
         first = rigid if rigid is not None else solvers[0]
@@ -318,8 +322,8 @@ class Coupling:
         if self._listed or self._ties.count or self.holds.count or self.joints.count:
             self._go(
                 solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
-                self.holds, self.joints, self._passing, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
-                int(self._at_once), self._threads,
+                self.holds, self.joints, self._trees, self._passing, dt, fraction,
+                PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
             )  # fmt: skip
             if self._listed:
                 self._go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)

@@ -8,7 +8,9 @@ import numpy as np
 import warp as wp
 
 from nuno.coupled.joint_response import Joints
+from nuno.coupled.joint_tree import Trees
 from nuno.joints.joint import KINDS, Joint, JointSpec
+from nuno.tables.joint_trees import ANCHOR, tree_table
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -26,7 +28,7 @@ class CoupledJoints:
 
     def __init__(self, world: Simulation, joints: list[Joint], bodies: list[Body]) -> None:
         self.joints = joints
-        self.table = Joints()
+        self.table, self.trees = Joints(), Trees()
         self._specs: list[JointSpec] = []
         self._device = str(world.device)
         count, worlds, scene = len(joints), world.world_count, world._rigid
@@ -64,6 +66,12 @@ class CoupledJoints:
             ("total_twist", wp.vec3), ("total_axial", float), ("unmet", int),
         ):  # fmt: skip
             setattr(self.table, name, wp.zeros(worlds * count, dtype=kind, device=self._device))
+        pairs = [
+            (own, other if other is not None and joint.target is not None and joint.target.is_dynamic else ANCHOR)
+            for joint, own, other in zip(joints, slots, other_slots, strict=True)
+            if own is not None
+        ]
+        self.trees = tree_table(pairs, worlds, self._device)
         self.bring()
 
     def bring(self) -> None:

@@ -87,7 +87,14 @@ class CoupledBodies:
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
         self._joints = CoupledJoints(world, [grip for grip in ties if isinstance(grip, Joint)], self.bodies)
         self.coupling = Coupling(
-            solvers, rigid, slots, elements, self._make_ties(), self._make_holds(), self._joints.table
+            solvers,
+            rigid,
+            slots,
+            elements,
+            self._make_ties(),
+            self._make_holds(),
+            self._joints.table,
+            self._joints.trees,
         )
 
     def is_current(self) -> bool:
