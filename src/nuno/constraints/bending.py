@@ -13,8 +13,8 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, is_set
-from nuno.numbers.lanes import add, div, full_like, maximum, mul, sqrt, sub  # noqa: F401
-from nuno.numbers.vec3 import cross, dot, move, offset, position, put_position
+from nuno.numbers.lanes import add, div, full_like, maximum, mul, product, sqrt, sub  # noqa: F401
+from nuno.numbers.vec3 import cross, dot, offset, position, put_position
 
 
 @wp.func
@@ -29,20 +29,29 @@ def bend_stiffness(weight: Any, alpha: Any):
 
 
 @wp.func
-def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any):
-    """Three vertices in a row: c = x_0 - 2 x_1 + x_2."""
-    xa = position(t, a)
-    xb = position(t, b)
-    xc = position(t, c)
-    wa = at(t.w, a)
-    wb = at(t.w, b)
-    wc = at(t.w, c)
+def bend_alpha(compliance: Any, scale: Any, rate: float):
+    """The compliance of a bend over dt^2: the material's, times the factor of its size and ``rate``, 1 / dt^2."""
+    return product(compliance, scale * rate)
+
+
+@wp.func
+def project_line(xa: Any, xb: Any, xc: Any, wa: Any, wb: Any, wc: Any, alpha: Any):
+    """Three vertices in a row: c = x_0 - 2 x_1 + x_2. Returns their positions after the update."""
     error = offset(xa, xb) - offset(xb, xb) * 2.0 + offset(xc, xb)
     weight = wa + wb * 4.0 + wc
     s = -1.0 / bend_stiffness(weight, alpha)
-    put_position(t, a, xa + error * (s * wa))
-    put_position(t, b, xb + error * (s * wb * -2.0))
-    put_position(t, c, xc + error * (s * wc))
+    return xa + error * (s * wa), xb + error * (s * wb * -2.0), xc + error * (s * wc)
+
+
+@wp.func
+def bend_line(t: Any, a: Any, b: Any, c: Any, alpha: Any):
+    """`project_line` of three particles."""
+    xa, xb, xc = project_line(
+        position(t, a), position(t, b), position(t, c), at(t.w, a), at(t.w, b), at(t.w, c), alpha
+    )  # fmt: skip
+    put_position(t, a, xa)
+    put_position(t, b, xb)
+    put_position(t, c, xc)
 
 
 @wp.func
@@ -52,19 +61,25 @@ def twist_of(a: Any, b: Any, c: Any, d: Any):
 
 
 @wp.func
-def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any):
-    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3."""
-    error = twist_of(position(t, a), position(t, b), position(t, c), position(t, d))
-    wa = at(t.w, a)
-    wb = at(t.w, b)
-    wc = at(t.w, c)
-    wd = at(t.w, d)
+def project_twist(xa: Any, xb: Any, xc: Any, xd: Any, wa: Any, wb: Any, wc: Any, wd: Any, alpha: Any):
+    """The corners of a cell: c = x_0 - x_1 - x_2 + x_3. Returns their positions after the update."""
+    error = twist_of(xa, xb, xc, xd)
     weight = wa + wb + wc + wd
     s = -1.0 / bend_stiffness(weight, alpha)
-    move(t, a, error * (s * wa))
-    move(t, b, error * (-s * wb))
-    move(t, c, error * (-s * wc))
-    move(t, d, error * (s * wd))
+    return xa + error * (s * wa), xb + error * (-s * wb), xc + error * (-s * wc), xd + error * (s * wd)
+
+
+@wp.func
+def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any):
+    """`project_twist` of four particles."""
+    xa, xb, xc, xd = project_twist(
+        position(t, a), position(t, b), position(t, c), position(t, d),
+        at(t.w, a), at(t.w, b), at(t.w, c), at(t.w, d), alpha,
+    )  # fmt: skip
+    put_position(t, a, xa)
+    put_position(t, b, xb)
+    put_position(t, c, xc)
+    put_position(t, d, xd)
 
 
 @wp.func

@@ -12,10 +12,10 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.bending import bend_stiffness, total, twist_of
+from nuno.constraints.bending import bend_alpha, bend_stiffness, total, twist_of
 from nuno.numbers.block_group import wait_for
 from nuno.numbers.element_access import at, corner, factor_like
-from nuno.numbers.lanes import add, div, lane, mul, product, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, mul, product, sub  # noqa: F401
 from nuno.numbers.vec3 import put_velocity, velocity
 from nuno.state.cloth_state import DAMPING, Settings
 
@@ -87,34 +87,18 @@ def damp_patch(t: Any, table: Any, k: int, alpha: Any, gamma: Any):
 
 
 @wp.func
-def softness(soft: float, scale: float):
-    """A compliance over dt^2, rounded by itself, so that CUDA's plans have the same bits."""
-    return product(soft, scale)
-
-
-@wp.func
-def softness(soft: lane, scale: float):
-    return soft * scale
-
-
-@wp.func
-def softness(soft: lane, scale: lane):
-    return soft * scale
-
-
-@wp.func
 def damp_bends(t: Any, table: Any, run: Settings, rank: int, size: int, those: Any):
     """The damping of all bends, colour by colour, by ``those``: the threads of a block, so many, or a block group."""
     rate = 1.0 / (run.dt * run.dt)
     damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for colour in range(table.patch_colour.shape[0] - 1):
         for k in range(table.patch_colour[colour] + rank, table.patch_colour[colour + 1], size):
-            alpha = softness(at(t.bend_compliance, table.patch_compliance[k]), rate)
+            alpha = product(at(t.bend_compliance, table.patch_compliance[k]), rate)
             damp_patch(t, table, k, alpha, factor_like(alpha, damping))
         wait_for(those)
     for colour in range(table.twist_colour.shape[0] - 1):
         for k in range(table.twist_colour[colour] + rank, table.twist_colour[colour + 1], size):
-            alpha = softness(at(t.bend_compliance, table.twist_compliance[k]), table.twist_scale[k] * rate)
+            alpha = bend_alpha(at(t.bend_compliance, table.twist_compliance[k]), table.twist_scale[k], rate)
             a = corner(table.twist, k, 0, 4)
             b = corner(table.twist, k, 1, 4)
             c = corner(table.twist, k, 2, 4)
@@ -123,7 +107,7 @@ def damp_bends(t: Any, table: Any, run: Settings, rank: int, size: int, those: A
         wait_for(those)
     for colour in range(table.line_colour.shape[0] - 1):
         for k in range(table.line_colour[colour] + rank, table.line_colour[colour + 1], size):
-            alpha = softness(at(t.bend_compliance, table.line_compliance[k]), table.line_scale[k] * rate)
+            alpha = bend_alpha(at(t.bend_compliance, table.line_compliance[k]), table.line_scale[k], rate)
             a = corner(table.line, k, 0, 3)
             b = corner(table.line, k, 1, 3)
             c = corner(table.line, k, 2, 3)

@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, corner, put
-from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401
+from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
 
 MOST_RELAXED = wp.constant(1.45)
@@ -30,16 +30,51 @@ def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
     return minimum(maximum((sqrt(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
 
 
+# The rows of a grid line. Its edges C_k = |x_k - x_k+1| - rest_k are linear in their lambdas, with a matrix of three
+# diagonals: `edge_diagonal`, and beside it minus `edge_coupling`; on the right stands rest length less length. Whatever
+# solves them (below one thread from end to end; several on CUDA, in `nuno.plans`) takes its rows from here.
+@wp.func
+def stretch_alpha(compliance: Any, scale: Any, rate: float):
+    """The compliance of an edge over dt^2: the material's, times the factor of its size and ``rate``, 1 / dt^2."""
+    return compliance * (scale * rate)
+
+
+@wp.func
+def edge_direction(a: Any, b: Any):
+    """The unit vector from b to a, their distance, and one over that; two vertices in one place are 1e-10 m apart."""
+    edge = a - b
+    length = sqrt(dot(edge, edge) + 1.0e-20)
+    inverse = 1.0 / length
+    return edge * inverse, length, inverse
+
+
+@wp.func
+def edge_diagonal(wa: Any, wb: Any, alpha: Any):
+    """The diagonal of an edge's row: w_k + w_k+1 + alpha_k."""
+    return wa + wb + alpha + 1.0e-12
+
+
+@wp.func
+def edge_coupling(w: Any, before: Any, direction: Any):
+    """Minus the entry beside the diagonal, shared by the edges that meet at a vertex of inverse mass ``w``."""
+    return w * dot(before, direction)
+
+
+@wp.func
+def between_pulls(w: Any, after: Any, before: Any):
+    """The move of the vertex between two edges, by lambda times direction of either."""
+    return w * (after - before)
+
+
 @wp.func
 def stretch_grid_line(
     t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
 ):
     """All edges of a grid line at once: C_k = |x_k - x_k+1| - rest_k.
 
-    Linear in its lambdas, a grid line has a matrix of three diagonals: w_k + w_k+1 + alpha_k, and coupling it -w_k
-    times the cosine between the edges that meet at vertex k. Elimination forth and substitution back solve it exactly,
-    so that a force runs the whole length of a grid line in one substep. (The direct solution of a chain of XPBD
-    constraints: Deul et al. 2018, "Direct Position-Based Solver for Stiff Rods".)
+    Elimination forth and substitution back solve their rows exactly, so that a force runs the whole length of a grid
+    line in one substep. (The direct solution of a chain of XPBD constraints: Deul et al. 2018, "Direct Position-Based
+    Solver for Stiff Rods".)
 
     Args:
         t: The world's state.
@@ -63,19 +98,16 @@ def stretch_grid_line(
         j = corner(table.edge, k, 1, 2)
         b = position(t, j)
         wb = at(t.w, j)
-        edge = a - b
-        length = sqrt(dot(edge, edge) + 1.0e-20)
-        direction = edge * (1.0 / length)
-        # minus the entry beside the diagonal, shared with the edge before
-        coupling = wa * dot(before, direction)
+        direction, length, inverse = edge_direction(a, b)
+        coupling = edge_coupling(wa, before, direction)
         gain = coupling * pivot
         if k > first:
             put(gains, k - 1, gain)
-        alpha = at(t.stretch_compliance, table.edge_compliance[k]) * (table.edge_scale[k] * rate)
-        pivot = 1.0 / (wa + wb + alpha + 1.0e-12 - coupling * gain)
+        alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[k]), table.edge_scale[k], rate)
+        pivot = 1.0 / (edge_diagonal(wa, wb, alpha) - coupling * gain)
         pull = (rest[k] - length + coupling * pull) * pivot
         put(pulls, k, pull)
-        put(inverses, k, 1.0 / length)
+        put(inverses, k, inverse)
         a = b
         wa = wb
         before = direction
@@ -89,38 +121,50 @@ def stretch_grid_line(
             pull = at(pulls, k) + at(gains, k) * pull
         b = position(t, i)
         own = (b - a) * (pull * at(inverses, k))
-        put_position(t, j, a + at(t.w, j) * (force - own))
+        put_position(t, j, a + between_pulls(at(t.w, j), force, own))
         a = b
         force = own
     move(t, head, force * at(t.w, head))
 
 
 @wp.func
-def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
+def shear_alpha(compliance: Any, scale: Any, rate: float):
+    """The compliance of a cell's shear over dt^2: the material's over the area, 1 / (4 scale), times ``rate``."""
+    return product(compliance, scale * 4.0 * rate)
+
+
+@wp.func
+def project_cell(
+    xa: Any, xb: Any, xc: Any, xd: Any, wa: Any, wb: Any, wc: Any, wd: Any, scale: Any, alpha: Any, past: Any,
+    rise: float, onset: float,
+):  # fmt: skip
     """A rectangular cell: C = F_u . F_v = s (|p|^2 - |q|^2), p = x_d - x_a and q = x_b - x_c its diagonals.
 
-    Its gradients are 2 s p at d, -2 s p at a, 2 s q at c and -2 s q at b; ``scale`` is s = 1 / (4 area). Returned is
-    minus the change of lambda; ``past`` is the sum of those of this substep, and the last two are `relaxation`'s.
+    Its gradients are 2 s p at d, -2 s p at a, 2 s q at c and -2 s q at b; ``scale`` is s = 1 / (4 area). Returned are
+    minus the change of lambda and the positions after the update; ``past`` is the sum of those of this substep, and the
+    last two are `relaxation`'s.
     """
-    xa = position(t, a)
-    xb = position(t, b)
-    xc = position(t, c)
-    xd = position(t, d)
     p = xd - xa
     q = xb - xc
     pp = dot(p, p)
     qq = dot(q, q)
-    wa = at(t.w, a)
-    wb = at(t.w, b)
-    wc = at(t.w, c)
-    wd = at(t.w, d)
     weight = ((wa + wd) * pp + (wb + wc) * qq) * (scale * 4.0 * scale) + alpha + 1.0e-12
     gain = ((pp - qq) * scale - alpha * past) / weight * relaxation(weight, alpha, rise, onset)
     s = gain * (scale * 2.0)
-    put_position(t, a, xa + p * (s * wa))
-    put_position(t, d, xd - p * (s * wd))
-    put_position(t, b, xb + q * (s * wb))
-    put_position(t, c, xc - q * (s * wc))
+    return gain, xa + p * (s * wa), xb + q * (s * wb), xc - q * (s * wc), xd - p * (s * wd)
+
+
+@wp.func
+def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, past: Any, rise: float, onset: float):
+    """`project_cell` of four particles; returned is minus the change of lambda."""
+    gain, xa, xb, xc, xd = project_cell(
+        position(t, a), position(t, b), position(t, c), position(t, d),
+        at(t.w, a), at(t.w, b), at(t.w, c), at(t.w, d), scale, alpha, past, rise, onset,
+    )  # fmt: skip
+    put_position(t, a, xa)
+    put_position(t, d, xd)
+    put_position(t, b, xb)
+    put_position(t, c, xc)
     return gain
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.membrane import shear_cell, shear_triangle, stretch_triangle
+from nuno.constraints.membrane import shear_alpha, shear_cell, shear_triangle, stretch_triangle
 from nuno.numbers.element_access import at, corner, put
 from nuno.numbers.lanes import add, div, full_like, mul, sqrt, sub  # noqa: F401
 from nuno.state.cloth_state import Settings
@@ -34,7 +34,7 @@ def shear_cells_again(
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
         scale = table.cell_scale[k]
-        alpha = at(t.shear_compliance, table.cell_compliance[k]) * (scale * 4.0 * rate)
+        alpha = shear_alpha(at(t.shear_compliance, table.cell_compliance[k]), scale, rate)
         a = corner(table.cell, k, 0, 4)
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)

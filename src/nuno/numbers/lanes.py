@@ -123,6 +123,16 @@ def product(a: float, b: float) -> float:
     ...
 
 
+@wp.func
+def product(a: lane, b: float):
+    return a * b
+
+
+@wp.func
+def product(a: lane, b: lane):
+    return a * b
+
+
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
 return fmaf(a, b, c);

@@ -8,9 +8,9 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.bending import bend_line, bend_twist
-from nuno.constraints.membrane import shear_cell
-from nuno.numbers.lanes import barrier, product
+from nuno.constraints.bending import bend_alpha, bend_line, bend_twist
+from nuno.constraints.membrane import shear_alpha, shear_cell
+from nuno.numbers.lanes import barrier
 from nuno.state.cloth_state import Settings, Topology
 
 
@@ -82,7 +82,7 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, rank: int, size: in
         compliance = t.bend_compliance[ready.compliance]
         for c in range(colours):
             now = ready
-            alpha = product(compliance, now.scale * rate)
+            alpha = bend_alpha(compliance, now.scale, rate)
             start = last
             stop = table.line_colour[wp.min(c + 2, colours)]
             ready = read_line(table, start + rank, stop)
@@ -90,7 +90,7 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, rank: int, size: in
                 bend_line(t, now.a, now.b, now.c, alpha)
             for k in range(first + rank + size, last, size):
                 element = read_line(table, k, last)
-                alpha = product(t.bend_compliance[element.compliance], element.scale * rate)
+                alpha = bend_alpha(t.bend_compliance[element.compliance], element.scale, rate)
                 bend_line(t, element.a, element.b, element.c, alpha)
             compliance = t.bend_compliance[ready.compliance]
             first = start
@@ -110,7 +110,7 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, rank: int, size: i
         compliance = t.bend_compliance[ready.compliance]
         for c in range(colours):
             now = ready
-            alpha = product(compliance, now.scale * rate)
+            alpha = bend_alpha(compliance, now.scale, rate)
             start = last
             stop = table.twist_colour[wp.min(c + 2, colours)]
             ready = read_twist(table, start + rank, stop)
@@ -118,7 +118,7 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, rank: int, size: i
                 bend_twist(t, now.a, now.b, now.c, now.d, alpha)
             for k in range(first + rank + size, last, size):
                 element = read_twist(table, k, last)
-                alpha = product(t.bend_compliance[element.compliance], element.scale * rate)
+                alpha = bend_alpha(t.bend_compliance[element.compliance], element.scale, rate)
                 bend_twist(t, element.a, element.b, element.c, element.d, alpha)
             compliance = t.bend_compliance[ready.compliance]
             first = start
@@ -138,7 +138,7 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, rank: int, size: i
         compliance = t.shear_compliance[ready.compliance]
         for c in range(colours):
             now = ready
-            alpha = product(compliance, now.scale * 4.0 * rate)
+            alpha = shear_alpha(compliance, now.scale, rate)
             start = last
             stop = table.cell_colour[wp.min(c + 2, colours)]
             ready = read_cell(table, start + rank, stop)
@@ -146,7 +146,7 @@ def shear_cells_ahead(t: Any, table: Topology, run: Settings, rank: int, size: i
                 shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha, 0.0, 0.0, 0.0)
             for k in range(first + rank + size, last, size):
                 element = read_cell(table, k, last)
-                alpha = product(t.shear_compliance[element.compliance], element.scale * 4.0 * rate)
+                alpha = shear_alpha(t.shear_compliance[element.compliance], element.scale, rate)
                 shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha, 0.0, 0.0, 0.0)
             compliance = t.shear_compliance[ready.compliance]
             first = start

@@ -9,10 +9,10 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.bending import bend_line, bend_patch, bend_twist
+from nuno.constraints.bending import bend_alpha, bend_line, bend_patch, bend_twist
 from nuno.constraints.damping import damp_bends
 from nuno.constraints.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.constraints.membrane import shear_cell, shear_triangle, stretch_grid_line, stretch_triangle
+from nuno.constraints.membrane import shear_alpha, shear_cell, shear_triangle, stretch_grid_line, stretch_triangle
 from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.contact.particle.feature_contact import push_active, push_features, travel_of_substep
 from nuno.contact.particle.feature_lists import EARLIEST, TRAVELLED, clear_features, list_features, mark_features
@@ -21,7 +21,8 @@ from nuno.contact.particle.static_shape_contact import touch_shapes_together
 from nuno.contact.self.list_rebuild import rebuild_lists
 from nuno.contact.self.self_contact import take_moves, touch_edge_edge, touch_vertex_triangle
 from nuno.numbers.element_access import at, corner
-from nuno.numbers.lanes import add, barrier, div, full_like, mul, shares_work, sub  # noqa: F401
+from nuno.numbers.lanes import add, barrier, div, full_like, mul, product, shares_work, sub  # noqa: F401
+from nuno.numbers.warp_lanes import lane_of
 from nuno.numbers.warps import WARP, in_warps
 from nuno.plans.cloth_prefetch import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
 from nuno.plans.grid_lines_by_threads import GRID_LINE_EDGES, stretch_grid_lines_by_threads
@@ -54,7 +55,7 @@ def bend_lines(t: Any, table: Any, run: Settings, first: int, last: int, rank: i
     """The line bends of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
-        alpha = at(t.bend_compliance, table.line_compliance[k]) * (table.line_scale[k] * rate)
+        alpha = bend_alpha(at(t.bend_compliance, table.line_compliance[k]), table.line_scale[k], rate)
         a = corner(table.line, k, 0, 3)
         b = corner(table.line, k, 1, 3)
         c = corner(table.line, k, 2, 3)
@@ -66,7 +67,7 @@ def bend_twists(t: Any, table: Any, run: Settings, first: int, last: int, rank: 
     """The cell twists of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
-        alpha = at(t.bend_compliance, table.twist_compliance[k]) * (table.twist_scale[k] * rate)
+        alpha = bend_alpha(at(t.bend_compliance, table.twist_compliance[k]), table.twist_scale[k], rate)
         a = corner(table.twist, k, 0, 4)
         b = corner(table.twist, k, 1, 4)
         c = corner(table.twist, k, 2, 4)
@@ -79,7 +80,7 @@ def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, rank:
     """The triangles' curvatures of one colour."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
-        alpha = at(t.bend_compliance, table.patch_compliance[k]) * rate
+        alpha = product(at(t.bend_compliance, table.patch_compliance[k]), rate)
         bend_patch(t, table, k, alpha)
 
 
@@ -89,7 +90,7 @@ def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, rank: 
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
         scale = table.cell_scale[k]
-        alpha = at(t.shear_compliance, table.cell_compliance[k]) * (scale * 4.0 * rate)
+        alpha = shear_alpha(at(t.shear_compliance, table.cell_compliance[k]), scale, rate)
         a = corner(table.cell, k, 0, 4)
         b = corner(table.cell, k, 1, 4)
         c = corner(table.cell, k, 2, 4)
@@ -136,10 +137,9 @@ def stretch_grid_lines(
     if in_warps(size) and first < last:
         count = table.grid_line[first + 1] - table.grid_line[first]
     if count > 0 and count <= GRID_LINE_EDGES:
+        varied = sweep > 0 or t.stretch_compliance.shape[0] > STRETCH_KINDS
         stretch_grid_lines_by_threads(
-            t.x, t.y, t.z, t.w, t.stretch_compliance, table.edge, rest, table.edge_scale, table.edge_compliance,
-            table.grid_line[first],
-            count, last - first, sweep > 0 or t.stretch_compliance.shape[0] > STRETCH_KINDS, rate, size,
+            t, table, rest, table.grid_line[first], count, last - first, varied, rate, lane_of(rank, size)
         )  # fmt: skip
     else:
         for k in range(first + rank, last, size):
@@ -177,11 +177,7 @@ def stretch_grid_lines(
             if wp.max(stop - start, end - other) > PAIR_EDGES:
                 end = other
             if stop - start <= WARP_EDGES:
-                stretch_double_grid_lines(
-                    t.x, t.y, t.z, t.w, t.stretch_compliance, table.edge, rest, table.edge_scale,
-                    table.edge_compliance, start,
-                    stop, other, end, rate,
-                )  # fmt: skip
+                stretch_double_grid_lines(t, table, rest, start, stop, other, end, rate, lane_of(rank, size))
             elif rank % WARP == 0:
                 stretch_grid_line(
                     t, table, rest, t.grid_line_gain, t.grid_line_pull, t.grid_line_inverse, start, stop, rate
@@ -234,7 +230,7 @@ def bend_sheet(t: Any, topo: Topology, run: Settings, rank: int, size: int):
 @wp.func
 def bend_sheet(t: StateFloat, topo: Topology, run: Settings, rank: int, size: int):
     if in_warps(size) and fits_strips(topo):
-        bend_in_strips(t, topo, run, size)
+        bend_in_strips(t, topo, run, rank, size)
     else:
         bend_one_sheet(t, topo, run, rank, size)
 

@@ -1,119 +1,110 @@
-"""grid lines' stretch by all threads of a CUDA block: a thread an edge.
+"""A grid line's stretch by all threads of a CUDA block: a thread an edge.
 
-As in `nuno.plans.grid_lines_by_threads` all rows are freed of their neighbours at once, step by step, but the rows lie
-in the block's own memory. grid lines that follow one another are solved side by side: where one ends, its row is linked
-to none.
+As in `nuno.plans.grid_lines_by_warp` all rows are freed of their neighbours at once, step by step, but the rows lie in
+the block's own memory. Grid lines that follow one another are solved side by side: where one ends, its row is linked to
+none.
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.constraints.membrane import stretch_grid_line
-from nuno.numbers.doubles import float64
-from nuno.numbers.lanes import barrier, shares_work
+from nuno.constraints.membrane import (
+    between_pulls,
+    edge_coupling,
+    edge_diagonal,
+    edge_direction,
+    stretch_alpha,
+    stretch_grid_line,
+)
+from nuno.numbers.element_access import at, corner
+from nuno.numbers.lanes import barrier, mul, shares_work, sub  # noqa: F401 (mul, sub: the operators)
+from nuno.numbers.tridiagonal import free_row
+from nuno.numbers.vec3 import move, position, vec3
 from nuno.plans.cloth_substep import stretch_grid_lines
 from nuno.state.cloth_state import Settings, Topology
 
-_EDGES = """
+EDGES = wp.constant(512)
+"""Edges that a block takes at once, one for each of at most so many threads."""
+six = wp.types.vector(length=6, dtype=float)
+
+
+@wp.func_native("""
 #if defined(__CUDA_ARCH__)
-__shared__ float rows[2][3][512];
-const int k = threadIdx.x, count = last - first;
-const bool own = k < count;
-const int e = own ? first + k : first;
-const int a = edge.data[e][0], b = edge.data[e][1];
-// an edge goes on from where the one before ended
-const bool linked = own && k > 0 && edge.data[e - 1][1] == a;
-const decltype(x.data[0] + 0.f) px = x.data[b], py = y.data[b], pz = z.data[b];  // as coordinates are
-const float wa = w.data[a], wb = w.data[b];
-float ex = x.data[a] - px, ey = y.data[a] - py, ez = z.data[a] - pz;
-const float length = sqrtf(ex * ex + ey * ey + ez * ez + 1.0e-20f);
-const float inverse = 1.f / length;
-ex *= inverse; ey *= inverse; ez *= inverse;
-rows[0][0][k] = ex; rows[0][1][k] = ey; rows[0][2][k] = ez;
+__shared__ float rows[3072];
+float* own = rows + 1536 * turn;
+own[k] = a; own[512 + k] = b; own[1024 + k] = c;
 __syncthreads();
-float low = linked ? -wa * (rows[0][0][k - 1] * ex + rows[0][1][k - 1] * ey + rows[0][2][k - 1] * ez) : 0.f;
-rows[1][0][k] = low;
-__syncthreads();
-const float s = 1.f / (wa + wb + compliance.data[which.data[e]] * (scale.data[e] * rate) + 1.0e-12f);
-float high = k + 1 < count ? rows[1][0][k + 1] * s : 0.f;
-float pull = (own ? rest.data[e] - length : 0.f) * s;
-low *= s;
-int buffer = 0;
-for (int shift = 1; shift < longest; shift *= 2) {
-    rows[buffer][0][k] = low; rows[buffer][1][k] = high; rows[buffer][2][k] = pull;
-    __syncthreads();
-    const bool down = k >= shift, up = k + shift < 512;
-    const int i = down ? k - shift : 0, j = up ? k + shift : 0;
-    const float lb = down ? rows[buffer][0][i] : 0.f, la = up ? rows[buffer][0][j] : 0.f;
-    const float hb = down ? rows[buffer][1][i] : 0.f, ha = up ? rows[buffer][1][j] : 0.f;
-    const float pb = down ? rows[buffer][2][i] : 0.f, pa = up ? rows[buffer][2][j] : 0.f;
-    const float t = 1.f / (1.f - low * hb - high * la);
-    pull = (pull - low * pb - high * pa) * t;
-    low = -low * lb * t;
-    high = -high * ha * t;
-    buffer = 1 - buffer;
-}
-ex *= pull; ey *= pull; ez *= pull;
-__syncthreads();
-rows[0][0][k] = ex; rows[0][1][k] = ey; rows[0][2][k] = ez;
-__syncthreads();
-if (own) {
-    const bool on = k + 1 < count && edge.data[e + 1][0] == b;
-    x.data[b] = px + wb * ((on ? rows[0][0][k + 1] : 0.f) - ex);
-    y.data[b] = py + wb * ((on ? rows[0][1][k + 1] : 0.f) - ey);
-    z.data[b] = pz + wb * ((on ? rows[0][2][k + 1] : 0.f) - ez);
-    if (!linked) {
-        x.data[a] += wa * ex;
-        y.data[a] += wa * ey;
-        z.data[a] += wa * ez;
-    }
-}
-__syncthreads();
+#else
+// as in nuno.numbers.warp_lanes, for threads that follow one another
+const int next = (int)exchanged.data[0];
+float* own = exchanged.data + 1 + 1536 * next;
+exchanged.data[0] = next + 1;
+own[k] = a; own[512 + k] = b; own[1024 + k] = c;
 #endif
-"""
+wp::vec_t<6, wp::float32> r;
+for (int j = 0; j < 3; ++j) {
+    r[j] = k >= shift ? own[512 * j + k - shift] : 0.f;
+    r[3 + j] = k + shift < 512 ? own[512 * j + k + shift] : 0.f;
+}
+return r;
+""")
+def neighbours(exchanged: wp.array(dtype=float), turn: int, k: int, a: float, b: float, c: float, shift: int) -> six:
+    """Hand three numbers to the other threads, and take those of threads k - shift and k + shift.
 
-
-@wp.func_native(_EDGES)
-def stretch_edges(
-    x: wp.array(dtype=float),
-    y: wp.array(dtype=float),
-    z: wp.array(dtype=float),
-    w: wp.array(dtype=float),
-    compliance: wp.array(dtype=float),
-    edge: wp.array(dtype=wp.vec2i),
-    rest: wp.array(dtype=float),
-    scale: wp.array(dtype=float),
-    which: wp.array(dtype=int),
-    first: int,
-    last: int,
-    longest: int,
-    rate: float,
-):
-    """Solve the edges first to last, those of whole grid lines of at most ``longest`` edges, and move their vertices.
-
-    For the other arguments see `nuno.plans.grid_lines_by_threads.stretch_grid_lines_by_threads`. All threads of the
-    block come here.
+    Calls have 0 and 1 for ``turn`` alternately: what one writes is read until the next but one.
     """
     ...
 
 
-@wp.func_native(_EDGES)
+@wp.func
 def stretch_edges(
-    x: wp.array(dtype=float64),
-    y: wp.array(dtype=float64),
-    z: wp.array(dtype=float64),
-    w: wp.array(dtype=float),
-    compliance: wp.array(dtype=float),
-    edge: wp.array(dtype=wp.vec2i),
-    rest: wp.array(dtype=float),
-    scale: wp.array(dtype=float),
-    which: wp.array(dtype=int),
-    first: int,
-    last: int,
-    longest: int,
-    rate: float,
-): ...
+    t: Any, table: Topology, rest: wp.array(dtype=float), first: int, last: int, longest: int, rate: float, k: int,
+    exchanged: wp.array(dtype=float),
+):  # fmt: skip
+    """Solve the edges first to last, those of whole grid lines of at most ``longest`` edges, and move their vertices.
+
+    All threads k of the block come here; ``exchanged`` is as `nuno.numbers.warp_lanes.Lane` has it. For the other
+    arguments see `nuno.plans.grid_lines_by_warp.stretch_double_grid_lines`.
+    """
+    mine = first + k < last
+    e = wp.where(mine, first + k, first)
+    a = corner(table.edge, e, 0, 2)
+    b = corner(table.edge, e, 1, 2)
+    wa = at(t.w, a)
+    wb = at(t.w, b)
+    direction, length, _inverse = edge_direction(position(t, a), position(t, b))
+    # an edge goes on from where the one before ended
+    linked = bool(False)
+    if mine and k > 0:
+        linked = corner(table.edge, e - 1, 1, 2) == a
+    r = neighbours(exchanged, 0, k, direction.x, direction.y, direction.z, 1)
+    coupling = wp.where(linked, edge_coupling(wa, vec3(r[0], r[1], r[2]), direction), 0.0)
+    r = neighbours(exchanged, 1, k, coupling, 0.0, 0.0, 1)
+    alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[e]), table.edge_scale[e], rate)
+    s = 1.0 / edge_diagonal(wa, wb, alpha)
+    low = coupling * s
+    high = r[3] * s
+    right = wp.where(mine, at(rest, e) - length, 0.0) * s
+    turn = int(0)
+    shift = int(1)
+    while shift < longest:
+        r = neighbours(exchanged, turn, k, low, high, right, shift)
+        low, high, right = free_row(low, high, right, r[0], r[1], r[2], r[3], r[4], r[5])
+        turn = 1 - turn
+        shift = shift * 2
+    pull = direction * right
+    r = neighbours(exchanged, turn, k, pull.x, pull.y, pull.z, 1)
+    if mine:
+        onto = vec3(r[3], r[4], r[5])
+        if k + 1 < last - first:
+            if corner(table.edge, e + 1, 0, 2) != b:
+                onto = onto * 0.0
+        else:
+            onto = onto * 0.0
+        move(t, b, between_pulls(wb, onto, pull))
+        if not linked:
+            move(t, a, wa * pull)
 
 
 @wp.func
@@ -135,24 +126,13 @@ def stretch_grid_lines_of_block(
                 longest = wp.max(longest, table.grid_line[k + 1] - table.grid_line[k])
                 k += 1
             if longest > 0:
-                stretch_edges(
-                    t.x, t.y, t.z, t.w, t.stretch_compliance, table.edge, lengths, table.edge_scale,
-                    table.edge_compliance, start,
-                    table.grid_line[k], longest, rate,
-                )  # fmt: skip
+                stretch_edges(t, table, lengths, start, table.grid_line[k], longest, rate, rank, lengths)
             else:
                 if rank == 0:
                     stretch_grid_line(
-                        t,
-                        table,
-                        lengths,
-                        t.grid_line_gain,
-                        t.grid_line_pull,
-                        t.grid_line_inverse,
-                        start,
-                        table.grid_line[k + 1],
-                        rate,
-                    )
+                        t, table, lengths, t.grid_line_gain, t.grid_line_pull, t.grid_line_inverse, start,
+                        table.grid_line[k + 1], rate,
+                    )  # fmt: skip
                 k += 1
             barrier(size)
     else:

@@ -3,175 +3,174 @@
 What `nuno.constraints.membrane.stretch_grid_line` does from one end to the other takes a step an edge, each waiting for
 the one before. Here each thread eliminates its own rows but the last, as that does, with the last row of the thread
 before as one more unknown (the partition method of Wang, "A parallel method for tridiagonal equations", 1981). What is
-left, a row a thread, is solved by cyclic reduction (Hockney and Jesshope, "Parallel Computers", 1981): in each step a
-row is freed of its neighbours and linked to those twice as far.
+left, a row a thread, is solved by cyclic reduction (`nuno.numbers.tridiagonal`). The rows are the constraint's.
 """
+
+from typing import Any
 
 import warp as wp
 
+from nuno.constraints.membrane import between_pulls, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
+from nuno.numbers.element_access import at, corner
+from nuno.numbers.lanes import add, choose, mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.tridiagonal import free_row
+from nuno.numbers.vec3 import move, position, put_position, vec3
+from nuno.numbers.warp_lanes import LANES_OF_WARP, Lane, above, below, from_above, from_below, quotient
+from nuno.numbers.warps import sync_warp
+from nuno.state.cloth_state import Topology
+
+ROWS = wp.constant(8)
+"""Edges of a thread."""
 GRID_LINE_EDGES = wp.constant(256)
 """Edges of the longest grid line that threads of one warp solve: eight each."""
 
+eight = wp.types.vector(length=8, dtype=float)
 
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-const unsigned all = 0xffffffffu;
-const int lane = threadIdx.x % 32, warp = threadIdx.x / 32, warps = size / 32;
-constexpr int ROWS = 8;
-// read anew, once they are needed again: there are not registers enough to keep them
-auto again = [](const float& a) { return *const_cast<const volatile float*>(&a); };
-int power = 0;
-while ((ROWS << power) < count) ++power;
-const int span = 1 << power, each = 32 >> power, side = lane >> power, q = lane - (side << power);
-for (int begin = warp * each; begin < grid_lines; begin += warps * each) {
-    const int own = begin + side;
-    const int start = first + (own < grid_lines ? own : begin) * count;
-    const int here = own < grid_lines ? count : 0;
-    const int head = edge.data[start][0], step = edge.data[start][1] - head;
-    float length = rest.data[start];
-    float alpha = compliance.data[which.data[start]] * (scale.data[start] * rate);
-    // the thread's rows, and the vertices at both ends of each
-    float vx[ROWS + 1], vy[ROWS + 1], vz[ROWS + 1], vw[ROWS + 1];
-    #pragma unroll
-    for (int r = 0; r <= ROWS; ++r) {
-        const int k = q * ROWS + r;
-        const int i = head + (k < count ? k : count) * step;
-        vx[r] = x.data[i]; vy[r] = y.data[i]; vz[r] = z.data[i]; vw[r] = w.data[i];
-    }
-    float ex[ROWS], ey[ROWS], ez[ROWS], weight[ROWS], pull[ROWS];
-    #pragma unroll
-    for (int r = 0; r < ROWS; ++r) {
-        const bool on = q * ROWS + r < here;
-        if (__builtin_expect(varied, false) && on) {
-            const int k = start + q * ROWS + r;
-            alpha = compliance.data[which.data[k]] * (scale.data[k] * rate);
-            length = rest.data[k];
-        }
-        const float dx = vx[r] - vx[r + 1], dy = vy[r] - vy[r + 1], dz = vz[r] - vz[r + 1];
-        const float square = dx * dx + dy * dy + dz * dz + 1.0e-20f;
-        const float inverse = rsqrtf(square);
-        ex[r] = dx * inverse; ey[r] = dy * inverse; ez[r] = dz * inverse;
-        pull[r] = on ? length - square * inverse : 0.f;
-        weight[r] = on ? vw[r] + vw[r + 1] + alpha + 1.0e-12f : 1.f;
-    }
-    // what links each row to the one before, and the last one to the next thread's first
-    float coupling[ROWS + 1];
-    const float bx = __shfl_up_sync(all, ex[ROWS - 1], 1, span);
-    const float by = __shfl_up_sync(all, ey[ROWS - 1], 1, span);
-    const float bz = __shfl_up_sync(all, ez[ROWS - 1], 1, span);
-    coupling[0] = q > 0 && q * ROWS < here ? vw[0] * (bx * ex[0] + by * ey[0] + bz * ez[0]) : 0.f;
-    #pragma unroll
-    for (int r = 1; r < ROWS; ++r) {
-        const float c = vw[r] * (ex[r - 1] * ex[r] + ey[r - 1] * ey[r] + ez[r - 1] * ez[r]);
-        coupling[r] = q * ROWS + r < here ? c : 0.f;
-    }
-    coupling[ROWS] = __shfl_down_sync(all, coupling[0], 1, span);
-    if (q == span - 1) coupling[ROWS] = 0.f;
-    // row r is now pull + gain (row r + 1) + far (the last row of the thread before)
-    float gain[ROWS], far[ROWS];
-    {
-        const float s = 1.f / weight[0];
-        pull[0] *= s; gain[0] = coupling[1] * s; far[0] = coupling[0] * s;
-    }
-    #pragma unroll
-    for (int r = 1; r < ROWS - 1; ++r) {
-        const float s = 1.f / (weight[r] - coupling[r] * gain[r - 1]);
-        pull[r] = (pull[r] + coupling[r] * pull[r - 1]) * s;
-        gain[r] = coupling[r + 1] * s;
-        far[r] = coupling[r] * far[r - 1] * s;
-    }
-    // the first row by the thread's last and the last before, which the thread before asks for
-    float p = pull[ROWS - 2], g = gain[ROWS - 2], f = far[ROWS - 2];
-    #pragma unroll
-    for (int r = ROWS - 3; r >= 0; --r) {
-        p = pull[r] + gain[r] * p;
-        f = far[r] + gain[r] * f;
-        g = gain[r] * g;
-    }
-    p = __shfl_down_sync(all, p, 1, span);
-    g = __shfl_down_sync(all, g, 1, span);
-    f = __shfl_down_sync(all, f, 1, span);
-    const float near = coupling[ROWS - 1], next = coupling[ROWS];
-    const float s = 1.f / (weight[ROWS - 1] - near * gain[ROWS - 2] - next * f);
-    float low = near * far[ROWS - 2] * s, high = next * g * s;
-    float last = (pull[ROWS - 1] + near * pull[ROWS - 2] + next * p) * s;
-    for (int shift = 1; shift < span; shift *= 2) {
-        const bool down = q >= shift, up = q + shift < span;
-        const float lb = __shfl_up_sync(all, low, shift, span), hb = __shfl_up_sync(all, high, shift, span);
-        const float pb = __shfl_up_sync(all, last, shift, span), la = __shfl_down_sync(all, low, shift, span);
-        const float ha = __shfl_down_sync(all, high, shift, span), pa = __shfl_down_sync(all, last, shift, span);
-        // at the ends ``low`` and ``high`` are zero, and what comes from there is finite
-        const float s = 1.f / (1.f - (down ? low * hb : 0.f) - (up ? high * la : 0.f));
-        last = (last + low * pb + high * pa) * s;
-        low = down ? low * lb * s : 0.f;
-        high = up ? high * ha * s : 0.f;
-    }
-    float before = __shfl_up_sync(all, last, 1, span);
-    if (q == 0) before = 0.f;
-    pull[ROWS - 1] = last;
-    #pragma unroll
-    for (int r = ROWS - 2; r >= 0; --r) pull[r] = pull[r] + gain[r] * pull[r + 1] + far[r] * before;
-    #pragma unroll
-    for (int r = 0; r < ROWS; ++r) { ex[r] *= pull[r]; ey[r] *= pull[r]; ez[r] *= pull[r]; }
-    float nx = __shfl_down_sync(all, ex[0], 1, span);
-    float ny = __shfl_down_sync(all, ey[0], 1, span);
-    float nz = __shfl_down_sync(all, ez[0], 1, span);
-    if (q == span - 1) { nx = 0.f; ny = 0.f; nz = 0.f; }
-    // all have read their vertices before the first shuffle, so that nothing is overwritten too soon
-    __syncwarp();
-    if (q == 0 && here > 0) {
-        x.data[head] += vw[0] * ex[0];
-        y.data[head] += vw[0] * ey[0];
-        z.data[head] += vw[0] * ez[0];
-    }
-    #pragma unroll
-    for (int r = 0; r < ROWS; ++r) {
-        if (q * ROWS + r < here) {
-            const int i = head + (q * ROWS + r + 1) * step;
-            x.data[i] = again(x.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ex[(r + 1) % ROWS] : nx) - ex[r]);
-            y.data[i] = again(y.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ey[(r + 1) % ROWS] : ny) - ey[r]);
-            z.data[i] = again(z.data[i]) + vw[r + 1] * ((r < ROWS - 1 ? ez[(r + 1) % ROWS] : nz) - ez[r]);
-        }
-    }
-}
-#endif
-""")
+
+@wp.func_native("return *const_cast<const volatile float*>(x.data + i);")
+def again(x: wp.array(dtype=float), i: int) -> float:
+    """Element i, read anew once it is needed again: there are not registers enough to keep it."""
+    ...
+
+
+@wp.func
+def entry(x: eight, y: eight, z: eight, r: int):
+    """Vector r of eight."""
+    return vec3(x[r], y[r], z[r])
+
+
+@wp.func
 def stretch_grid_lines_by_threads(
-    x: wp.array(dtype=float),
-    y: wp.array(dtype=float),
-    z: wp.array(dtype=float),
-    w: wp.array(dtype=float),
-    compliance: wp.array(dtype=float),
-    edge: wp.array(dtype=wp.vec2i),
-    rest: wp.array(dtype=float),
-    scale: wp.array(dtype=float),
-    which: wp.array(dtype=int),
-    first: int,
-    count: int,
-    grid_lines: int,
-    varied: bool,
-    rate: float,
-    size: int,
-):
+    t: Any, table: Topology, rest: wp.array(dtype=float), first: int, count: int, grid_lines: int, varied: bool,
+    rate: float, own: Lane,
+):  # fmt: skip
     """Solve the edges of each grid line of one direction at once and move its vertices.
 
     The grid lines are equally long, and their vertices equally far apart in memory.
 
     Args:
-        x: Coordinates; so are ``y`` and ``z`` [m].
-        y: See ``x``.
-        z: See ``x``.
-        w: Inverse masses [1/kg].
-        compliance: The world's compliances.
-        edge: Vertices of the edges, those of one grid line after those of another.
+        t: The world's state, coordinates as floats.
+        table: The edges, those of one grid line after those of another.
         rest: Their lengths [m].
-        scale: What the compliance of each is multiplied with.
-        which: The place of each in ``compliance``.
         first: The first edge of the first grid line.
         count: Edges of a grid line, `GRID_LINE_EDGES` at most.
         grid_lines: How many grid lines.
         varied: Whether the edges of a grid line differ in compliance or length.
         rate: 1 / dt^2 [1/s2].
-        size: Threads of the block, whole warps.
+        own: The thread among those of the block.
     """
-    ...
+    span = int(1)
+    while span * ROWS < count:
+        span = span * 2
+    each = quotient(LANES_OF_WARP, span)
+    side = quotient(own.lane, span)
+    q = own.lane - side * span
+    begin = own.warp * each
+    while begin < grid_lines:
+        mine = begin + side
+        here = wp.where(mine < grid_lines, count, 0)
+        start = first + wp.where(mine < grid_lines, mine, begin) * count
+        head = corner(table.edge, start, 0, 2)
+        step = corner(table.edge, start, 1, 2) - head
+        length = at(rest, start)
+        alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[start]), table.edge_scale[start], rate)
+        # the rows of the thread, and the directions of their edges; of those that are none, y = 0
+        x = eight()
+        y = eight()
+        z = eight()
+        w = eight()
+        diagonal = eight()
+        right = eight()
+        coupling = eight()
+        i = head + wp.min(q * ROWS, count) * step
+        a = position(t, i)
+        wa = at(t.w, i)
+        for r in range(8):
+            k = q * ROWS + r
+            j = head + wp.min(k + 1, count) * step
+            b = position(t, j)
+            wb = at(t.w, j)
+            if varied and k < here:
+                e = start + k
+                alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[e]), table.edge_scale[e], rate)
+                length = at(rest, e)
+            direction, distance, _inverse = edge_direction(a, b)
+            x[r] = direction.x
+            y[r] = direction.y
+            z[r] = direction.z
+            w[r] = wa
+            right[r] = wp.where(k < here, length - distance, 0.0)
+            diagonal[r] = wp.where(k < here, edge_diagonal(wa, wb, alpha), 1.0)
+            if r > 0:
+                coupling[r] = wp.where(k < here, edge_coupling(wa, entry(x, y, z, r - 1), direction), 0.0)
+            a = b
+            wa = wb
+        # what links the first row to the thread before, and the last one to the next thread's first
+        before = below(own, entry(x, y, z, 7), span)
+        linked = q > 0 and q * ROWS < here
+        coupling[0] = wp.where(linked, edge_coupling(w[0], before, entry(x, y, z, 0)), 0.0)
+        onward = from_above(own.exchanged, own.lane, coupling[0], 1, span)
+        onward = wp.where(q == span - 1, 0.0, onward)
+        # row r is now right + gain (row r + 1) + far (the last row of the thread before)
+        gain = eight()
+        far = eight()
+        s = 1.0 / diagonal[0]
+        right[0] = right[0] * s
+        gain[0] = coupling[1] * s
+        far[0] = coupling[0] * s
+        for r in range(1, 7):
+            s = 1.0 / (diagonal[r] - coupling[r] * gain[r - 1])
+            right[r] = (right[r] + coupling[r] * right[r - 1]) * s
+            gain[r] = coupling[r + 1] * s
+            far[r] = coupling[r] * far[r - 1] * s
+        # the first row by the thread's last and the last before, which the thread before asks for
+        p = right[6]
+        g = gain[6]
+        f = far[6]
+        for back in range(6):
+            p = right[5 - back] + gain[5 - back] * p
+            f = far[5 - back] + gain[5 - back] * f
+            g = gain[5 - back] * g
+        p = from_above(own.exchanged, own.lane, p, 1, span)
+        g = from_above(own.exchanged, own.lane, g, 1, span)
+        f = from_above(own.exchanged, own.lane, f, 1, span)
+        s = 1.0 / (diagonal[7] - coupling[7] * gain[6] - onward * f)
+        low = coupling[7] * far[6] * s
+        high = onward * g * s
+        last = (right[7] + coupling[7] * right[6] + onward * p) * s
+        shift = int(1)
+        while shift < span:
+            low_before = from_below(own.exchanged, own.lane, low, shift, span)
+            high_before = from_below(own.exchanged, own.lane, high, shift, span)
+            last_before = from_below(own.exchanged, own.lane, last, shift, span)
+            low_after = from_above(own.exchanged, own.lane, low, shift, span)
+            high_after = from_above(own.exchanged, own.lane, high, shift, span)
+            last_after = from_above(own.exchanged, own.lane, last, shift, span)
+            low, high, last = free_row(
+                low, high, last, low_before, high_before, last_before, low_after, high_after, last_after
+            )  # fmt: skip
+            shift = shift * 2
+        previous = from_below(own.exchanged, own.lane, last, 1, span)
+        previous = wp.where(q == 0, 0.0, previous)
+        right[7] = last
+        for back in range(7):
+            right[6 - back] = right[6 - back] + gain[6 - back] * right[7 - back] + far[6 - back] * previous
+        # all have read their vertices before the first exchange, so that nothing is overwritten too soon
+        sync_warp()
+        pull = entry(x, y, z, 0) * right[0]
+        after = above(own, pull, span)
+        after = choose(float(span - 1 - q), after, after * 0.0)
+        if q == 0 and here > 0:
+            move(t, head, w[0] * pull)
+        for r in range(8):
+            onto = after
+            wb = wa
+            if r < 7:
+                onto = entry(x, y, z, (r + 1) % 8) * right[(r + 1) % 8]
+                wb = w[(r + 1) % 8]
+            if q * ROWS + r < here:
+                j = head + (q * ROWS + r + 1) * step
+                place = vec3(again(t.x, j), again(t.y, j), again(t.z, j))
+                put_position(t, j, place + between_pulls(wb, onto, pull))
+            pull = onto
+        begin += own.warps * each

@@ -1,14 +1,21 @@
 """A grid line's stretch by the 32 threads of a warp on CUDA, where coordinates are doubles.
 
 `nuno.plans.grid_lines_by_threads` reads coordinates again to save registers, in ways that are for floats. Here all rows
-are freed of their neighbours at once by cyclic reduction (Hockney and Jesshope, "Parallel Computers", 1981), a row a
-thread and
-step: each is linked to those twice as far as before.
+are freed of their neighbours at once by cyclic reduction (`nuno.numbers.tridiagonal`), a row a thread and step, with
+the bits of `nuno.plans.grid_lines_by_block`.
 """
+
+from typing import Any
 
 import warp as wp
 
-from nuno.numbers.doubles import float64
+from nuno.constraints.membrane import between_pulls, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
+from nuno.numbers.element_access import at, corner
+from nuno.numbers.lanes import mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.tridiagonal import free_row
+from nuno.numbers.vec3 import move, position, vec3
+from nuno.numbers.warp_lanes import SHUFFLES, Lane
+from nuno.state.cloth_state import Topology
 
 PAIR_EDGES = wp.constant(32)
 """Edges of the longest grid lines of which a warp takes two side by side: each waits less for the other than for
@@ -16,162 +23,176 @@ itself."""
 WARP_EDGES = wp.constant(256)
 """Edges of the longest grid line that a warp takes together: eight rows a thread."""
 
+_NEIGHBOURS = """
+constexpr int ROWS = sizeof(v) / sizeof(v[0]);
+wp::vec_t<ROWS, wp::float32> s, r;
+if (shift < 32) {
+    for (int j = 0; j < ROWS; ++j) s[j] = shuffle(v[j], (lane DIRECTION shift) & 31);
+    for (int j = 0; j < ROWS; ++j) {
+        const int i = j DIRECTION 1;
+        const bool within = lane DIRECTION shift >= 0 && lane DIRECTION shift < 32;
+        r[j] = within ? s[j] : (i >= 0 && i < ROWS && !apart ? s[i >= 0 && i < ROWS ? i : j] : 0.f);
+    }
+} else {
+    #pragma unroll
+    for (int j = 0; j < ROWS; ++j) {
+        r[j] = 0.f;
+        #pragma unroll
+        for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == (DIRECTION shift)) r[j] = v[i];
+    }
+}
+return r;
+"""
 
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-const unsigned all = 0xffffffffu;
-const int lane = threadIdx.x % 32;
-const int count = last - first, more = stop - start;
-struct One { enum { rows = 1, apart = 0 }; };
-struct Pair { enum { rows = 2, apart = 1 }; };
-struct Two { enum { rows = 2, apart = 0 }; };
-struct Eight { enum { rows = 8, apart = 0 }; };
-auto solve = [&](auto kind) {
-    // row k of the system is in thread k % 32; of two yarns apart each thread has a row of either
-    constexpr int ROWS = decltype(kind)::rows;
-    constexpr bool APART = decltype(kind)::apart;
-    constexpr int REACH = APART ? 32 : 32 * ROWS;
-    auto place = [&](int j) { return APART ? lane : 32 * j + lane; };
-    auto length_of = [&](int j) { return APART && j > 0 ? more : count; };
-    int end[ROWS];
-    float ex[ROWS], ey[ROWS], ez[ROWS], inverse[ROWS], low[ROWS], high[ROWS], pull[ROWS];
-    // what row k - shift, or k + shift, has
-    auto before = [&](const float* v, int shift, float* r) {
-        if (shift < 32) {
-            float s[ROWS];
-            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane - shift) & 31);
-            for (int j = ROWS - 1; j >= 0; --j)
-                r[j] = lane >= shift ? s[j] : (j > 0 && !APART ? s[j > 0 ? j - 1 : 0] : 0.f);
-        } else {
-            #pragma unroll
-            for (int j = 0; j < ROWS; ++j) {
-                r[j] = 0.f;
-                #pragma unroll
-                for (int i = 0; i < ROWS; ++i) if (32 * (j - i) == shift) r[j] = v[i];
-            }
-        }
-    };
-    auto after = [&](const float* v, int shift, float* r) {
-        if (shift < 32) {
-            float s[ROWS];
-            for (int j = 0; j < ROWS; ++j) s[j] = __shfl_sync(all, v[j], (lane + shift) & 31);
-            for (int j = 0; j < ROWS; ++j)
-                r[j] = lane + shift < 32 ? s[j] : (j < ROWS - 1 && !APART ? s[j < ROWS - 1 ? j + 1 : j] : 0.f);
-        } else {
-            #pragma unroll
-            for (int j = 0; j < ROWS; ++j) {
-                r[j] = 0.f;
-                #pragma unroll
-                for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == shift) r[j] = v[i];
-            }
-        }
-    };
-    float wa[ROWS], wb[ROWS];
-    double px[ROWS], py[ROWS], pz[ROWS];
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) {
-        const bool own = place(j) < length_of(j);
-        const int e = own ? (APART && j > 0 ? start : first) + place(j) : first;
-        const int a = edge.data[e][0], b = edge.data[e][1];
-        px[j] = x.data[b]; py[j] = y.data[b]; pz[j] = z.data[b];
-        wa[j] = w.data[a]; wb[j] = w.data[b];
-        end[j] = own ? b : -1;
-        const float dx = x.data[a] - px[j], dy = y.data[a] - py[j], dz = z.data[a] - pz[j];
-        const float length = sqrtf(dx * dx + dy * dy + dz * dz + 1.0e-20f);
-        inverse[j] = 1.f / length;
-        ex[j] = dx * inverse[j]; ey[j] = dy * inverse[j]; ez[j] = dz * inverse[j];
-        pull[j] = own ? rest.data[e] - length : 0.f;
-        inverse[j] = wa[j] + wb[j] + compliance.data[which.data[e]] * (scale.data[e] * rate) + 1.0e-12f;
-    }
-    {
-        float bx[ROWS], by[ROWS], bz[ROWS], coupling[ROWS];
-        before(ex, 1, bx); before(ey, 1, by); before(ez, 1, bz);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const int k = place(j);
-            coupling[j] = k > 0 && k < length_of(j) ? -wa[j] * (bx[j] * ex[j] + by[j] * ey[j] + bz[j] * ez[j]) : 0.f;
-        }
-        after(coupling, 1, high);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const float s = 1.f / inverse[j];
-            low[j] = coupling[j] * s; high[j] *= s; pull[j] *= s;
-        }
-    }
-    // unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
-    #pragma unroll
-    for (int shift = 1; shift < REACH; shift *= 2) {
-        float lb[ROWS], hb[ROWS], pb[ROWS], la[ROWS], ha[ROWS], pa[ROWS];
-        before(low, shift, lb); before(high, shift, hb); before(pull, shift, pb);
-        after(low, shift, la); after(high, shift, ha); after(pull, shift, pa);
-        #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            const float s = 1.f / (1.f - low[j] * hb[j] - high[j] * la[j]);
-            pull[j] = (pull[j] - low[j] * pb[j] - high[j] * pa[j]) * s;
-            low[j] = -low[j] * lb[j] * s;
-            high[j] = -high[j] * ha[j] * s;
-        }
-    }
-    float nx[ROWS], ny[ROWS], nz[ROWS];
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) { ex[j] *= pull[j]; ey[j] *= pull[j]; ez[j] *= pull[j]; }
-    after(ex, 1, nx); after(ey, 1, ny); after(ez, 1, nz);
-    #pragma unroll
-    for (int j = 0; j < ROWS; ++j) {
-        // all have read their ends in the first shuffles, so that nothing is overwritten too soon
-        const int k = place(j);
-        if (end[j] >= 0) {
-            const bool on = k + 1 < length_of(j);
-            x.data[end[j]] = px[j] + wb[j] * ((on ? nx[j] : 0.f) - ex[j]);
-            y.data[end[j]] = py[j] + wb[j] * ((on ? ny[j] : 0.f) - ey[j]);
-            z.data[end[j]] = pz[j] + wb[j] * ((on ? nz[j] : 0.f) - ez[j]);
-        }
-        if (k == 0 && length_of(j) > 0) {
-            const int head = edge.data[APART && j > 0 ? start : first][0];
-            x.data[head] += wa[j] * ex[j];
-            y.data[head] += wa[j] * ey[j];
-            z.data[head] += wa[j] * ez[j];
-        }
-    }
-};
-if (more > 0) solve(Pair());
-else if (count <= 32) solve(One());
-else if (count <= 64) solve(Two());
-else solve(Eight());
-#endif
-""")
+
+_BEFORE, _AFTER = (SHUFFLES + _NEIGHBOURS.replace("DIRECTION", sign) for sign in "-+")
+one, two, eight = (wp.types.vector(length=rows, dtype=float) for rows in (1, 2, 8))
+
+
+@wp.func_native(_BEFORE)
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: one, shift: int, apart: bool) -> one:
+    """The values of the rows ``shift`` before; of two grid lines ``apart`` each thread has a row of either."""
+    ...
+
+
+@wp.func_native(_BEFORE)
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: two, shift: int, apart: bool) -> two: ...
+
+
+@wp.func_native(_BEFORE)
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: eight, shift: int, apart: bool) -> eight: ...
+
+
+@wp.func_native(_AFTER)
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: one, shift: int, apart: bool) -> one:
+    """The values of the rows ``shift`` after."""
+    ...
+
+
+@wp.func_native(_AFTER)
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: two, shift: int, apart: bool) -> two: ...
+
+
+@wp.func_native(_AFTER)
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: eight, shift: int, apart: bool) -> eight: ...
+
+
+def _solver(rows: int, apart: bool) -> Any:
+    """Return the function that solves a grid line of at most 32 ``rows`` edges, or two of at most 32 that lie apart.
+
+    Row k of the system is in thread k % 32; of two grid lines apart each thread has a row of either.
+    """
+    vector = {1: one, 2: two, 8: eight}[rows]
+    steps = 5 if apart else (32 * rows).bit_length() - 1
+
+    @wp.func(name=f"solve_{rows}_rows{'_apart' * apart}")
+    def solve(
+        t: Any, table: Topology, rest: wp.array(dtype=float), first: int, count: int, other: int, more: int,
+        rate: float, own: Lane,
+    ):  # fmt: skip
+        """Solve the ``count`` edges of a grid line from ``first`` on, and where apart ``more`` from ``other`` on."""
+        x = vector()
+        y = vector()
+        z = vector()
+        right = vector()
+        scale = vector()
+        for j in range(wp.static(rows)):
+            k = own.lane + wp.static(0 if apart else 32) * j
+            begin = wp.where(wp.static(apart) and j > 0, other, first)
+            mine = k < wp.where(wp.static(apart) and j > 0, more, count)
+            e = wp.where(mine, begin + k, first)
+            a = corner(table.edge, e, 0, 2)
+            b = corner(table.edge, e, 1, 2)
+            direction, length, _inverse = edge_direction(position(t, a), position(t, b))
+            x[j] = direction.x
+            y[j] = direction.y
+            z[j] = direction.z
+            alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[e]), table.edge_scale[e], rate)
+            right[j] = wp.where(mine, at(rest, e) - length, 0.0)
+            scale[j] = 1.0 / edge_diagonal(at(t.w, a), at(t.w, b), alpha)
+        bx = rows_before(own.exchanged, own.lane, x, 1, wp.static(apart))
+        by = rows_before(own.exchanged, own.lane, y, 1, wp.static(apart))
+        bz = rows_before(own.exchanged, own.lane, z, 1, wp.static(apart))
+        low = vector()
+        for j in range(wp.static(rows)):
+            k = own.lane + wp.static(0 if apart else 32) * j
+            begin = wp.where(wp.static(apart) and j > 0, other, first)
+            linked = k > 0 and k < wp.where(wp.static(apart) and j > 0, more, count)
+            a = corner(table.edge, wp.where(linked, begin + k, first), 0, 2)
+            coupling = edge_coupling(at(t.w, a), vec3(bx[j], by[j], bz[j]), vec3(x[j], y[j], z[j]))
+            low[j] = wp.where(linked, coupling, 0.0)
+        high = rows_after(own.exchanged, own.lane, low, 1, wp.static(apart))
+        for j in range(wp.static(rows)):
+            low[j] = low[j] * scale[j]
+            high[j] = high[j] * scale[j]
+            right[j] = right[j] * scale[j]
+        # unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
+        for p in range(wp.static(steps)):
+            low_before = rows_before(own.exchanged, own.lane, low, 1 << p, wp.static(apart))
+            high_before = rows_before(own.exchanged, own.lane, high, 1 << p, wp.static(apart))
+            right_before = rows_before(own.exchanged, own.lane, right, 1 << p, wp.static(apart))
+            low_after = rows_after(own.exchanged, own.lane, low, 1 << p, wp.static(apart))
+            high_after = rows_after(own.exchanged, own.lane, high, 1 << p, wp.static(apart))
+            right_after = rows_after(own.exchanged, own.lane, right, 1 << p, wp.static(apart))
+            for j in range(wp.static(rows)):
+                freed_low, freed_high, freed_right = free_row(
+                    low[j], high[j], right[j], low_before[j], high_before[j], right_before[j],
+                    low_after[j], high_after[j], right_after[j],
+                )  # fmt: skip
+                low[j] = freed_low
+                high[j] = freed_high
+                right[j] = freed_right
+        for j in range(wp.static(rows)):
+            x[j] = x[j] * right[j]
+            y[j] = y[j] * right[j]
+            z[j] = z[j] * right[j]
+        nx = rows_after(own.exchanged, own.lane, x, 1, wp.static(apart))
+        ny = rows_after(own.exchanged, own.lane, y, 1, wp.static(apart))
+        nz = rows_after(own.exchanged, own.lane, z, 1, wp.static(apart))
+        # all have read their ends before the first exchange, so that nothing is overwritten too soon
+        for j in range(wp.static(rows)):
+            k = own.lane + wp.static(0 if apart else 32) * j
+            begin = wp.where(wp.static(apart) and j > 0, other, first)
+            end = wp.where(wp.static(apart) and j > 0, more, count)
+            if k < end:
+                b = corner(table.edge, begin + k, 1, 2)
+                pull = vec3(x[j], y[j], z[j])
+                # rows behind the last pull nothing
+                move(t, b, between_pulls(at(t.w, b), vec3(nx[j], ny[j], nz[j]), pull))
+                if k == 0:
+                    a = corner(table.edge, begin, 0, 2)
+                    move(t, a, at(t.w, a) * pull)
+
+    return solve
+
+
+_SHORT, _PAIR, _DOUBLE, _LONG = _solver(1, False), _solver(2, True), _solver(2, False), _solver(8, False)
+
+
+@wp.func
 def stretch_double_grid_lines(
-    x: wp.array(dtype=float64),
-    y: wp.array(dtype=float64),
-    z: wp.array(dtype=float64),
-    w: wp.array(dtype=float),
-    compliance: wp.array(dtype=float),
-    edge: wp.array(dtype=wp.vec2i),
-    rest: wp.array(dtype=float),
-    scale: wp.array(dtype=float),
-    which: wp.array(dtype=int),
-    first: int,
-    last: int,
-    start: int,
-    stop: int,
-    rate: float,
-):
+    t: Any, table: Topology, rest: wp.array(dtype=float), first: int, last: int, start: int, stop: int, rate: float,
+    own: Lane,
+):  # fmt: skip
     """Solve the edges first to last of a grid line at once and move its vertices, or of two short ones side by side.
 
     Args:
-        x: Coordinates; so are ``y`` and ``z`` [m].
-        y: See ``x``.
-        z: See ``x``.
-        w: Inverse masses [1/kg].
-        compliance: The world's compliances.
-        edge: Vertices of the edges.
+        t: The world's state, coordinates as doubles.
+        table: The edges.
         rest: Their lengths [m].
-        scale: What the compliance of each is multiplied with.
-        which: The place of each in ``compliance``.
         first: The grid line's first edge.
         last: One past its last.
         start: The same of another grid line of at most 32 edges, which shares no vertex with the first, as short a one.
         stop: See ``start``, and the same where there is no other.
         rate: 1 / dt^2 [1/s2].
+        own: The thread among those of the block.
     """
-    ...
+    count = last - first
+    if stop > start:
+        _PAIR(t, table, rest, first, count, start, stop - start, rate, own)
+    elif count <= 32:
+        _SHORT(t, table, rest, first, count, start, 0, rate, own)
+    elif count <= 64:
+        _DOUBLE(t, table, rest, first, count, start, 0, rate, own)
+    else:
+        _LONG(t, table, rest, first, count, start, 0, rate, own)

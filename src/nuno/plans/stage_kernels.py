@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.constraints.bending import bend_line, bend_twist
+from nuno.constraints.bending import bend_alpha, bend_line, bend_twist
 from nuno.constraints.compliances import Compliances
 from nuno.constraints.grips import hold_vertices
-from nuno.constraints.membrane import shear_cell
+from nuno.constraints.membrane import shear_alpha, shear_cell
 from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
 from nuno.numbers.block_group import BlockGroup, grid_barrier
-from nuno.numbers.lanes import barrier, product, subarray
+from nuno.numbers.lanes import barrier, subarray
 from nuno.plans.cloth_substep import bend_patches, strain_triangles
 from nuno.plans.grid_lines_by_block import stretch_grid_lines_of_block
 from nuno.state.cloth_state import Settings, Topology
@@ -145,11 +145,11 @@ def read(work: Work, world: int, kind: int, k: int, last: int):
 def solve(t: Any, kind: int, e: Element, rate: float):
     """One bend or shear, as in `nuno.plans.cloth_substep`."""
     if kind == TWISTS:
-        bend_twist(t, e.a, e.b, e.c, e.d, product(e.compliance, e.scale * rate))
+        bend_twist(t, e.a, e.b, e.c, e.d, bend_alpha(e.compliance, e.scale, rate))
     elif kind == LINES:
-        bend_line(t, e.a, e.b, e.c, product(e.compliance, e.scale * rate))
+        bend_line(t, e.a, e.b, e.c, bend_alpha(e.compliance, e.scale, rate))
     else:
-        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, product(e.compliance, e.scale * 4.0 * rate), 0.0, 0.0, 0.0)
+        shear_cell(t, e.a, e.b, e.c, e.d, e.scale, shear_alpha(e.compliance, e.scale, rate), 0.0, 0.0, 0.0)
 
 
 @wp.func
