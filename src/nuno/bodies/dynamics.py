@@ -113,6 +113,10 @@ class Dynamics:
         """Set the state that `state` gave."""
         raise NotImplementedError
 
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others keep every bit."""
+        raise NotImplementedError
+
     def prepare(self, time: float, frame: float) -> None:
         """Bring what acts on the body from ``time`` [s] on, once for each run or ``frame`` [s]."""
         raise NotImplementedError
@@ -278,6 +282,12 @@ class ParticleDynamics(Dynamics):
         """Set the state that `state` gave; what shapes gave before that was in another past."""
         self.solver.load_state(state)
         self._forget_impulses()
+
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others keep every bit."""
+        from nuno.solvers.some_worlds import load_particles
+
+        load_particles(self.solver, worlds, state)
 
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether all positions and velocities are finite."""

@@ -305,6 +305,17 @@ class RigidDynamics(Dynamics):
         self.solver.load_state(self.slot, {**state, "partner_slot": partner})
         self._pushing = None
 
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others go on as they are."""
+        whole = self.state()
+        for name, values in state.items():
+            own, given = whole[name], np.asarray(values)
+            if given.shape[1:] != own.shape[1:]:  # rows of contacts have become longer since
+                own, given = _as_wide(own, given, name)
+            own[worlds] = given
+            whole[name] = own
+        self.load_state(whole)
+
     def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
         """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
         return self.thickness == thickness and _same_shape(self.deformed, deformed)
@@ -316,6 +327,17 @@ class RigidDynamics(Dynamics):
     def release(self) -> None:
         """Give the slot back."""
         self.solver.remove(self.slot)
+
+
+def _as_wide(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return contacts (worlds, parts, row, ...) of two states with rows of one length."""
+    fill = -1 if name in ("partner_slot", "partner_part") else 0
+    row = max(a.shape[2], b.shape[2])
+    wide = [
+        np.pad(v, [(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)], constant_values=fill)
+        for v in (a, b)
+    ]
+    return wide[0], wide[1]
 
 
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from nuno.numbers.lanes import LANES, lane, lane_int
+from nuno.solvers.array_memory import HOST_COPIES, array_bytes
 from nuno.solvers.grip_rows import grip_rows
 from nuno.state.cloth_state import (
     ALL_PARTS,
@@ -278,10 +279,11 @@ class ParticleSolver:
     @property
     def memory_bytes(self) -> int:
         """Bytes of device memory that this body holds, elements shared by all worlds included."""
-        holders = (self._state, self._topology, self._surface)
-        values = [getattr(holder, name) for holder in holders for name in holder._cls.vars]
-        # some arrays go by two names
-        return sum({value.ptr: value.capacity for value in values if isinstance(value, wp.array)}.values())
+        return array_bytes(self._state, self._topology, self._surface)
+
+    def world_bytes(self) -> tuple[int, int]:
+        """Return what each world takes on the device, and what making a copy of it takes on the host [bytes]."""
+        return array_bytes(self._state) // self.world_count, HOST_COPIES * 8 * 6 * self.particle_count
 
     # -- what acts on the particles
 

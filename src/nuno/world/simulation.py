@@ -54,6 +54,7 @@ class Simulation:
         self.world_count = 1
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
+        self._clock_shift: np.ndarray | None = None  # (worlds,) [s], what each world's clock is behind; None: nothing
         self._family = uuid.uuid4().hex
         # whether its materials are guesses, of which many are imagined: nobody is told of their resolution, and one
         # that passes through itself is a guess that does not fit
@@ -86,6 +87,15 @@ class Simulation:
     def time(self) -> float:
         """The simulated time [s]."""
         return self._time
+
+    @property
+    def clock(self) -> Any:
+        """Each world's own clock [s], a number or (worlds,): ``time``, but for what ``reset`` has set back.
+
+        Paths and pushes go by ``time``, which all worlds of a batch share.
+        """
+        shift = np.zeros(self.world_count) if self._clock_shift is None else self._clock_shift
+        return self._time - (shift if self.world_count > 1 else float(shift[0]))
 
     @property
     def device(self) -> str:
