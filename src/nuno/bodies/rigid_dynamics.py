@@ -274,10 +274,24 @@ class RigidDynamics(Dynamics):
         place, turn = self.solver.pose(self.slot)
         return motion_of_rigid(self.mass, place, self.inertia, turn, *self.solver.velocity(self.slot))
 
-    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
-        """Give the body a velocity and an angular velocity."""
+    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+        """Give the body a velocity and an angular velocity, in all worlds or some (k,)."""
         place, _ = self.solver.pose(self.slot)
-        self.solver.set_velocity(self.slot, given.at(place[:, None], place)[:, 0], given.angular)
+        linear, angular = given.at(place[:, None], place)[:, 0], given.angular
+        if worlds is not None:
+            own = self.solver.velocity(self.slot)
+            for now, new in zip(own, (linear, angular), strict=True):
+                now[worlds] = new[worlds]
+            linear, angular = own
+        self.solver.set_velocity(self.slot, linear, angular)
+
+    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+        """Put the body elsewhere in some worlds (k,); its velocities turn along there."""
+        before = {name: self.solver._read(name, self.slot).copy() for name in SAVED[:4]}
+        self.place(body, position, quaternion)
+        for name, kept in before.items():
+            kept[worlds] = self.solver._read(name, self.slot)[worlds]
+            self.solver._write(name, self.slot, kept)
 
     def elastic_energy(self, body: Body) -> np.ndarray:
         """Return (worlds,) [J]: none, for it does not deform."""

@@ -40,7 +40,6 @@ def load_particles(solver: ParticleSolver, worlds: np.ndarray, state: Mapping[st
         wp.copy(s.scalars, solver._put(solver._scalars))
         if solver._grip_count:
             set_grips(solver, solver._grips, worlds)
-    solver.missed[worlds] = False
     if hasattr(solver, "guarded"):
         solver.guarded[worlds] = state.get("guarded", np.int32(0))
     if solver.sums is not None:

@@ -104,6 +104,8 @@ def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> N
         if dynamics.is_rigid:
             state["partner_slot"] = renumbered[state["partner_slot"]]
         dynamics.load_worlds(worlds, state)
+        if not dynamics.is_rigid:
+            dynamics.solver.missed[worlds] = False
         body._quaternion = at.merged(body._quaternion, record.quaternion, 1)
         dynamics.pushes = pushes[body]
     set_merged_grips(world, grips, held, worlds)

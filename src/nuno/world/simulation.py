@@ -60,6 +60,8 @@ class Simulation:
         # that passes through itself is a guess that does not fit
         self._quiet = False
         self._bodies: dict[str, Body] = {}
+        # arrays of states that callers have views of
+        self._views: weakref.WeakKeyDictionary[Dynamics, dict[str, Any]] = weakref.WeakKeyDictionary()
         self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
         self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
         self._rules = ContactRules()
@@ -107,6 +109,15 @@ class Simulation:
     def is_running(self) -> bool:
         """Return whether frames are made in the background."""
         return self._background is not None and self._background.alive
+
+    def __copy__(self) -> Simulation:
+        raise BodyStateError("a world is copied with imagine(1), which gives it bodies of its own, or kept with save")
+
+    def __deepcopy__(self, memo: Any) -> Simulation:
+        return self.__copy__()
+
+    def __reduce__(self) -> Any:
+        raise BodyStateError("a world is not pickled: save(path) writes it to a file, and restore reads it")
 
     @contextmanager
     def _call(self) -> Iterator[None]:
