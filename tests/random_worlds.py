@@ -336,7 +336,7 @@ def state_of(world, k=None):
         found[f"{own} velocities"] = picked(body.velocities, 2)
         found[f"{own} position"], found[f"{own} quaternion"] = picked(body.position, 1), picked(body.quaternion, 1)
         found[f"{own} friction"] = picked(np.asarray(body.friction), 0)
-        if body._path is not None:
+        if body._path is not None and body._path.times[-1] > world.time:  # one that has ended is no more than a place
             found[f"{own} path"] = picked(body._path.at(world.time), 1)
     return found
 

@@ -31,6 +31,10 @@ def check_worlds(seed, device):
             # what grips bore is not told of a world that has another past
             for extract in (state_of,) if adopted else (state_of, wrenches_of):
                 told = differences(extract(*copy), extract(single))
+                if extract is wrenches_of and "reset" in variation.log:
+                    # another grip may be there in one world alone; and of a leading body the two frames before a reset
+                    # are the others', which may be 1 ns off: 1e-9 s * 1 m/s / (1/60 s)^2 of an acceleration
+                    told = [each for each in told if each.startswith("grip") and float(each.split()[-2]) > 1e-5]
                 found.extend(f"{what}, world {k}: {each}" for each in told)
 
     try:
@@ -65,7 +69,7 @@ def check(seeds, device):
 def test_worlds_of_a_batch_that_differ():
     """Other places, velocities, pushes, paths, grips and friction in each world: each is what it is alone."""
     happened = check(SHORT, "cpu")
-    assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "run"}
+    assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "reset", "run"}
 
 
 def test_a_push_that_is_nothing_in_one_world_ends_its_frame_too():

@@ -29,7 +29,7 @@ class Variation:
     """
 
     def __init__(self, seed, world, count):
-        self.random, self.log = np.random.default_rng(seed), []
+        self.random, self.log, self.saved = np.random.default_rng(seed), [], None
         saved = world.save()
         self.batch = world.imagine(count)
         self.singles = [nuno.World(device=world.device) for _ in range(count)]
@@ -167,6 +167,8 @@ def release(variation):
     if not grips:
         return None
     k = variation.random.integers(len(grips))
+    if any(len(RandomWorld(0, single).grips()) != len(grips) for single in variation.singles):
+        return None  # of a world that was reset some may have come or gone
     return lambda world, own: RandomWorld(0, world).grips()[k].release()
 
 
@@ -199,6 +201,29 @@ def detach(variation):
         return None
     k = variation.index(body)
     return lambda world, own: world.detach(world.bodies[k])
+
+
+@change(4)
+def reset(variation):
+    """Some worlds, to what they were or to what one of them was."""
+    if variation.saved is None or variation.random.random() < 0.3:
+        variation.saved = variation.batch.save(), [single.save() for single in variation.singles]
+        return None
+    whole, alone = variation.saved
+    chosen = variation.random.random(len(alone)) < 0.5
+    source = variation.scene.pick([None, int(variation.random.integers(len(alone)))])
+    numbers = np.arange(len(alone))
+
+    def done(world, own):
+        if world is variation.batch:
+            world.reset(chosen, whole if source is None else whole.pick(source))
+        elif own(chosen):
+            world.restore(alone[own(numbers) if source is None else source].at(world.time))
+            for body, other in zip(world.bodies, variation.batch.bodies, strict=True):
+                if other._path is None:  # one that has ended comes back in none
+                    body._path = world._kinematic = None
+
+    return done
 
 
 @change(6)

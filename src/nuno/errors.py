@@ -78,6 +78,21 @@ class EstimationError(NunoError, RuntimeError):
     """Valid input for which no answer could be computed."""
 
 
+class NotEnoughMemoryError(NunoError, MemoryError):
+    """Something that needs more memory than is free; nothing was begun.
+
+    Args:
+        what: What needs it.
+        needed: How much it needs [bytes].
+        free: How much is free [bytes].
+        hint: What helps.
+    """
+
+    def __init__(self, what: str, needed: int, free: int, hint: str) -> None:
+        self.needed, self.free = int(needed), int(free)
+        super().__init__(f"{what} would need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free: {hint}")
+
+
 class SimulationDiverged(NunoError, RuntimeError):
     """A state that is no longer finite; the world keeps its last good state.
 

@@ -136,13 +136,13 @@ def test_files_that_cannot_be_read(tmp_path):
     with np.load(path) as file:
         arrays = dict(file)
     header = json.loads(str(arrays["header"]))
-    assert header["format"] == 3 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
+    assert header["format"] == 4 and header["units"]["length"] == "m" and len(header["meshes"]) == 5
 
     def variant(name, **changes):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=4)
+    variant("newer.npz", format=5)
     variant("strange.npz", world={"type": "Path", "fields": {}})
     variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
     variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))
@@ -222,7 +222,7 @@ def test_detached_in_a_batch():
 
 
 def test_wrong_batches_are_refused():
-    """A batch is not imagined further; what is by world must fit the batch; a batch adopts nothing."""
+    """A batch is not imagined further as a whole; what is by world must fit the batch."""
     world, towel, _ = room()
     futures = world.imagine(2)
     with pytest.raises(BodyStateError):

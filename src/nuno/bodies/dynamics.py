@@ -97,8 +97,12 @@ class Dynamics:
         """Return how the body moves as a whole."""
         raise NotImplementedError
 
-    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
-        """Give the body velocities; it stays where it is."""
+    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+        """Give the body velocities, in all worlds or some (k,); it stays where it is."""
+        raise NotImplementedError
+
+    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+        """Put the body elsewhere as a whole in some worlds (k,); velocities turn along."""
         raise NotImplementedError
 
     def elastic_energy(self, body: Body) -> np.ndarray:
@@ -111,6 +115,10 @@ class Dynamics:
 
     def load_state(self, state: State) -> None:
         """Set the state that `state` gave."""
+        raise NotImplementedError
+
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others keep every bit."""
         raise NotImplementedError
 
     def prepare(self, time: float, frame: float) -> None:
@@ -208,8 +216,8 @@ class ParticleDynamics(Dynamics):
         """Return how the body moves as a whole: the motion of its vertices' masses."""
         return motion_of_particles(self.solver.mass, self.vertices(body), self.velocities(body))
 
-    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
-        """Give the vertices velocities; they stay where they are, to the bit."""
+    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+        """Give the vertices velocities, in all worlds or some (k,); they stay where they are, to the bit."""
         from nuno.state.cloth_state import SPEED
 
         velocities = given.vertices
@@ -218,7 +226,22 @@ class ParticleDynamics(Dynamics):
         state = self.solver.save_state()
         state["velocities"] = velocities.astype(np.float32)
         state["notes"][:, SPEED] = (velocities**2).sum(axis=-1).max(axis=-1)  # which bounds what pairs are listed
-        self.solver.load_state(state)
+        if worlds is None:
+            self.solver.load_state(state)
+        else:
+            self.load_worlds(worlds, {name: array[worlds] for name, array in state.items()})
+
+    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+        """Put the body elsewhere as a whole in some worlds (k,); velocities turn along."""
+        motion = compose((position, quaternion), invert(self.pose(body)))
+        turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
+        self.set_vertices(apply(motion, self.vertices(body)), turned, worlds)
+
+    def set_vertices(self, vertices: np.ndarray, velocities: np.ndarray, worlds: np.ndarray) -> None:
+        """Set positions [m] and velocities [m/s] (worlds, n, 3), in some worlds (k,)."""
+        from nuno.solvers.particle_solver import state_from
+
+        self.load_worlds(worlds, state_from(vertices[worlds], velocities[worlds]))
 
     def elastic_energy(self, body: Body) -> np.ndarray:
         """Return (worlds,) [J], what the body's deformation stores."""
@@ -278,6 +301,12 @@ class ParticleDynamics(Dynamics):
         """Set the state that `state` gave; what shapes gave before that was in another past."""
         self.solver.load_state(state)
         self._forget_impulses()
+
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others keep every bit."""
+        from nuno.solvers.some_worlds import load_particles
+
+        load_particles(self.solver, worlds, state)
 
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether all positions and velocities are finite."""

@@ -8,6 +8,8 @@ import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, ParticleDynamics, State
 from nuno.materials import Material, Rigid
+from nuno.mesh.memory_limit import CLOTH_BYTES, check_host_memory
+from nuno.shapes.shape import LARGE
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -40,6 +42,9 @@ def start_dynamics(body: Body, material: Any, world: Simulation) -> Dynamics:
         from nuno.bodies.rigid_dynamics import RigidDynamics
 
         return RigidDynamics(body, material, material.friction, world)
+    n = len(body.shape.mesh()[0])
+    if body.shape.is_cloth and n > LARGE:
+        check_host_memory(f"a cloth of {n} vertices", CLOTH_BYTES * n)
     vertices = body._vertices()
     positions = np.broadcast_to(vertices, (world.world_count, *vertices.shape[-2:]))
     still = np.broadcast_to(np.zeros(3), positions.shape)

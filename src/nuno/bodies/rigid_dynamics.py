@@ -274,10 +274,24 @@ class RigidDynamics(Dynamics):
         place, turn = self.solver.pose(self.slot)
         return motion_of_rigid(self.mass, place, self.inertia, turn, *self.solver.velocity(self.slot))
 
-    def set_velocity(self, body: Body, given: GivenVelocity) -> None:
-        """Give the body a velocity and an angular velocity."""
+    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+        """Give the body a velocity and an angular velocity, in all worlds or some (k,)."""
         place, _ = self.solver.pose(self.slot)
-        self.solver.set_velocity(self.slot, given.at(place[:, None], place)[:, 0], given.angular)
+        linear, angular = given.at(place[:, None], place)[:, 0], given.angular
+        if worlds is not None:
+            own = self.solver.velocity(self.slot)
+            for now, new in zip(own, (linear, angular), strict=True):
+                now[worlds] = new[worlds]
+            linear, angular = own
+        self.solver.set_velocity(self.slot, linear, angular)
+
+    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+        """Put the body elsewhere in some worlds (k,); its velocities turn along there."""
+        before = {name: self.solver._read(name, self.slot).copy() for name in SAVED[:4]}
+        self.place(body, position, quaternion)
+        for name, kept in before.items():
+            kept[worlds] = self.solver._read(name, self.slot)[worlds]
+            self.solver._write(name, self.slot, kept)
 
     def elastic_energy(self, body: Body) -> np.ndarray:
         """Return (worlds,) [J]: none, for it does not deform."""
@@ -305,6 +319,17 @@ class RigidDynamics(Dynamics):
         self.solver.load_state(self.slot, {**state, "partner_slot": partner})
         self._pushing = None
 
+    def load_worlds(self, worlds: np.ndarray, state: State) -> None:
+        """Set some worlds (k,) to the state (k, ...) that `state` gave of them; the others go on as they are."""
+        whole = self.state()
+        for name, values in state.items():
+            own, given = whole[name], np.asarray(values)
+            if given.shape[1:] != own.shape[1:]:  # rows of contacts have become longer since
+                own, given = _as_wide(own, given, name)
+            own[worlds] = given
+            whole[name] = own
+        self.load_state(whole)
+
     def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
         """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
         return self.thickness == thickness and _same_shape(self.deformed, deformed)
@@ -316,6 +341,17 @@ class RigidDynamics(Dynamics):
     def release(self) -> None:
         """Give the slot back."""
         self.solver.remove(self.slot)
+
+
+def _as_wide(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return contacts (worlds, parts, row, ...) of two states with rows of one length."""
+    fill = -1 if name in ("partner_slot", "partner_part") else 0
+    row = max(a.shape[2], b.shape[2])
+    wide = [
+        np.pad(v, [(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)], constant_values=fill)
+        for v in (a, b)
+    ]
+    return wide[0], wide[1]
 
 
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:

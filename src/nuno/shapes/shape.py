@@ -15,9 +15,12 @@ import numpy as np
 from nuno.errors import MeshError
 from nuno.mesh import primitives
 from nuno.mesh.closed import enclosed_volume
+from nuno.mesh.memory_limit import SHEET_BYTES, check_host_memory
 from nuno.mesh.primitives import MeshArrays
 from nuno.validation import count, finite_array, index_array, number
 
+LARGE = 1_000_000
+"""Vertices from which on it is asked whether there is memory for them."""
 FLAT = 1e-6
 """Of its convex hull's volume, what a hull may lack by rounding."""
 
@@ -116,6 +119,9 @@ class Sheet(Shape):
         except (TypeError, ValueError) as error:
             raise MeshError(f"cells must be two whole numbers (nx, ny), got {self.cells!r}") from error
         object.__setattr__(self, "cells", (count("cells[0]", nx), count("cells[1]", ny)))
+        vertices = (self.cells[0] + 1) * (self.cells[1] + 1)
+        if vertices > LARGE:
+            check_host_memory(f"a sheet of {vertices} vertices", SHEET_BYTES * vertices)
 
 
 @dataclass(frozen=True, eq=False)

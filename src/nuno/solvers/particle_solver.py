@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from nuno.numbers.lanes import LANES, lane, lane_int
+from nuno.solvers.array_memory import HOST_COPIES, array_bytes
 from nuno.solvers.grip_rows import grip_rows
 from nuno.state.cloth_state import (
     ALL_PARTS,
@@ -185,18 +186,7 @@ class ParticleSolver:
 
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
-        positions = np.asarray(positions, dtype=np.float64)
-        velocities = np.asarray(velocities)
-        if positions.strides[0] == 0 and velocities.strides[0] == 0:  # of worlds that are all alike one will do
-            positions, velocities = positions[:1], velocities[:1]
-        # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
-        origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
-        notes = np.zeros((len(positions), FASTEST), dtype=np.float32)
-        notes[:, TRAVEL] = 1.0e9
-        speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
-        notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
-        local, origin = (positions - origin[:, None]).astype(np.float32), origin.astype(np.float32)
-        self.load_state(dict(local=local, origin=origin, velocities=velocities.astype(np.float32), notes=notes))
+        self.load_state(state_from(positions, velocities))
 
     def save_state(self) -> dict[str, np.ndarray]:
         """Return all that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
@@ -266,6 +256,12 @@ class ParticleSolver:
         worlds, n, places = self.world_count, self.particle_count, self._doubles.arrays
         return pack_positions(self._state, worlds, n, self.lanes, self.device, out, places)
 
+    def velocities_on_device(self, out: wp.array | None = None) -> wp.array:
+        """(worlds, n) array of vec3 [m/s] on the solver's device; a copy, into ``out`` if given."""
+        from nuno.state.pack import pack_velocities
+
+        return pack_velocities(self._state, self.world_count, self.particle_count, self.lanes, self.device, out)
+
     @property
     def arrays(self) -> dict[str, wp.array]:
         """The solver's own arrays x, y, z [m] and vx, vy, vz [m/s].
@@ -278,10 +274,11 @@ class ParticleSolver:
     @property
     def memory_bytes(self) -> int:
         """Bytes of device memory that this body holds, elements shared by all worlds included."""
-        holders = (self._state, self._topology, self._surface)
-        values = [getattr(holder, name) for holder in holders for name in holder._cls.vars]
-        # some arrays go by two names
-        return sum({value.ptr: value.capacity for value in values if isinstance(value, wp.array)}.values())
+        return array_bytes(self._state, self._topology, self._surface)
+
+    def world_bytes(self) -> tuple[int, int]:
+        """Return what each world takes on the device, and what making a copy of it takes on the host [bytes]."""
+        return array_bytes(self._state) // self.world_count, HOST_COPIES * 8 * 6 * self.particle_count
 
     # -- what acts on the particles
 
@@ -475,3 +472,19 @@ class ParticleSolver:
 def substeps_of(duration: float, frame: float, substeps: int) -> int:
     """Substeps of a span shorter than a frame [s] that has ``substeps``."""
     return max(1, math.ceil(substeps * duration / frame - 1e-6))
+
+
+def state_from(positions: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
+    """Return positions [m] and velocities [m/s], (worlds, n, 3) each, as what `ParticleSolver.load_state` takes."""
+    positions = np.asarray(positions, dtype=np.float64)
+    velocities = np.asarray(velocities)
+    if positions.strides[0] == 0 and velocities.strides[0] == 0:  # of worlds that are all alike one will do
+        positions, velocities = positions[:1], velocities[:1]
+    # each world's own origin, in steps of 1/1024 m so that adding it loses nothing
+    origin = np.round(np.nan_to_num(positions.mean(axis=1)) * 1024.0) / 1024.0
+    notes = np.zeros((len(positions), FASTEST), dtype=np.float32)
+    notes[:, TRAVEL] = 1.0e9
+    speed = np.linalg.norm(np.asarray(velocities, dtype=float), axis=-1).max(axis=-1)
+    notes[:, SPEED] = np.nan_to_num(speed, nan=0.0) ** 2
+    local, origin = (positions - origin[:, None]).astype(np.float32), origin.astype(np.float32)
+    return dict(local=local, origin=origin, velocities=velocities.astype(np.float32), notes=notes)

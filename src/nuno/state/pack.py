@@ -170,6 +170,16 @@ def pack_positions(
     return out
 
 
+def pack_velocities(state: Any, worlds: int, n: int, lanes: int, device: str, out: wp.array | None = None) -> wp.array:
+    """(worlds, n) array of vec3 [m/s] from a solver's state, or into ``out``: as positions about no origin."""
+    if out is None:
+        out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
+    nothing = wp.zeros_like(state.scalars)
+    inputs = [state.vx, state.vy, state.vz, nothing, n, out]
+    wp.launch((pack, pack_lanes)[lanes > 1], dim=(-(-worlds // lanes), n), inputs=inputs, device=device)
+    return out
+
+
 def reset_note(state: Any, groups: int, device: str, entry: int) -> None:
     """Set one of the notes to zero in all worlds."""
     wp.launch(zero_note, dim=groups, inputs=[state.notes, NOTES, entry], device=device)

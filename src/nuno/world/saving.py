@@ -6,8 +6,13 @@ import logging
 import os
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.validation import count
+from nuno.world.memory import check_memory
+from nuno.world.reset import checked_worlds, reset_worlds
 from nuno.world.running import Running
 from nuno.world.snapshot import Snapshot, apply, capture, check_world_index
 
@@ -50,45 +55,90 @@ class Saving(Running):
         with self._change("restore"):
             apply(snapshot, self)
 
-    def imagine(self, n: int, device: str | None = None) -> World:
+    def reset(self, worlds: ArrayLike, saved: Snapshot) -> None:
+        """Let some worlds of a batch become what was saved, and leave all others as they are, to the bit.
+
+        Bodies, dynamics, materials and rules stay those of the batch; what was gripped or let go since is gripped as
+        it was. The worlds' own clocks (``clock``) go back, ``time`` goes on for all: what is under way in the snapshot
+        goes on from now, as ``saved.at(world.time)`` says.
+
+        Args:
+            worlds: Indices of the worlds, one or (k,), or a mask (worlds,) bool.
+            saved: What ``save`` returned: of a single world, which each of them becomes; or of a batch of as many
+                worlds, each of which becomes what it was itself.
+
+        Raises:
+            BodyStateError: the snapshot has other bodies, dynamics, materials, rules or settings, or a path or push is
+                under way in it and in other worlds at different times.
+            InvalidInputError: no snapshot, one of another number of worlds, or worlds that there are not.
+        """
+        if not isinstance(saved, Snapshot):
+            raise InvalidInputError(f"reset needs what save returned, got {type(saved).__name__}")
+        with self._change("reset"):
+            if self.drivers:
+                raise BodyStateError("a world with a driver, such as a robot, is one world: use restore")
+            reset_worlds(self, checked_worlds(worlds, self.world_count), saved)
+
+    def imagine(self, n: int, device: str | None = None, *, world: int | None = None) -> World:
         """Return a batch of ``n`` copies of this world as it is now, with everything in it.
 
         Args:
             n: How many.
             device: Where they run; None is where this world runs.
+            world: Which world of a batch is copied; None where this is a single world.
 
         A driver, such as a simulated robot, moves this world only: what it moves stands still in the copies, which is
         said once, as a warning.
 
         Raises:
-            BodyStateError: this world is a batch itself.
+            BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
+            InvalidInputError: no such world, or more copies than there is memory for.
         """
         worlds = count("n", n)
         with self._change("imagine"):
-            if self.world_count != 1:
-                raise BodyStateError(f"only a single world can be imagined further; this one has {self.world_count}")
+            chosen = self._chosen("imagine", world)
             self._tell_of_drivers()
             futures = cast("type[World]", type(self))(device=self._device if device is None else device)
-            snapshot = capture(self)
+            check_memory(self, worlds, futures.device, chosen)
+            snapshot = capture(self).pick(chosen)
         apply(snapshot.spread(worlds), futures)
         futures._family, futures._quiet = self._family, self._quiet
         return futures
 
-    def adopt(self, futures: World, k: int) -> None:
+    def adopt(self, futures: World, k: int, *, world: int | None = None) -> None:
         """Become world ``k`` of a batch that was imagined from this one; Body objects keep their identity.
 
+        Args:
+            futures: The batch.
+            k: Which of its worlds.
+            world: Which world of this batch becomes that one, as by ``reset``; None where this is a single world.
+
         Raises:
-            InvalidInputError: not imagined from this world, or ``k`` out of range.
-            BodyStateError: this world is a batch itself.
+            InvalidInputError: not imagined from this world, or ``k`` or ``world`` out of range.
+            BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
         """
         if not isinstance(futures, Saving) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
         with futures._change("adopt"):
             snapshot = capture(futures).pick(check_world_index(k, futures.world_count))
         with self._change("adopt"):
-            if self.world_count != 1:
-                raise BodyStateError("a batch cannot adopt a world; adopt it in the single world")
-            apply(snapshot, self)
+            chosen = self._chosen("adopt", world)
+            if self.world_count > 1:
+                reset_worlds(self, np.array([chosen]), snapshot)
+            else:
+                apply(snapshot, self)
+
+    def _chosen(self, what: str, world: int | None) -> int:
+        """Return which world is meant.
+
+        Raises:
+            BodyStateError: none is named, and there are several.
+        """
+        if world is not None:
+            return check_world_index(world, self.world_count, "world")
+        if self.world_count != 1:
+            raise BodyStateError(f"{what} needs world=k, one of the {self.world_count} worlds of this batch")
+        return 0
 
     def _tell_of_drivers(self) -> None:
         """Say once of each driver that imagined worlds are without it."""

@@ -55,11 +55,14 @@ class Simulation:
         self.world_count = 1
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
+        self._clock_shift: np.ndarray | None = None  # (worlds,) [s], what each world's clock is behind; None: nothing
         self._family = uuid.uuid4().hex
         # whether its materials are guesses, of which many are imagined: nobody is told of their resolution, and one
         # that passes through itself is a guess that does not fit
         self._quiet = False
         self._bodies: dict[str, Body] = {}
+        # arrays of states that callers have views of
+        self._views: weakref.WeakKeyDictionary[Dynamics, dict[str, Any]] = weakref.WeakKeyDictionary()
         self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
         self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
         self._rules = ContactRules()
@@ -90,6 +93,15 @@ class Simulation:
         return self._time
 
     @property
+    def clock(self) -> Any:
+        """Each world's own clock [s], a number or (worlds,): ``time``, but for what ``reset`` has set back.
+
+        Paths and pushes go by ``time``, which all worlds of a batch share.
+        """
+        shift = np.zeros(self.world_count) if self._clock_shift is None else self._clock_shift
+        return self._time - (shift if self.world_count > 1 else float(shift[0]))
+
+    @property
     def device(self) -> str:
         """The device that dynamics run on, "cpu" or "cuda:0" ..."""
         self._device = found_device(self._device)
@@ -99,6 +111,15 @@ class Simulation:
     def is_running(self) -> bool:
         """Return whether frames are made in the background."""
         return self._background is not None and self._background.alive
+
+    def __copy__(self) -> Simulation:
+        raise BodyStateError("a world is copied with imagine(1), which gives it bodies of its own, or kept with save")
+
+    def __deepcopy__(self, memo: Any) -> Simulation:
+        return self.__copy__()
+
+    def __reduce__(self) -> Any:
+        raise BodyStateError("a world is not pickled: save(path) writes it to a file, and restore reads it")
 
     @contextmanager
     def _call(self) -> Iterator[None]:

@@ -23,6 +23,7 @@ from nuno.shapes.coordinates import Pose, compose, invert
 from nuno.shapes.path import Path
 from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import GroupPath, of_world
+from nuno.validation import number
 from nuno.world.rigid_layout import RigidLayout, bring_static, layout_of, scene_for, settle
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ class Snapshot:
     ignored: tuple[tuple[str, str], ...]
     rigid: RigidLayout | None = None
     summed: tuple[str, ...] = ()
+    clock_shift: np.ndarray | None = None  # (worlds,) [s], what each world's own clock is behind ``time``
     from_file: bool = field(default=False)
     drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
 
@@ -165,8 +167,46 @@ class Snapshot:
             rigid = replace(rigid, origin=batched(rigid.origin), listing=listing)
         return replace(
             self, bodies=tuple(bodies), grips=tuple(grips), pair_friction=friction, world_count=world_count,
-            rigid=rigid, drivers=(),
+            rigid=rigid, drivers=(), clock_shift=batched(self.clock_shift),
         )  # fmt: skip  # a driver moves the one world that it is in
+
+    def at(self, time: float) -> Snapshot:
+        """Return the same at another reading of the world's clock: paths and the ends of pushes go along with it.
+
+        Args:
+            time: What ``World.time`` is then [s].
+
+        Raises:
+            InvalidInputError: a time that is not finite.
+        """
+        later = number("time", time) - self.time
+        if later == 0.0:
+            return self
+        bodies = [
+            replace(
+                body,
+                path=None if body.path is None else Path(
+                    body.path.times + later, body.path.positions, body.path.quaternions, body.path.interpolation
+                ),
+                dynamics=body.dynamics and replace(
+                    body.dynamics,
+                    pushes=tuple(Push(p.force, None if p.end is None else p.end + later) for p in body.dynamics.pushes),
+                ),
+            )
+            for body in self.bodies
+        ]  # fmt: skip
+        grips = [
+            replace(
+                grip,
+                spec=_later(grip.spec, later),
+                followed=grip.followed and (grip.followed[0] + later, *grip.followed[1:]),
+            )
+            for grip in self.grips
+        ]
+        shift = np.zeros(self.world_count) if self.clock_shift is None else self.clock_shift
+        return replace(
+            self, time=self.time + later, bodies=tuple(bodies), grips=tuple(grips), clock_shift=shift + later
+        )
 
 
 def capture(world: Simulation) -> Snapshot:
@@ -181,7 +221,7 @@ def capture(world: Simulation) -> Snapshot:
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
         ignored=tuple(ignored), rigid=layout_of(world), summed=tuple(sorted(rules.summed)),
-        drivers=tuple((driver, driver.save()) for driver in world.drivers),
+        drivers=tuple((driver, driver.save()) for driver in world.drivers), clock_shift=world._clock_shift,
     )  # fmt: skip
 
 
@@ -207,7 +247,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
         world._rigid = scene
         raise
     _take_apart(world, list(made.values()))
-    world._time = snapshot.time
+    world._time, world._clock_shift = snapshot.time, snapshot.clock_shift
     world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
     for record in snapshot.bodies:
         _fill(bodies[record.key], record)
@@ -380,16 +420,21 @@ def _mapped_lead(followed: tuple[float, Pose, Pose] | None, batched: Any) -> tup
     return time, (batched(start[0]), batched(start[1])), (batched(end[0]), batched(end[1]))
 
 
+def _later(spec: Any, seconds: float) -> Any:
+    """Return a grip's numbers with its keys so much later."""
+    return replace(spec, times=spec.times + seconds) if hasattr(spec, "times") else spec
+
+
 def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, np.generic) else value
 
 
-def check_world_index(k: Any, world_count: int) -> int:
+def check_world_index(k: Any, world_count: int, name: str = "k") -> int:
     """Return ``k`` as an index of one world of a batch.
 
     Raises:
         InvalidInputError: not a whole number, or out of range.
     """
     if isinstance(k, bool) or not isinstance(k, int | np.integer) or not 0 <= k < world_count:
-        raise InvalidInputError(f"k must be a whole number in [0, {world_count - 1}], got {k!r}")
+        raise InvalidInputError(f"{name} must be a whole number in [0, {world_count - 1}], got {k!r}")
     return int(k)

@@ -138,6 +138,9 @@ class Stepping:
     ) -> None:  # fmt: skip
         """Advance the bodies that take so many substeps in some world, which are kept in the worlds where they do."""
         first, alone = islands.at(count), []
+        for k, body in enumerate(moving):
+            # in worlds that have gone through the frame already the body may have been with others
+            first[k] = np.where(kept.get(body, np.False_), first[k], k)
         for group in _joined(first, [k for k, body in enumerate(moving) if body in kept]):
             bodies = [moving[k] for k in group]
             grips = [grip for body in bodies for grip in body._dynamics.grips]  # type: ignore[union-attr]

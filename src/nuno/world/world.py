@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics, check_material, default_material, make_push
+from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
 from nuno.bodies.make_dynamics import start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
@@ -21,14 +21,10 @@ from nuno.shapes.path import Path
 from nuno.solvers.resolution import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
 from nuno.validation import finite_array, number
-from nuno.world.saving import Saving
-
-if TYPE_CHECKING:
-    from nuno.camera.camera import Camera
-    from nuno.world.contact_points import ContactPoints
+from nuno.world.setting import Setting
 
 
-class World(Saving):
+class World(Setting):
     """A room: static bodies, which cost nothing, and attached ones, which move.
 
     All methods may be called while the world runs in the background; they take effect between frames. In what a run
@@ -321,32 +317,6 @@ class World(Saving):
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
             own._dynamics.add_push(make_push(own, force, torque, duration, self))
 
-    def set_velocity(
-        self, body: Body | str, velocity: ArrayLike | None = None, angular_velocity: ArrayLike | None = None
-    ) -> None:
-        """Give a dynamic body a velocity in place of the one that it has; it stays where it is.
-
-        Every vertex of a cloth or soft body takes the velocity of the rigid motion. What a grip holds goes on with the
-        grip.
-
-        Args:
-            body: The body.
-            velocity: (3,) or (worlds, 3) [m/s] of the centre of mass; of a cloth or soft body also of every vertex,
-                (n, 3) or (worlds, n, 3). Where worlds = n, two axes mean vertices. None is zero.
-            angular_velocity: (3,) or (worlds, 3) [rad/s], along the world's axes; None is zero.
-
-        Raises:
-            BodyStateError: the body is static.
-            InvalidInputError: not finite, of another shape, or an angular velocity on top of those of vertices.
-        """
-        with self._change("set_velocity"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; attach it with a velocity")
-            is_rigid = own._dynamics.is_rigid
-            given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
-            own._dynamics.set_velocity(own, given)
-
     def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
         """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back.
 
@@ -385,72 +355,3 @@ class World(Saving):
         with self._change("sum_impulses"):
             own = self._own(body)
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)
-
-    def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:
-        """Return where a dynamic body touches others: points, normals and forces.
-
-        Those with static bodies are what the next substep would make of them, for cloth and soft bodies; all others
-        are those of the last substep.
-
-        Args:
-            body: The body.
-            itself: Whether contacts of a cloth or soft body with itself are told too, under its own name. Both sides of
-                each are, so that their forces add up to nothing. Of a cloth they are what the next substep would make
-                of them, vertex by vertex, which takes the time of two substeps.
-
-        Raises:
-            BodyStateError: the body is static.
-        """
-        from nuno.world.contact_points import contact_points
-
-        with self._call():
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
-            return contact_points(self, own, itself)
-
-    def state(self, body: Body | str) -> dict[str, Any]:
-        """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
-
-        They are copies on the world's device, in the layout that other libraries expect (``__dlpack__``,
-        ``__cuda_array_interface__``). Positions are copied there; velocities pass through the host.
-
-        Raises:
-            BodyStateError: the body is static.
-        """
-        import warp as wp
-
-        with self._call():
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
-            dynamics = own._dynamics
-            velocities: Any = wp.array(dynamics.velocities(own), dtype=wp.vec3, device=self.device)
-            if isinstance(dynamics, ParticleDynamics):
-                positions: Any = dynamics.solver.positions_on_device()
-            else:
-                positions = wp.array(dynamics.vertices(own), dtype=wp.vec3, device=self.device)
-            return {"positions": positions, "velocities": velocities}
-
-    # Cameras
-
-    def masks(self, camera: Camera, body: Body | str) -> Any:
-        """Return where ``body`` is seen: bool (h, w) or (worlds, h, w), on the device."""
-        from nuno.camera import render
-
-        with self._call():
-            return render.render_masks(self, camera, self._own(body))
-
-    def depth(self, camera: Camera) -> Any:
-        """Return the depth along the camera's axis [m]: float (h, w) or (worlds, h, w), on the device."""
-        from nuno.camera import render
-
-        with self._call():
-            return render.render_depth(self, camera)
-
-    def ids(self, camera: Camera) -> Any:
-        """Return which body is seen, its index in ``bodies`` or -1: int (h, w) or (worlds, h, w)."""
-        from nuno.camera import render
-
-        with self._call():
-            return render.render_ids(self, camera)

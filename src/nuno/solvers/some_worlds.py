@@ -1,0 +1,114 @@
+"""States of some worlds of a batch, written over what those worlds have; all others keep every bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from nuno.rigid.rigid_arrays import REPORTED
+from nuno.rigid.saved_contacts import load_listing, save_listing
+from nuno.solvers.particle_solver import ParticleSolver
+from nuno.solvers.rigid_solver import RigidSolver
+from nuno.state.cloth_state import FASTEST, LOADS, NOTES, ORIGIN
+
+
+def load_particles(solver: ParticleSolver, worlds: np.ndarray, state: Mapping[str, np.ndarray]) -> None:
+    """Set the particles of some worlds, as `ParticleSolver.load_state` sets those of all.
+
+    Args:
+        solver: The solver.
+        worlds: (k,) int, the worlds.
+        state: What `ParticleSolver.save_state` gave, (k, ...) each.
+    """
+    s, local = solver._state, np.asarray(state["local"])
+    if local.dtype == np.float64 and not solver._doubles.count:
+        solver._doubles.put(solver.local_positions())  # the other worlds' floats as they are
+    for k, axis in enumerate("xyz"):
+        for name in (axis, f"p{axis}"):
+            put_rows(solver, getattr(s, name), worlds, local[..., k].astype(np.float32))
+            if solver._doubles.count:
+                put_rows(solver, solver._doubles.array(name), worlds, local[..., k].astype(np.float64))
+        put_rows(solver, getattr(s, f"v{axis}"), worlds, np.asarray(state["velocities"])[..., k])
+    notes = np.pad(np.asarray(state["notes"]), ((0, 0), (0, NOTES - FASTEST)))
+    put_rows(solver, s.notes, worlds, notes)
+    origin = np.asarray(state["origin"], dtype=solver._scalars.dtype)
+    if not np.array_equal(solver._scalars[worlds, ORIGIN : ORIGIN + 3], origin):
+        solver._scalars[worlds, ORIGIN : ORIGIN + 3] = origin
+        wp.copy(s.scalars, solver._put(solver._scalars))
+        if solver._grip_count:
+            set_grips(solver, solver._grips, worlds)
+    if hasattr(solver, "guarded"):
+        solver.guarded[worlds] = state.get("guarded", np.int32(0))
+    if solver.sums is not None:
+        told = {key: impulse.copy() for key, impulse in solver.sums.told().items()}
+        for impulse in told.values():
+            impulse[worlds] = 0.0
+        solver.sums.tell(told)
+
+
+def set_grips(solver: ParticleSolver, grips: Any, worlds: np.ndarray) -> None:
+    """Set what is held; in all worlds but some, what the grips bore in the last frame stays known."""
+    count = LOADS * max(1, solver._grip_count)
+    loads, before = solver._get(solver._state.grip_load, count).copy(), solver._grip_count
+    solver.set_grips(grips)
+    if solver._grip_count == before:
+        loads[worlds] = 0.0
+        wp.copy(solver._state.grip_load, solver._put(loads))
+
+
+def put_rows(solver: ParticleSolver, array: wp.array, worlds: np.ndarray, values: np.ndarray) -> None:
+    """Write numbers (k, count) to some worlds of a device array, without passing the others through the host."""
+    count, lanes = values.shape[1], solver.lanes
+    if solver._cuda:
+        rows: Any = wp.array(np.asarray(worlds, dtype=np.int32), dtype=int, device=solver.device)
+        chosen: Any = [rows, None]
+        there: Any = wp.indexedarray(array.reshape((solver.world_count, count)), chosen)
+        wp.copy(there, wp.array(np.ascontiguousarray(values), dtype=array.dtype, device=solver.device))
+        return
+    if lanes == 1:
+        array.numpy().reshape(solver.world_count, count)[worlds] = values
+        return
+    table = array.numpy().reshape(solver.group_count, count, lanes)
+    table[worlds // lanes, :, worlds % lanes] = values
+    last = solver.world_count - 1
+    if last in worlds:  # lanes beyond the last world repeat it
+        table[-1, :, last % lanes + 1 :] = table[-1, :, last % lanes, None]
+
+
+class RigidRows:
+    """A rigid solver's reports of the last frame and listing of pairs, kept while some worlds are set anew.
+
+    Args:
+        solver: The solver.
+        worlds: (k,) int, the worlds that are set.
+    """
+
+    def __init__(self, solver: RigidSolver, worlds: np.ndarray) -> None:
+        self._solver, self._worlds = solver, worlds
+        solver._load_contacts()
+        self._listing = save_listing(solver)
+        self._reported = {name: solver._entries(name).copy() for name in REPORTED}
+
+    def settle(self, listing: Mapping[str, np.ndarray] | None, rows: np.ndarray) -> None:
+        """Give back what was kept; the worlds that were set take rows of a saved ``listing``, None to list anew."""
+        solver, worlds = self._solver, self._worlds
+        solver._load_contacts()
+        merged = save_listing(solver)
+        for name, values in merged.items():
+            kept = self._listing[name]
+            values[:, : kept.shape[1]] = kept
+            if listing is not None:
+                known = min(values.shape[1], listing[name].shape[1])
+                values[worlds, :known] = listing[name][rows, :known]
+        if listing is None:
+            merged["notes"][worlds] = -1.0
+        load_listing(solver, merged)
+        for name, values in self._reported.items():
+            values[worlds] = 0
+            now = solver._entries(name).copy()
+            now[:, : values.shape[1], : values.shape[2]] = values
+            array = getattr(solver.manifolds, name)
+            array.assign(now.reshape(array.numpy().shape))

@@ -1,0 +1,124 @@
+"""The grips of a batch some worlds of which are reset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.bodies.body import Body
+from nuno.errors import BodyStateError
+from nuno.joints.grip import Grip, GripSpec
+from nuno.joints.rows_of_worlds import WorldRows, merge_spec
+from nuno.shapes.coordinates import compose
+from nuno.world.snapshot import BodyRecord, GripRecord, Snapshot
+
+if TYPE_CHECKING:
+    from nuno.world.simulation import Simulation
+
+
+def merged_grips(
+    world: Simulation, snapshot: Snapshot, records: dict[Body, BodyRecord], at: WorldRows
+) -> tuple[list[tuple[Grip, Any, Any, Any]], list[tuple[GripRecord, Any]]]:
+    """Return what the batch's grips become, (grip, spec, offsets, followed), and grips that come back.
+
+    Raises:
+        BodyStateError: a grip that cannot be there in some worlds and not in others, or holds in another way.
+    """
+    saved = {record.key: record for record in snapshot.grips}
+    by_key = {body.key: body for body in records}
+    keys = {record.key: max([len(g.spec.times) for g in snapshot.grips if g.body == record.key
+                             and isinstance(g.spec, GripSpec)], default=1) for record in records.values()}  # fmt: skip
+    changed, back = [], []
+    for dynamics in world._attached():
+        for grip in dynamics.grips:
+            record = saved.pop(grip.key, None)
+            name = grip.body.name
+            if record is None:
+                changed.append((grip, merge_spec(grip.spec, None, at, name, None), grip.offsets, grip.followed))
+                continue
+            target = None if grip.target is None else grip.target.key
+            if (grip.body.key, target) != (record.body, record.target) or (grip.offsets is None) != (
+                record.offsets is None
+            ):
+                raise BodyStateError(f"the grip on {name!r} leads it in another way than in the snapshot")
+            origin = _origin(records[grip.body], at)
+            end = None if grip.is_tie else _end_of(origin, keys[grip.body.key])
+            spec = merge_spec(grip.spec, record.spec, at, name, end)
+            offsets = _merged_parts(grip.offsets, record.offsets, at)
+            changed.append((grip, spec, offsets, _followed(grip, record, at, by_key)))
+    for record in saved.values():
+        body = by_key[record.body]
+        back.append((record, merge_spec(None, record.spec, at, body.name, None)))
+        if record.offsets is not None:
+            raise BodyStateError(f"the grip on {body.name!r} by another body was released; grip it again in all worlds")
+    return changed, back
+
+
+def _origin(record: BodyRecord, at: WorldRows) -> np.ndarray:
+    assert record.dynamics is not None
+    return np.asarray(record.dynamics.state.get("origin", np.zeros((1, 3))), dtype=np.float64)
+
+
+def _end_of(origin: np.ndarray, keys: int) -> Any:
+    """Return what gives the places where an ended path holds its points, to the bit of the kernel that leads them."""
+
+    def end(spec: GripSpec) -> np.ndarray:
+        local = (spec.positions - origin[:, None, None]).astype(np.float32)
+        last = local[:, :, -1]
+        if 1 < spec.positions.shape[2] == keys:
+            last = local[:, :, -2] + (local[:, :, -1] - local[:, :, -2])
+        return last.astype(np.float64) + origin[:, None]
+
+    return end
+
+
+def _merged_parts(own: Any, other: Any, at: WorldRows) -> Any:
+    if own is None:
+        return None
+    if isinstance(own, tuple):
+        return tuple(at.merged(a, b, np.ndim(a) - 1) for a, b in zip(own, other, strict=True))
+    return at.merged(own, other, np.ndim(own) - 1)
+
+
+def _followed(grip: Grip, record: GripRecord, at: WorldRows, bodies: dict[str, Body]) -> Any:
+    own, other = grip.followed, record.followed
+    if own is None and other is None:
+        return None
+
+    def begun(pose: Any, offsets: Any, count: int) -> Any:
+        place, turn = compose(pose, offsets)
+        start = np.broadcast_to(place, (count, 3)), np.broadcast_to(turn, (count, 4))
+        return at.time - 1.0, start, start
+
+    assert grip.target is not None
+    if own is None:
+        own = begun(grip.target.pose(), grip.offsets, at.world_count)
+    if other is None:
+        leader = bodies[grip.target.key]
+        other = begun(leader.pose(), record.offsets, len(record.offsets[0]))
+    poses = (tuple(map(at.merged, x, y, (1, 1))) for x, y in zip(own[1:], other[1:], strict=True))
+    return own[0], *poses
+
+
+def set_merged_grips(
+    world: Simulation, changed: list[tuple[Grip, Any, Any, Any]], back: list[tuple[GripRecord, Any]],
+    worlds: np.ndarray,
+) -> None:  # fmt: skip
+    """Let grips be what `merged_grips` gave."""
+    from nuno.solvers.some_worlds import set_grips
+
+    led: dict[Any, list[Grip]] = {}
+    for grip, spec, offsets, followed in changed:
+        if not grip.is_tie and (spec is not grip.spec or offsets is not grip.offsets):
+            led.setdefault(grip.body._dynamics, []).append(grip)
+        grip.spec, grip.offsets, grip.followed = spec, offsets, followed
+    for record, spec in back:
+        grip = world._known_grips.get(record.key) or Grip(world._bodies[record.body], spec)
+        grip.key, grip.body = record.key, world._bodies[record.body]
+        grip.target = None if record.target is None else world._bodies[record.target]
+        grip.spec, grip.offsets, grip.followed = spec, record.offsets, record.followed
+        world._hold(grip)
+    for dynamics in led:
+        if not dynamics.grips_changed:
+            set_grips(dynamics.solver, [grip.spec for grip in dynamics.grips if not grip.is_tie], worlds)
