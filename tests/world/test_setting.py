@@ -83,7 +83,7 @@ def test_vertices_are_where_they_were_set():
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_states_are_views_that_are_filled_anew(worlds):
     """With copy=False arrays are the same from step to step, and hold the present state; copies stay as they are."""
-    world, batch = batch_of(worlds)
+    _, batch = batch_of(worlds)
     for name in ("cloth", "box"):
         body = batch.find(name)
         kept, copied = batch.state(name, copy=False), batch.state(name)
