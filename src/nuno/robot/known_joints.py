@@ -223,7 +223,7 @@ class KnownJoints(ABC):
                 f"{upper[k]:.4f}: is the vector in another model's order? The order here is that of joint_names; a "
                 "scikit-robot model itself, or a mapping from names, is taken by names"
             )
-        if not self._order_told and "skrobot" in sys.modules:
+        if len(wanted) and not self._order_told and "skrobot" in sys.modules:
             self._order_told = True
             logger.warning(
                 "a vector without names is taken in the order of joint_names, %s first; scikit-robot's models have "
