@@ -247,6 +247,11 @@ class Gait:
         if goal is not None:
             goal.status, goal.text = status
 
+    def give_up(self, why: str) -> None:
+        """Stop at once, wherever the feet are: the robot was put elsewhere."""
+        self._drop(why)
+        self.walk = self._before = self._drive = None
+
     def _drop(self, why: str) -> None:
         for goal in (self.goal, None if self._waiting is None else self._waiting[0]):
             if goal is not None:
