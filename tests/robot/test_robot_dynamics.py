@@ -7,6 +7,7 @@ import pytest
 import nuno
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.robot.link_dynamics import LinkDynamics
+from nuno.robot.whole_body import Gains
 
 G = 9.81
 PENDULUM = """
@@ -24,6 +25,7 @@ PENDULUM = """
 
 
 def robot_in(world, name="talos", **options):
+    """Return a robot with dynamics in a world."""
     return nuno.SimulatedRobot(nuno.Humanoid(name), world, dynamics=True, **options)
 
 
@@ -39,6 +41,7 @@ def floor_world():
 
 @pytest.fixture
 def standing(floor_world):
+    """The world and the robot of ``floor_world``, as they were."""
     world, robot, saved = floor_world
     world.restore(saved)
     return world, robot
@@ -64,6 +67,41 @@ def test_a_robot_in_free_fall_falls_as_any_body():
     np.testing.assert_allclose(moved[3:], 0.0, atol=0.2)
     # half a substep of symplectic Euler
     np.testing.assert_allclose(centre - start, (0.0, 0.0, -0.5 * G * 0.3 * (0.3 + 1 / 600)), atol=1e-3)
+
+
+def test_it_moves_as_pinocchio_says():
+    """Afloat in no gravity, its motors swing arms and a leg: joints and base go as by Pinocchio's forward dynamics.
+
+    Within 1 % of the way that the joints go, 0.5 s long; Pinocchio's articulated-body algorithm takes steps of 0.1 ms.
+    """
+    world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0), substeps=40)
+    model = nuno.Humanoid("talos")
+    links = model.enter(world, "joints")
+    dynamics = LinkDynamics(links)
+    dynamics.attach()
+    start = model.angle_vector()
+    wanted = start.copy()
+    for name, way in (("arm_left_2_joint", 0.3), ("arm_right_4_joint", -0.4), ("leg_left_4_joint", 0.3)):
+        wanted[model.joint_index(name)] += way
+    inertia = np.array(pin.crba(model.model, model.model.createData(), model.configuration())).diagonal()[6:]
+    stiffness, damping = 60.0 * inertia, 8.0 * inertia
+    nothing = np.zeros(len(start))
+    dynamics.efforts = np.full(len(start), 1e3)  # no limit is met
+    dynamics.drive(wanted, nothing, stiffness, damping, nothing)
+    inner = model.model.copy()
+    inner.gravity.linear = np.zeros(3)
+    data, q, v, dt = inner.createData(), model.configuration(), np.zeros(inner.nv), 1e-4
+    for _ in range(30):
+        world.step()
+        for _ in range(round(1 / 60 / dt)):
+            torque = np.zeros(inner.nv)
+            torque[6:] = stiffness * (wanted - model.angles_of(q)) - damping * v[6:]
+            v = v + 1 / 60 / round(1 / 60 / dt) * pin.aba(inner, data, q, v, torque)
+            q = pin.integrate(inner, q, 1 / 60 / round(1 / 60 / dt) * v)
+    mine, _ = dynamics.read()
+    np.testing.assert_allclose(model.angles_of(mine), model.angles_of(q), atol=0.01 * 0.4)
+    np.testing.assert_allclose(mine[:7], q[:7], atol=2e-3)
+    assert np.abs(model.angles_of(q) - start).max() > 0.3
 
 
 def test_a_pendulum_swings_with_its_period(tmp_path):
@@ -107,7 +145,7 @@ def test_standing_bears_the_weight(standing):
 
 
 def test_an_arm_goes_where_it_is_sent(standing):
-    """Within 0.02 rad at the end of the motion and 0.005 rad 0.6 s later, while the robot stands."""
+    """Within 0.01 rad at the end of the motion and 0.002 rad 0.6 s later, while the robot stands."""
     world, robot = standing
     wanted = robot.angle_vector()
     k = robot.actual.joint_index("arm_left_4_joint")
@@ -115,9 +153,9 @@ def test_an_arm_goes_where_it_is_sent(standing):
     robot.angle_vector(wanted, 0.8)
     robot.wait_interpolation()
     arms = [n for n, name in enumerate(robot.actual.joint_names) if name.startswith("arm")]
-    assert np.abs(robot.actual.angle_vector() - wanted)[arms].max() < 0.03
+    assert np.abs(robot.actual.angle_vector() - wanted)[arms].max() < 0.01
     world.run(0.6)
-    assert np.abs(robot.actual.angle_vector() - wanted)[arms].max() < 0.005
+    assert np.abs(robot.actual.angle_vector() - wanted)[arms].max() < 0.002
     assert robot.state().fallen is None
 
 
@@ -138,17 +176,19 @@ def test_restored_it_goes_on_bit_for_bit(standing):
 
 
 @pytest.mark.parametrize("push", [(0.0, 10.0, 0.0), (10.0, 0.0, 0.0)])
-def test_a_light_push_moves_the_base_and_is_survived(standing, push):
-    """10 N s on the base: it moves by some centimetres and comes back to within 1 cm."""
+def test_a_light_push_is_survived(standing, push):
+    """10 N s on the base: its centre of mass goes as a critically damped mass, J / (m e rate), and comes back."""
     world, robot = standing
-    start = robot.state().q[:2].copy()
-    world.push(robot.links.bodies[0], np.array(push) / 0.1, duration=0.1)
+    _, start = momentum(robot)
+    world.push(robot.links.bodies[0], np.array(push) / 0.05, duration=0.05)
     far = 0.0
     for _ in range(90):
         world.step()
-        far = max(far, float(np.linalg.norm(robot.state().q[:2] - start)))
-    assert 0.01 < far < 0.2
-    assert np.linalg.norm(robot.state().q[:2] - start) < 0.01 and robot.state().fallen is None
+        far = max(far, float(np.linalg.norm((momentum(robot)[1] - start)[:2])))
+    expected = 10.0 / (robot.actual.mass * np.e * Gains().centre_rate)
+    assert far == pytest.approx(expected, rel=0.2)
+    # soles have slid by that much
+    assert np.linalg.norm((momentum(robot)[1] - start)[:2]) < 2.5e-3 and robot.state().fallen is None
 
 
 def test_a_shove_throws_it_over_and_it_is_said(standing, caplog):
@@ -174,7 +214,7 @@ def test_detached_it_stands_still_and_walks_as_it_is_sent(standing):
     before = robot.state().q.copy()
     assert not any(body.is_dynamic for body in robot.links.bodies)
     world.run(0.2)
-    np.testing.assert_array_equal(robot.state().q, before)
+    np.testing.assert_allclose(robot.state().q, before, atol=1e-6)  # joints beyond a limit come back to it
     wanted = robot.angle_vector()
     wanted[robot.actual.joint_index("head_1_joint")] -= 0.1
     robot.angle_vector(wanted, 0.3)
@@ -186,7 +226,7 @@ def test_detached_it_stands_still_and_walks_as_it_is_sent(standing):
 
 
 def test_a_hand_stops_at_a_table(standing):
-    """A static box before the hand: the forearm presses on it instead of going through, and the motors' torque tells."""
+    """A static box before the hand: the forearm presses on it instead of going through."""
     world, robot = standing
     hand = robot.links.bodies[robot.links.names.index("arm_right_7_link")]
     low = hand.vertices[:, 2].min()
@@ -215,7 +255,7 @@ def test_bad_calls_are_named():
 @pytest.mark.long
 def test_it_walks_on_true_feet(standing):
     """0.3 m ahead: it arrives within 2 cm, upright, both feet on the floor, no motor at its limit."""
-    world, robot = standing
+    _, robot = standing
     start = robot.state().q[:2].copy()
     assert robot.go_pos(0.3, 0.0, 0.0)
     state = robot.state()

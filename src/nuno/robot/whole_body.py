@@ -45,7 +45,7 @@ class Gains:
     centre_rate: float = 6.0
     trunk_rate: float = 12.0
     foot_rate: float = 15.0
-    posture_rate: float = 10.0
+    posture_rate: float = 25.0
     stand_rate: float = 20.0
 
 
