@@ -247,6 +247,12 @@ class Gait:
         if goal is not None:
             goal.status, goal.text = status
 
+    def disown(self) -> None:
+        """Take copies in place of the goals."""
+        self.goal = None if self.goal is None else self.goal.copy()
+        if self._waiting is not None:
+            self._waiting = (self._waiting[0].copy(), self._waiting[1])
+
     def give_up(self, why: str) -> None:
         """Stop at once, wherever the feet are: the robot was put elsewhere."""
         self._drop(why)

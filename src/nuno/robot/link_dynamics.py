@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import Motor
 from nuno.materials import Rigid
@@ -15,7 +18,10 @@ from nuno.shapes import quaternion as quat
 from nuno.world.make_joints import hinge, slider
 
 if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.joints.grip import Grip
     from nuno.robot.links import Links
+    from nuno.world.world import World
 
 FULL_EFFORT = 0.01
 """[rad or m] How far a joint is from where it is wanted when its motor gives all that it can."""
@@ -54,6 +60,7 @@ class LinkDynamics:
         if not links.are_joints:
             raise InvalidInputError('dynamics need one body for each joint: robot.enter(world, "joints") makes them')
         self.links, self.robot, self.world, self.friction = links, links.robot, links.world, friction
+        self.bodies = links.bodies
         self.joints: tuple[Joint, ...] = ()
         model, limits = self.robot.model, self.robot.effort_limits
         self.efforts = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
@@ -126,30 +133,70 @@ class LinkDynamics:
         self, positions: np.ndarray, velocities: np.ndarray, stiffness: np.ndarray, damping: np.ndarray,
         effort: np.ndarray,
     ) -> None:  # fmt: skip
-        """Set all motors: (n,) each."""
+        """Set all motors: (n,) each, or (worlds, n)."""
         for n, joint in enumerate(self.joints):
             joint.motor = Motor(
-                velocities[n], positions[n], stiffness[n], damping[n], self.efforts[n], effort[n]
+                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], self.efforts[n],
+                effort[..., n],
             )  # fmt: skip
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the robot is, q (nq,), and how it moves, v (nv,), as Pinocchio has them."""
-        robot, base = self.robot, self.links.bodies[0]
-        place, turn = base.pose()
-        v = np.zeros(robot.model.nv)
-        v[6:] = [joint.velocity for joint in self.joints]
+        """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
+        robot, base, worlds = self.robot, self.bodies[0], self.world.world_count
+        place, turn = (np.atleast_2d(part) for part in base.pose())
+        v = np.zeros((worlds, robot.model.nv))
+        v[:, 6:] = np.stack([np.broadcast_to(joint.velocity, (worlds,)) for joint in self.joints], axis=1)
         if base.is_dynamic:
             back = quat.inverse(turn)
-            spin = np.asarray(base.angular_velocity)
-            arm = place - np.asarray(base.centre_of_mass)
-            v[:3] = quat.rotate(back, np.asarray(base.velocity) + np.cross(spin, arm))
-            v[3:6] = quat.rotate(back, spin)
-        pose = np.concatenate([place, np.roll(turn, -1)])
-        return robot.configuration_of(np.array([joint.position for joint in self.joints]), pose), v
+            spin = np.atleast_2d(base.angular_velocity)
+            arm = place - np.atleast_2d(base.centre_of_mass)
+            v[:, :3] = quat.rotate(back, np.atleast_2d(base.velocity) + np.cross(spin, arm))
+            v[:, 3:6] = quat.rotate(back, spin)
+        pose = np.broadcast_to(np.concatenate([place, np.roll(turn, -1, axis=1)], axis=1), (worlds, 7))
+        angles = np.stack([np.broadcast_to(joint.position, (worlds,)) for joint in self.joints], axis=1)
+        return np.stack([robot.configuration_of(a, own) for a, own in zip(angles, pose, strict=True)]), v
 
     def efforts_now(self) -> np.ndarray:
-        """Return what the joints' motors, friction and stops exert (n,) [N m; N], the mean over the last frame."""
-        return np.array([joint.effort for joint in self.joints])
+        """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
+        worlds = self.world.world_count
+        return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
+
+    def loads(self) -> list[Any]:
+        """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.
+
+        Of each world.
+        """
+        index = {body: k for k, body in enumerate(self.bodies)}
+        others = [body for body in self.world.bodies if body not in index]
+        held = [(index[grip.target], grip) for grip in _grips_of(others) if grip.target in index]
+        worlds = self.world.world_count
+        if not held:
+            return [None] * worlds
+        found = [pin.StdVec_Force() for _ in range(worlds)]
+        for own in found:
+            own.extend([pin.Force.Zero()] * self.robot.model.njoints)
+        for k, grip in held:
+            force, torque = (np.atleast_2d(part) for part in grip.wrench)
+            place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
+            for w, own in enumerate(found):
+                arm = held_points(grip, w).mean(axis=0) - place[w]
+                back = quat.inverse(turn[w])
+                moment = torque[w] + np.cross(arm, force[w])
+                own[k + 1] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
+        return found
+
+    def imagined(self, world: World) -> LinkDynamics:
+        """Return the same for the copies of the links in a batch that was imagined from their world."""
+        made = copy.copy(self)
+        made.world, made.bodies = world, tuple(world.find(body.name) for body in self.bodies)
+        keys = {grip.key: grip for grip in _grips_of(made.bodies)}
+        made.joints = tuple(keys[joint.key] for joint in self.joints)  # type: ignore[misc]
+        return made
+
+
+def _grips_of(bodies: Iterable[Body]) -> list[Grip]:
+    """Return what holds bodies, joints included."""
+    return [grip for body in bodies if body._dynamics is not None for grip in body._dynamics.grips]
 
 
 def _possible(inertia: np.ndarray, mass: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -88,9 +88,17 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
+        return self._poses_at(self._placements, self._joint_axes, self._joint_places)
+
+    def poses_of(self, robot: Humanoid) -> tuple[np.ndarray, np.ndarray]:
+        """Return where another robot of the same model has such shapes now, as ``poses`` does."""
+        placements = robot.update().oMi.tolist()
+        return self._poses_at(placements, *placement_arrays(placements))
+
+    def _poses_at(self, placements: Any, axes: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         joints = self._rows
-        places = self._joint_places[joints] + np.einsum("kij,kj->ki", self._joint_axes[joints], self._offsets)
-        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
+        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], self._offsets)
+        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
         return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
 
     def follow(self, seconds: float) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.robot.robot_state import RobotState
 from nuno.robot.simulated_senses import SimulatedSenses
 from nuno.robot.trajectory_controller import ARRIVED
 
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.simulated_joints import SimulatedJoints
+    from nuno.robot.wanted_motion import WantedMotion
 
 
 class SimulatedBody(SimulatedSenses):
@@ -34,8 +34,8 @@ class SimulatedBody(SimulatedSenses):
     joints: SimulatedJoints
     gait: Gait
     balance: Balance | None
-    _wanted: Humanoid
-    _aim: RobotState
+    wanted: Humanoid
+    _motion: WantedMotion
 
     @property
     def is_dynamic(self) -> bool:
@@ -55,7 +55,7 @@ class SimulatedBody(SimulatedSenses):
                 'SimulatedRobot(..., dynamics=True), or links of robot.enter(world, "joints")'
             )
         with self.world.lock:
-            self.balance.attach()
+            self.balance.dynamics.attach()
             self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
 
     def detach(self) -> None:
@@ -94,12 +94,7 @@ class SimulatedBody(SimulatedSenses):
             controller.near = near
 
     def _start_from(self, q: np.ndarray) -> None:
-        """Be at rest in a configuration (nq,): nothing that was wanted before is wanted any more."""
-        self.cancel_base()
-        nothing = np.zeros(self.actual.model.nv)
-        self._state = self._aim = RobotState(self.world.time, q, nothing, nothing)
-        angles = np.clip(self.actual.angles_of(q), *self.actual.joint_limits)
-        for robot in (self.actual, self._wanted):
-            robot.move_to(angles, q[:7])
-        self.gait.give_up("the robot was put elsewhere")
-        self.joints.put(self.actual.angle_vector())
+        self._motion.start_from(q, self.world.time)
+        self._state = self._motion.aim
+        if self.actual is not self.wanted:
+            self.actual.move_to(self.wanted.angle_vector(), q[:7])

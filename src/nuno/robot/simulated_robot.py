@@ -10,7 +10,6 @@ import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.robot.balance import Balance
-from nuno.robot.gait import Gait
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.hands import hands_of
 from nuno.robot.joint_interface import Controller
@@ -23,9 +22,8 @@ from nuno.robot.servo import Servo, ServoCommand, external_forces
 from nuno.robot.simulated_body import SimulatedBody
 from nuno.robot.simulated_cameras import SimulatedCameras
 from nuno.robot.simulated_gripper import SimulatedGripper
-from nuno.robot.simulated_joints import SimulatedJoints, joined
-from nuno.robot.stance import Stance
 from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import number
 from nuno.world.background import LATE
@@ -33,6 +31,7 @@ from nuno.world.background import LATE
 if TYPE_CHECKING:
     from nuno.robot.head_cameras import HeadCameras
     from nuno.robot.humanoid import Humanoid
+    from nuno.robot.imagined_robot import ImaginedRobot
     from nuno.robot.links import Links
     from nuno.world.world import World
 
@@ -64,6 +63,7 @@ class SimulatedRobot(SimulatedBody):
 
     Attributes:
         actual: The robot that is simulated, as it truly is.
+        wanted: The robot as its controllers want it; without dynamics, ``actual``.
         robot: What the program knows of it; as of a real one, it is brought up to date by ``update_robot_state``.
         joints: Its joints and controllers.
         hands: Its hands, by name.
@@ -88,24 +88,21 @@ class SimulatedRobot(SimulatedBody):
         self.actual = self.links.robot
         self.balance = Balance(self.links) if self.links.are_joints else None
         # with dynamics, the robot as its controllers want it, else the actual one
-        self._wanted = self.actual if self.balance is None else self.actual.copy()
+        self.wanted = self.actual if self.balance is None else self.actual.copy()
         super().__init__(self.actual, default_controller, namespace=namespace)
         groups = {own["controller_type"]: own["joint_names"] for own in self.default_controller()}
-        self.joints = SimulatedJoints(self.actual, groups)
+        self._motion = WantedMotion(self.wanted, groups, world.time)
+        self.joints, self.gait = self._motion.joints, self._motion.gait
         self.hands = hands_of(self.links)
         self.grippers = {name: SimulatedGripper(hand, self.joints) for name, hand in self.hands.items()}
-        self.gait, self.stance = Gait(self._wanted, self.joints), Stance(self._wanted)
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
         self._servo: Servo | None = None
-        self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
+        self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
-        self._state = RobotState(
-            world.time, self.actual.configuration(), np.zeros(self.actual.model.nv), np.zeros(self.actual.model.nv)
-        )
-        self._aim = self._state  # as its controllers want it to move
+        self._state = self._motion.aim
         if dynamics:
             self.attach()
         with world.lock:
@@ -257,7 +254,7 @@ class SimulatedRobot(SimulatedBody):
             if self.gait.is_walking:
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
-            standing = self._wanted.copy()
+            standing = self.wanted.copy()
         walk = self.gait.plan(standing, x, y, yaw, seconds)  # the world goes on meanwhile
         with self.world.lock:
             if self.gait.is_walking:
@@ -292,48 +289,30 @@ class SimulatedRobot(SimulatedBody):
 
     def begin_frame(self, start: float, end: float) -> None:
         """Send the links to where the robot is at the end of the frame, or, with dynamics, set their motors."""
-        span, before, robot = end - start, self._aim, self._wanted
-        rows, given = None, None
-        self._kept = (self._state, before, robot._angles, robot._position, robot._quaternion)
+        span, self._before = end - start, self._state
+        before = self._motion.aim
+        servo = None if self._servo is None or self.is_dynamic else self._serve
+        aim = self._motion.begin(end, span, servo)
         if span <= 0.0:
-            self.joints.step(0.0)
             return
-        base = base_motion = None
-        if self.gait.is_walking:
-            walk = self.gait.at(self.joints.clock + span)
-            rows = self.gait.rows
-            given = (robot.angles_of(walk.q)[rows], walk.v[6:][rows], walk.a[6:][rows])
-            base, base_motion = walk.q[:7], (walk.v[:6], walk.a[:6])
-        if self._servo is not None and not self.is_dynamic:
-            others = self.joints.step(span, rows, given)
-            own = self._servo.step(before, others, base, span, self._external())
-            rows, given = joined(rows, given, self._servo.rows, own)
-        positions, velocities, accelerations = self.joints.step(span, rows, given)
-        if positions is robot._angles and base is None:
-            self._aim = RobotState(end, before.q, np.zeros_like(before.v), np.zeros_like(before.a))
-        else:
-            if base is None and (stood := self.stance.base(robot._angles, (positions, velocities, accelerations))):
-                base, base_motion = stood
-            v, a = np.zeros_like(before.v), np.zeros_like(before.a)
-            v[6:], a[6:] = velocities, accelerations
-            if base is not None and base_motion is not None:
-                v[:6], a[:6] = base_motion
-            robot.move_to(positions, base)
-            self._aim = RobotState(end, robot.configuration(), v, a)
         if self.balance is not None and self.is_dynamic:
-            self.balance.begin(self._state, self._aim, span, self._servo, self._external())
+            loads = self.balance.dynamics.loads()[0]
+            command = self.balance.command(self._state, aim, span, self._servo, loads)
+            self.balance.dynamics.drive(*command)
             return
-        self._state = self._aim
-        if not (self._aim.q == before.q).all():
-            self.actual.take_configuration(self._aim.q)
+        self._state = aim
+        if not (aim.q == before.q).all():
+            if self.actual is not self.wanted:
+                self.actual.move_to(self.wanted._angles, aim.q[:7])
             self.links.follow(span)
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
         actual = None
         if self.balance is not None and self.is_dynamic:
-            self._state = self.balance.end(self._state, self._aim, self.world.time)
-            q = self._state.q
+            q, v = (values[0] for values in self.balance.dynamics.read())
+            torques = self.balance.dynamics.efforts_now()[0]
+            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time)
             angles = self.actual.angles_of(q)
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
@@ -344,30 +323,48 @@ class SimulatedRobot(SimulatedBody):
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
-        assert self._kept is not None
-        self._state, self._aim, *pose = self._kept
-        self._put(self._wanted, *pose)
+        assert self._before is not None
+        self._state = self._before
+        self._motion.cancel()
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-        poses = [(own._angles, own._position, own._quaternion) for own in (self.actual, self._wanted)]
-        body = None if self.balance is None else self.balance.save()
-        return self._state, self._aim, poses, self.joints.save(), self.gait.save(), grippers, self._servo, body
+        joints = () if self.balance is None else self.balance.dynamics.joints
+        return self._state, self._motion.save(), joints, grippers, self._servo
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, self._aim, poses, joints, gait, grippers, self._servo, body = saved
-        for robot, pose in zip((self.actual, self._wanted), poses, strict=True):
-            self._put(robot, *pose)
+        self._state, motion, joints, grippers, self._servo = saved
+        self._motion.load(motion)
         if self.balance is not None:
-            self.balance.load(body)
-        self.joints.load(joints)
-        self.gait.load(gait)
+            self.balance.dynamics.joints = joints
+        if self.actual is not self.wanted:
+            self.actual.move_to(self.actual.angles_of(self._state.q), self._state.q[:7])
         for name, gripper in self.grippers.items():
             gripper.load(grippers[name])
         self._readings = None
 
-    def _put(self, robot: Humanoid, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
-        robot._angles = angles
-        robot._place(position, quaternion)
+    def saved(self) -> tuple[RobotState, Any, Any]:
+        """Return its state, what is wanted of it, and its servo command, for its copies in imagined worlds."""
+        return self._state, self._motion.save(), self._servo
+
+    def imagined(self, futures: World, world: int) -> ImaginedRobot:
+        """Return the driver of this robot's copies in a batch that was imagined from its world."""
+        from nuno.robot.imagined_robot import ImaginedRobot
+
+        return ImaginedRobot(self, futures)
+
+    def take_future(self, futures: World, k: int) -> None:
+        """Go on as the copy in one world of a batch does, which the robot's world has just become."""
+        for other in futures.drivers:
+            if getattr(other, "original", None) is self:
+                joints = () if self.balance is None else self.balance.dynamics.joints
+                state, motion, servo = other.saved_of(k)  # type: ignore[attr-defined]
+                grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
+                self.load((state, motion, joints, grippers, servo))
+                self._motion.disown()
+
+    def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
+        assert self._servo is not None
+        return self._servo.rows, self._servo.step(before, others, base, span, self._external())
