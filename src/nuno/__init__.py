@@ -108,6 +108,7 @@ if TYPE_CHECKING:
     from nuno.robot.wire.names import Names
     from nuno.robot.wire.server import RobotServer
     from nuno.search.minimise import Minimum, minimise
+    from nuno.search.planner import Plan, plan
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
@@ -185,6 +186,7 @@ __all__ = [
     "PickCase",
     "PickResult",
     "Picture",
+    "Plan",
     "Plane",
     "PlayedFold",
     "Reach",
@@ -263,6 +265,7 @@ __all__ = [
     "locate_marker",
     "mesh",
     "minimise",
+    "plan",
     "plan_walk",
     "plan_walk_footsteps",
     "plan_walk_velocity",
@@ -351,6 +354,8 @@ _LAZY = {
     "each": "nuno.search.trial",
     "Trial": "nuno.search.trial",
     "minimise": "nuno.search.minimise",
+    "plan": "nuno.search.planner",
+    "Plan": "nuno.search.planner",
     "Minimum": "nuno.search.minimise",
     "Uniform": "nuno.search.sampler",
     "Footage": "nuno.estimate.footage",

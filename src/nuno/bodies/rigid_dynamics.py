@@ -367,6 +367,9 @@ def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
 
 def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
+    if material.mass is not None and material.inertia is not None and material.centre_of_mass is not None:
+        mass = np.broadcast_to(np.asarray(material.mass, dtype=float), density.shape)
+        return mass, np.broadcast_to(material.inertia, (len(mass), 3, 3)), np.asarray(material.centre_of_mass)
     vertices = body.local_vertices() if body._deformed is not None else None
     if vertices is not None and vertices.ndim == 3:
         vertices = vertices[0]
@@ -378,7 +381,8 @@ def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarr
         inertia, mass = inertia * (given / mass)[:, None, None], given
     if material.inertia is not None:
         inertia = np.broadcast_to(material.inertia, inertia.shape)
-    return mass, inertia, unit.centre
+    centre = unit.centre if material.centre_of_mass is None else np.asarray(material.centre_of_mass)
+    return mass, inertia, centre
 
 
 def _what(body: Body | BodyRecord) -> tuple[Any, ...]:

@@ -70,6 +70,12 @@ class Goal:
     def __repr__(self) -> str:
         return f"<Goal {self.name!r}, {self.status.name.lower()}{f': {self.text}' if self.text else ''}>"
 
+    def copy(self) -> Goal:
+        """Return another goal of the same name that stands where this one stands."""
+        made = Goal(self.asked, self.name)
+        made.status, made.code, made.text, made.feedback = self.status, self.code, self.text, self.feedback
+        return made
+
     @property
     def is_done(self) -> bool:
         """Return whether it has come to an end, of whichever kind."""

@@ -119,7 +119,8 @@ class Hand:
         with world.lock:
             self.open()
             frame = Coordinates(*compose(self.body.pose(), self._offset))  # where the body is, not where it is sent
-            chosen = [b for b in world.bodies if b.is_dynamic] if bodies is None else [world._own(b) for b in bodies]
+            others = [b for b in world.bodies if b.is_dynamic and b not in self.links.bodies]
+            chosen = others if bodies is None else [world._own(b) for b in bodies]
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
