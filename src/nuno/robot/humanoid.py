@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.assumed_limits import assume_limits
 from nuno.robot.description import FileName, find_description
 from nuno.robot.pinocchio import pin
 from nuno.robot.placement import pose_of
@@ -68,6 +69,7 @@ class Humanoid(Coordinates):
         self._rows = np.array([self.model.joints[j].idx_q for j in joints], dtype=int)
         self._turns_freely = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
         self._free = np.flatnonzero(self._turns_freely)
+        assume_limits(self.model, self.name, self.is_slide, self.description.velocity_limits)
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
         self._angles = np.zeros(len(self.joint_names))
