@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from nuno.mesh.fitted import fitted_tetrahedra
     from nuno.mesh.lattice import lattice_tetrahedra
     from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra
+    from nuno.robot.describe_robot import describe_robot
     from nuno.robot.footsteps import Footstep
     from nuno.robot.goal import Goal, Tolerances
     from nuno.robot.hands import Hand
@@ -247,6 +248,7 @@ __all__ = [
     "compound",
     "continue_walk",
     "cylinder",
+    "describe_robot",
     "draw",
     "each",
     "elements",
@@ -311,6 +313,7 @@ _LAZY = {
     "read_case": "nuno.estimate.case",
     "similarity": "nuno.estimate.similarity",
     "Humanoid": "nuno.robot.humanoid",
+    "describe_robot": "nuno.robot.describe_robot",
     "Links": "nuno.robot.links",
     "Reach": "nuno.robot.reach",
     "Film": "nuno.viewer.film",

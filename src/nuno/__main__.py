@@ -1,4 +1,4 @@
-"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, ``fold`` likewise, ``serve talos`` and ``compile``."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compile``."""
 
 from __future__ import annotations
 
@@ -50,6 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--factor", type=float, default=1.0, help="simulated over real time (default 1; inf: at full speed)"
     )
     pace.add_argument("--stepped", action="store_true", help="let time pass only while a client waits for it")
+    describe = commands.add_parser(
+        "describe-robot", help="guess from a URDF the table of hands, feet, cameras and groups of a robot, to be edited"
+    )
+    describe.add_argument("urdf", metavar="URDF", help="the robot's file")
+    describe.add_argument("--srdf", metavar="FILE", help="pairs of links that may overlap, postures, groups")
+    describe.add_argument("--packages", nargs="+", metavar="DIR", help="folders that package:// is looked up in")
+    describe.add_argument("--name", help="what the robot is to be called (default: the file's name)")
+    describe.add_argument("--out", metavar="FILE", help="where the table goes (default: to the terminal)")
     ahead = commands.add_parser(
         "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
         description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
@@ -71,7 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
-        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile}
+        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
+                       "describe-robot": _describe_robot}  # fmt: skip
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
@@ -144,6 +153,16 @@ def _serve(options: argparse.Namespace) -> int:
         sys.stdout.flush()
         while not server.join(1.0):
             pass
+    return ANSWERED
+
+
+def _describe_robot(options: argparse.Namespace) -> int:
+    from nuno.robot.describe_robot import describe_robot
+
+    text = describe_robot(
+        options.urdf, options.out, srdf=options.srdf, package_dirs=options.packages, name=options.name
+    )  # fmt: skip
+    sys.stdout.write(text if options.out is None else f"see {options.out}, and correct what says CHECK\n")
     return ANSWERED
 
 
