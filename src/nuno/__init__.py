@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from nuno.robot.interface import RobotInterface
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
+    from nuno.robot.ros2.ros2_server import Ros2Server
     from nuno.robot.sensor_model import SensorModel
     from nuno.robot.sensors import Readings, Sensors
     from nuno.robot.servo import ServoCommand
@@ -201,6 +202,7 @@ __all__ = [
     "RobotModelError",
     "RobotServer",
     "RobotTimeoutError",
+    "Ros2Server",
     "SensorModel",
     "Sensors",
     "ServoCommand",
@@ -341,6 +343,7 @@ _LAZY = {
     "StereoPoints": "nuno.robot.stereo",
     "locate_marker": "nuno.robot.stereo",
     "RobotServer": "nuno.robot.wire.server",
+    "Ros2Server": "nuno.robot.ros2.ros2_server",
     "WireRobot": "nuno.robot.wire.client",
     "SimulatedRobot": "nuno.robot.simulated_robot",
     "RobotInterface": "nuno.robot.interface",

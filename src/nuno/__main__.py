@@ -11,10 +11,14 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
 from nuno.estimate.lift_prior import SIDEWAYS
+
+if TYPE_CHECKING:
+    from nuno.robot.simulated_robot import SimulatedRobot
 
 ANSWERED, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -36,9 +40,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
     serve = commands.add_parser(
-        "serve", help="put a simulated robot on the wire, for clients of the rosbridge protocol"
+        "serve", help="put a simulated robot on the wire, for programs that speak to it as to a real one"
     )
     serve.add_argument("robot", nargs="?", default="talos", help="talos (default), g1, or the path of a URDF file")
+    graph = serve.add_mutually_exclusive_group()
+    graph.add_argument("--rosbridge", action="store_true", help="for clients of the rosbridge protocol (default)")
+    graph.add_argument("--ros2", action="store_true", help="in a ROS 2 graph, over CycloneDDS")
+    serve.add_argument("--domain", type=int, metavar="N", help="ROS 2's domain (default: ROS_DOMAIN_ID, else 0)")
     serve.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
     serve.add_argument("--port", type=int, default=9090, help="0 takes a free one (default 9090)")
     serve.add_argument(
@@ -138,18 +146,37 @@ def _fold(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
+    from nuno.errors import InvalidInputError
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.simulated_robot import SimulatedRobot
     from nuno.robot.wire.server import RobotServer
     from nuno.world.world import World
 
+    if options.ros2 and options.stepped:
+        raise InvalidInputError("--stepped needs clients of rosbridge, which ask for time; --ros2 takes --factor")
+    if options.domain is not None and not options.ros2:
+        raise InvalidInputError("--domain is of ROS 2: it needs --ros2")
     _start_warp()
     robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))
+    if options.ros2:
+        return _serve_ros2(robot, options)
     factor = None if options.stepped else options.factor
     origins = tuple(options.origins)
     with RobotServer(robot, options.host, options.port, real_time_factor=factor, origins=origins) as server:
         gc.freeze()  # else one message in many thousands waits until all that was loaded is looked through for garbage
         sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
+        sys.stdout.flush()
+        while not server.join(1.0):
+            pass
+    return ANSWERED
+
+
+def _serve_ros2(robot: SimulatedRobot, options: argparse.Namespace) -> int:
+    from nuno.robot.ros2.ros2_server import Ros2Server
+
+    with Ros2Server(robot, options.domain, real_time_factor=options.factor) as server:
+        gc.freeze()
+        sys.stdout.write(f"{robot.robot.name} in the ROS 2 domain {server.domain}; Ctrl-C ends it\n")
         sys.stdout.flush()
         while not server.join(1.0):
             pass

@@ -6,7 +6,7 @@ import logging
 import uuid
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from nuno.errors import RobotModelError
 from nuno.robot.interface import WRENCHES, RobotInterface
@@ -14,7 +14,6 @@ from nuno.robot.joint_interface import Controller
 from nuno.robot.readings import JointState
 from nuno.robot.wire import image_messages as images
 from nuno.robot.wire import messages as ros
-from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.names import Names
 from nuno.robot.wire.protocol import EXECUTING
 from nuno.robot.wire.transforms import camera_frame, link_transforms
@@ -22,6 +21,16 @@ from nuno.robot.wire.transforms import camera_frame, link_transforms
 logger = logging.getLogger(__name__)
 
 Fields = dict[str, Any]
+
+
+class Publisher(Protocol):
+    """The part of a bridge that publishes."""
+
+    def has_subscribers(self, topic: str) -> bool:
+        """Return whether anyone would get what is published."""
+
+    def publish(self, topic: str, message: Fields, latched: bool = False) -> None:
+        """Send a message to all that have subscribed to its topic; latched, to those that come later too."""
 
 
 class Broadcast:
@@ -38,7 +47,7 @@ class Broadcast:
     """
 
     def __init__(
-        self, robot: RobotInterface, bridge: Bridge, names: Names, controllers: list[Controller], image_rate: float,
+        self, robot: RobotInterface, bridge: Publisher, names: Names, controllers: list[Controller], image_rate: float,
     ) -> None:  # fmt: skip
         self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
         self._busy: dict[str, bool] = {}
