@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from nuno.robot.interface import RobotInterface
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
+    from nuno.robot.ros1.ros1_driver import Ros1Driver
     from nuno.robot.ros2.ros2_server import Ros2Server
     from nuno.robot.sensor_model import SensorModel
     from nuno.robot.sensors import Readings, Sensors
@@ -202,6 +203,7 @@ __all__ = [
     "RobotModelError",
     "RobotServer",
     "RobotTimeoutError",
+    "Ros1Driver",
     "Ros2Server",
     "SensorModel",
     "Sensors",
@@ -343,6 +345,7 @@ _LAZY = {
     "StereoPoints": "nuno.robot.stereo",
     "locate_marker": "nuno.robot.stereo",
     "RobotServer": "nuno.robot.wire.server",
+    "Ros1Driver": "nuno.robot.ros1.ros1_driver",
     "Ros2Server": "nuno.robot.ros2.ros2_server",
     "WireRobot": "nuno.robot.wire.client",
     "SimulatedRobot": "nuno.robot.simulated_robot",

@@ -9,7 +9,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,8 +45,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     serve.add_argument("robot", nargs="?", default="talos", help="talos (default), g1, or the path of a URDF file")
     graph = serve.add_mutually_exclusive_group()
     graph.add_argument("--rosbridge", action="store_true", help="for clients of the rosbridge protocol (default)")
+    graph.add_argument("--ros1", action="store_true", help="in a ROS 1 graph too, by the system's rospy")
     graph.add_argument("--ros2", action="store_true", help="in a ROS 2 graph, over CycloneDDS")
     serve.add_argument("--domain", type=int, metavar="N", help="ROS 2's domain (default: ROS_DOMAIN_ID, else 0)")
+    serve.add_argument(
+        "--ros1-python", metavar="FILE", default="/usr/bin/python3", help="the Python with rospy (default %(default)s)"
+    )
     serve.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
     serve.add_argument("--port", type=int, default=9090, help="0 takes a free one (default 9090)")
     serve.add_argument(
@@ -146,14 +150,15 @@ def _fold(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from nuno.errors import InvalidInputError
+    from nuno.errors import ConnectionLostError, InvalidInputError
     from nuno.robot.humanoid import Humanoid
+    from nuno.robot.ros1.ros1_driver import Ros1Driver
     from nuno.robot.simulated_robot import SimulatedRobot
     from nuno.robot.wire.server import RobotServer
     from nuno.world.world import World
 
-    if options.ros2 and options.stepped:
-        raise InvalidInputError("--stepped needs clients of rosbridge, which ask for time; --ros2 takes --factor")
+    if (options.ros1 or options.ros2) and options.stepped:
+        raise InvalidInputError("--stepped needs clients of rosbridge, which ask for time; ROS takes --factor")
     if options.domain is not None and not options.ros2:
         raise InvalidInputError("--domain is of ROS 2: it needs --ros2")
     _start_warp()
@@ -164,10 +169,13 @@ def _serve(options: argparse.Namespace) -> int:
     origins = tuple(options.origins)
     with RobotServer(robot, options.host, options.port, real_time_factor=factor, origins=origins) as server:
         gc.freeze()  # else one message in many thousands waits until all that was loaded is looked through for garbage
-        sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
-        sys.stdout.flush()
-        while not server.join(1.0):
-            pass
+        with Ros1Driver(server.url, options.ros1_python) if options.ros1 else nullcontext() as driver:
+            where = f"{server.url} and in the ROS 1 graph" if options.ros1 else server.url
+            sys.stdout.write(f"{robot.robot.name} at {where}; Ctrl-C ends it\n")
+            sys.stdout.flush()
+            while not server.join(1.0):
+                if driver is not None and not driver.alive:
+                    raise ConnectionLostError("the ROS 1 node has ended; its messages above say why")
     return ANSWERED
 
 
