@@ -51,6 +51,7 @@ class Broadcast:
     ) -> None:  # fmt: skip
         self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
         self._busy: dict[str, bool] = {}
+        self._asked: str | None = None
         self._image_interval = 1.0 / image_rate
         self._wrenches = [frame for frame in WRENCHES.values() if self._has(robot.read_wrench, frame)]
         self._has_imu = self._has(robot.read_imu)
@@ -84,9 +85,10 @@ class Broadcast:
         """Publish everything as it is now, images where they are due.
 
         Args:
-            asked: A topic that is due as somebody has just subscribed to it.
+            asked: A topic that is due as somebody has just subscribed to it, which alone is published.
         """
         own, time = self.names, self.robot.now()
+        self._asked = asked
         self._publish_images(time, asked)
         self._send(own.transforms, lambda: {"transforms": link_transforms(self.robot, time)})
         self._send(own.clock, lambda: {"clock": ros.time_fields(time)})
@@ -94,7 +96,7 @@ class Broadcast:
         if state is not None:
             self._send(own.joint_states, lambda: ros.joint_state_fields(state))
         self._send(own.odometry, lambda: self._odometry(time))
-        watched = [c for c in self.controllers if self.bridge.has_subscribers(own.state_of(c))]
+        watched = [c for c in self.controllers if self._is_wanted(own.state_of(c))]
         reference = self.robot.read_reference() if watched else None
         for controller in watched:
             fields = motion_fields(controller["joint_names"], reference, state, time)
@@ -120,8 +122,7 @@ class Broadcast:
             frame, topics = camera_frame(camera), [
                 own.full(name, camera=camera) for name in (own.image, own.compressed, own.depth, own.camera_info)
             ]  # fmt: skip
-            due = [self.bridge.has_subscribers(topic) and (topic == asked or self._is_due(topic, time))
-                   for topic in topics]  # fmt: skip
+            due = [self._is_wanted(topic) and (topic == asked or self._is_due(topic, time)) for topic in topics]
             self._shown |= {topic: time for topic, now in zip(topics, due, strict=True) if now}
             if due[0] or due[1]:
                 reading = self.robot.read_image(camera)
@@ -141,8 +142,11 @@ class Broadcast:
 
     def _send(self, name: str, fields: Callable[[], Fields]) -> None:
         topic = self.names.full(name)
-        if self.bridge.has_subscribers(topic):
+        if self._is_wanted(topic):
             self.bridge.publish(topic, fields())
+
+    def _is_wanted(self, topic: str) -> bool:
+        return self._asked in (None, topic) and self.bridge.has_subscribers(topic)
 
     def _wrench(self, time: float, frame: str) -> Fields:
         return ros.wrench_fields(time, self.robot.read_wrench(frame), frame)
