@@ -6,6 +6,7 @@ import logging
 import uuid
 from collections.abc import Callable
 from functools import partial
+from time import perf_counter
 from typing import Any, Protocol
 
 from nuno.errors import RobotModelError
@@ -44,6 +45,9 @@ class Broadcast:
         names: Of the topics.
         controllers: Of the robot.
         image_rate: Images a second of the robot's time, of every camera that somebody looks through.
+
+    Attributes:
+        seconds: The last publication took [s], its images aside.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class Broadcast:
         self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
         self._busy: dict[str, bool] = {}
         self._asked: str | None = None
+        self.seconds = 0.0
         self._image_interval = 1.0 / image_rate
         self._wrenches = [frame for frame in WRENCHES.values() if self._has(robot.read_wrench, frame)]
         self._has_imu = self._has(robot.read_imu)
@@ -90,6 +95,7 @@ class Broadcast:
         own, time = self.names, self.robot.now()
         self._asked = asked
         self._publish_images(time, asked)
+        begin = perf_counter()
         self._send(own.transforms, lambda: {"transforms": link_transforms(self.robot, time)})
         self._send(own.clock, lambda: {"clock": ros.time_fields(time)})
         state = self.robot.read_joint_state()
@@ -105,6 +111,7 @@ class Broadcast:
             self._send(own.wrench.format(frame=frame), partial(self._wrench, time, frame))
         if self._has_imu:
             self._send(own.imu, lambda: ros.imu_fields(self.robot.read_imu(), "imu"))
+        self.seconds = perf_counter() - begin
 
     def publish_status(self) -> None:
         """Publish which controllers follow goals, where that has changed."""

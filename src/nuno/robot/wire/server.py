@@ -29,7 +29,7 @@ CHANGES = ("send_action_goal", "cancel_action_goal", "publish")
 OFTEN = 0.004
 """[s] Of real time, at least, between two publications of a simulation that runs faster than its ticks are long."""
 SHARE = 2.0
-"""Times as long as a publication takes to send, at least, until the next: many subscribers slow it, not the clock."""
+"""Times as long as a publication takes, at least, until the next: many subscribers slow it down, not the clock."""
 STALE = 0.5
 """[s] Of the robot's time, at most, between two publications."""
 ROUNDS = 3
@@ -259,7 +259,7 @@ class RobotServer:
             self._broadcast.publish()
             begin = time.perf_counter()
             self._bridge.flush()
-            self._cost = time.perf_counter() - begin
+            self._cost = self._broadcast.seconds + time.perf_counter() - begin
         self._commands.settle()
         for own in [own for own in self._waiting if now >= own[2] - 1e-9]:
             self._waiting.remove(own)
