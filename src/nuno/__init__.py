@@ -87,6 +87,7 @@ if TYPE_CHECKING:
     from nuno.mesh.fitted import fitted_tetrahedra
     from nuno.mesh.lattice import lattice_tetrahedra
     from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra
+    from nuno.robot.describe_robot import describe_robot
     from nuno.robot.footsteps import Footstep
     from nuno.robot.goal import Goal, Tolerances
     from nuno.robot.hands import Hand
@@ -95,6 +96,8 @@ if TYPE_CHECKING:
     from nuno.robot.interface import RobotInterface
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
+    from nuno.robot.ros1.ros1_driver import Ros1Driver
+    from nuno.robot.ros2.ros2_server import Ros2Server
     from nuno.robot.sensor_model import SensorModel
     from nuno.robot.sensors import Readings, Sensors
     from nuno.robot.servo import ServoCommand
@@ -202,6 +205,8 @@ __all__ = [
     "RobotModelError",
     "RobotServer",
     "RobotTimeoutError",
+    "Ros1Driver",
+    "Ros2Server",
     "SensorModel",
     "Sensors",
     "ServoCommand",
@@ -249,6 +254,7 @@ __all__ = [
     "compound",
     "continue_walk",
     "cylinder",
+    "describe_robot",
     "draw",
     "each",
     "elements",
@@ -314,6 +320,7 @@ _LAZY = {
     "read_case": "nuno.estimate.case",
     "similarity": "nuno.estimate.similarity",
     "Humanoid": "nuno.robot.humanoid",
+    "describe_robot": "nuno.robot.describe_robot",
     "Links": "nuno.robot.links",
     "Reach": "nuno.robot.reach",
     "Film": "nuno.viewer.film",
@@ -341,6 +348,8 @@ _LAZY = {
     "StereoPoints": "nuno.robot.stereo",
     "locate_marker": "nuno.robot.stereo",
     "RobotServer": "nuno.robot.wire.server",
+    "Ros1Driver": "nuno.robot.ros1.ros1_driver",
+    "Ros2Server": "nuno.robot.ros2.ros2_server",
     "WireRobot": "nuno.robot.wire.client",
     "SimulatedRobot": "nuno.robot.simulated_robot",
     "RobotInterface": "nuno.robot.interface",

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.assumed_limits import assume_limits
 from nuno.robot.description import FileName, find_description
 from nuno.robot.pinocchio import pin
-from nuno.robot.placement import pose_of
+from nuno.robot.placement import frame_called, pose_of
 from nuno.robot.support import convex_outline
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, compose, invert
@@ -68,6 +69,7 @@ class Humanoid(Coordinates):
         self._rows = np.array([self.model.joints[j].idx_q for j in joints], dtype=int)
         self._turns_freely = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
         self._free = np.flatnonzero(self._turns_freely)
+        assume_limits(self.model, self.name, self.is_slide, self.description.velocity_limits)
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
         self._angles = np.zeros(len(self.joint_names))
@@ -344,7 +346,7 @@ class Humanoid(Coordinates):
         """
         if not isinstance(frame, str) or not self.model.existFrame(frame):
             raise UnknownNameError("frame", frame, list(self.frame_names))
-        return int(self.model.getFrameId(frame))
+        return frame_called(self.model, frame)
 
     def posture_configuration(self) -> np.ndarray:
         """Return the configuration (nq,) of the posture, the base where it is now."""
@@ -378,7 +380,7 @@ class Humanoid(Coordinates):
         for role, own in self.description.frames.items():
             if not self.model.existFrame(own.link):
                 raise UnknownNameError("link", own.link, [frame.name for frame in self.model.frames])
-            parent = self.model.getFrameId(own.link)
+            parent = frame_called(self.model, own.link)
             carrier = self.model.frames[parent]
             w, x, y, z = own.quaternion
             offset = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), own.position)

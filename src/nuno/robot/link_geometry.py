@@ -174,9 +174,13 @@ def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
         return Cylinder(own.radius, 2.0 * own.halfLength), origin
     if kind == "Capsule":
         return Capsule(own.radius, 2.0 * own.halfLength), origin
+    if kind.startswith("Convex"):
+        vertices, faces = convex_hull(np.array(own.points()).reshape(-1, 3))
+        shape = TriangleMesh(vertices, faces)
+        return shape, shape.centre
     if not hasattr(own, "num_tris"):
         raise MeshError(
-            f"the geometry {part.name!r} is a {kind}; Nuno takes meshes, boxes, spheres, cylinders, capsules"
+            f"the geometry {part.name!r} is a {kind}; Nuno takes meshes, hulls, boxes, spheres, cylinders, capsules"
         )
     vertices = np.array(own.vertices())
     if as_hull:

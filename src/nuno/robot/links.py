@@ -147,7 +147,8 @@ class Links:
         if path_batch is not None and path_batch.arrived is not None and path_batch.arrived[0] == self.world.time:
             if [body._path for body in self.bodies] == self._kinematic_group.paths:
                 return path_batch.arrived[1:]
-        return np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
+        places, turns = [body._position for body in self.bodies], [body._quaternion for body in self.bodies]
+        return np.array(places).reshape(-1, 3), np.array(turns).reshape(-1, 4)
 
     def leave(self) -> None:
         """Take the bodies out of the world.

@@ -45,10 +45,15 @@ def test_result_has_the_fields_of_ros(serve, raw, plain):
 
 
 def test_topics(serve, raw, plain):
-    """Every topic that is listed is published when it is subscribed to, with what the robot tells."""
+    """Every topic that is listed as published is so when it is subscribed to, with what the robot tells."""
     client = raw(serve())
     client.say({"op": "call_service", "service": "/rosapi/topics"})
-    listed = client.hear(op="service_response")["values"]["topics"]
+    every = client.hear(op="service_response")["values"]["topics"]
+    client.say({"op": "call_service", "service": "/rosapi/node_details", "args": {"node": "/nuno"}})
+    node = client.hear(op="service_response")["values"]
+    listed = node["publishing"]
+    assert set(every) == {*listed, *node["subscribing"]}
+    assert {"/cmd_vel", "/larm_controller/joint_trajectory"} <= set(node["subscribing"])
     assert {"/clock", "/joint_states", "/odom", "/left_wrist/wrench", "/robot_description"} <= set(listed)
     assert "/imu/data" not in listed  # this robot has none
     for topic in listed:
