@@ -46,7 +46,7 @@ def render_masks(
         UnknownNameError: the world has no such body.
         InvalidInputError: the region is not inside the image, or the camera's distortion cannot be drawn.
     """
-    target = _index(world, body)
+    target = body_index(world, body)
     label = [0 if k == target else 1 for k in range(len(world.bodies))]
     hidden = _hidden(world, without)
     if target in hidden:
@@ -105,7 +105,12 @@ def render_ids(
     return _render(world, camera, region, label, hidden, cloth_thickness, wp.int32, raster.ids_of)
 
 
-def _index(world: Any, body: Any) -> int:
+def body_index(world: Any, body: Any) -> int:
+    """Return a body's index in ``world.bodies``; the body may be one of another world, or a name.
+
+    Raises:
+        UnknownNameError: the world has no such body.
+    """
     name = body if isinstance(body, str) else getattr(body, "name", repr(body))
     bodies = list(world.bodies)
     for k, candidate in enumerate(bodies):
@@ -118,7 +123,7 @@ def _index(world: Any, body: Any) -> int:
 
 
 def _hidden(world: Any, without: Iterable[Any]) -> set[int]:
-    return {_index(world, body) for body in without}
+    return {body_index(world, body) for body in without}
 
 
 def _render(

@@ -105,6 +105,24 @@ class Reading(Saving):
         with self._call():
             return render.render_masks(self, camera, self._own(body))
 
+    def segment(self, camera: Camera, *bodies: Body | str) -> dict[str, Any]:
+        """Return where each of some bodies, or of all, is seen; everything is drawn once.
+
+        Args:
+            camera: The camera.
+            bodies: Bodies or names; none named is all.
+
+        Returns:
+            By the bodies' names, Warp arrays bool (h, w) or (worlds, h, w), on the device.
+
+        Raises:
+            UnknownNameError: a body that is not in the world.
+        """
+        from nuno.camera import body_masks
+
+        with self._call():
+            return body_masks.segment(self, camera, [self._own(body) for body in bodies])
+
     def depth(self, camera: Camera) -> Any:
         """Return the depth along the camera's axis [m]: float (h, w) or (worlds, h, w), on the device."""
         from nuno.camera import render
