@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,13 @@ class Camera:
     cy: float
     camera_to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     distortion: np.ndarray | None = None
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, width: int, height: int, fx: float, fy: float, cx: float, cy: float,
+            camera_to_world: ArrayLike = ..., distortion: ArrayLike | None = None,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         pose = finite_array("camera_to_world", self.camera_to_world, (4, 4))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -22,6 +22,9 @@ from nuno.files.whole_file import replacing
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
 from nuno.validation import count, finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.numbers.device_array import DeviceArray
 
 SHADOW_PIXELS = 1024
 SHADOW_SLACK = 1e-3
@@ -88,9 +91,9 @@ class Picture:
 
     camera: Camera
     time: float
-    color: Any
-    depth: Any
-    ids: Any
+    color: DeviceArray
+    depth: DeviceArray
+    ids: DeviceArray
     bodies: tuple[Any, ...] = field(repr=False)
 
     def __repr__(self) -> str:
@@ -126,7 +129,7 @@ class Picture:
         wanted = [body_index(self, body) for body in bodies]
         return np.isin(self.ids.numpy(), wanted)
 
-    def masks(self, *bodies: Any) -> dict[str, Any]:
+    def masks(self, *bodies: Any) -> dict[str, DeviceArray]:
         """Return where each of some bodies, or of all, is seen: by name, bool Warp arrays of the shape of ``ids``.
 
         Raises:

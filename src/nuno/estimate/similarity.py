@@ -357,7 +357,7 @@ def similarity(
     - "chamfer" = (mean of d over S's contour + mean of d over R's contour) / 2 [px], lower is better.
 
     Args:
-        masks: (worlds, h, w), or one mask (h, w): NumPy of bool or whole numbers (non-zero is in), Warp of bool or uint8.
+        masks: (worlds, h, w) or (h, w): NumPy of bool or whole numbers (non-zero is in), Warp of bool or uint8.
         real_mask: (h, w) likewise, or a prepared `Silhouette`.
         score: "eq1", "iou", "chamfer", or "all".
         ignore: (h, w) pixels that do not count, bool or whole numbers; a Silhouette has its own.
