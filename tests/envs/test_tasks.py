@@ -82,7 +82,7 @@ def test_cover_counts_the_box():
 @pytest.mark.parametrize("name", TASKS)
 def test_the_script_does_better_than_chance(name):
     """Within an episode it solves what it can with so few cells, and far more than random motion."""
-    env = ClothVectorEnv(name, 3, autoreset_mode="Disabled", cells=(6, 6), device="cpu", substeps=8)
+    env = ClothVectorEnv(name, 3, autoreset_mode="Disabled", cells=(8, 8), device="cpu")
     policy, best = ScriptedPolicy(env), {}
     random = np.random.default_rng(0)
     for who in ("script", "chance"):

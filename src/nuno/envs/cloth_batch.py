@@ -10,8 +10,9 @@ from nuno.envs.cloth_task import SIDE, TABLE, ClothTask, Start
 from nuno.envs.pickers import Pickers
 from nuno.envs.top_view import TopView
 
-FRAMES = 8
-"""Frames of a control step: 1/8 s."""
+FRAMES = 10
+"""Frames of a control step: 5/32 s. As many lie between two looks at whether cloth passes through itself, by the clock
+of the world (`nuno.world.impacts`): so episodes are alike whenever they begin."""
 STEP = 0.05
 """[m] A hand goes at most so far along each axis in a control step."""
 KEY_POINTS = 5
@@ -30,6 +31,7 @@ class ClothBatch:
         task: The task.
         world_count: Worlds.
         with_hands: Whether hands are drawn in pictures.
+        thorough: Whether frames in which the cloth may pass through itself are gone through again, with more substeps.
 
     Attributes:
         task: The task.
@@ -39,7 +41,7 @@ class ClothBatch:
         places: (worlds, 3) [m], ``Start.place`` of each world's episode.
     """
 
-    def __init__(self, task: ClothTask, world_count: int, with_hands: bool = False) -> None:
+    def __init__(self, task: ClothTask, world_count: int, with_hands: bool = False, thorough: bool = False) -> None:
         self.task = task
         single = task.world()
         self._marks = []
@@ -48,6 +50,7 @@ class ClothBatch:
             self._marks.append(single.add(mark).key)
         self._start = single.save()
         self.world = single.imagine(world_count)
+        self.world._quiet = not thorough
         self.cloth = self.world.find("cloth")
         marks = [body for body in self.world.bodies if body.key in self._marks]
         self._view = TopView(self.world, self.cloth, marks)

@@ -83,7 +83,7 @@ class ClothTask(ABC):
     """
 
     name: ClassVar[str]
-    horizon: ClassVar[int] = 40
+    horizon: ClassVar[int] = 32
     done_at: ClassVar[float]
     hands: ClassVar[int] = 2
 

@@ -22,7 +22,7 @@ class HangTask(ClothTask):
     """
 
     name = "hang"
-    horizon = 48
+    horizon = 40
     done_at = 0.85
 
     def furnish(self, world: World) -> None:

@@ -20,7 +20,7 @@ class ClothEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         options: As of `ClothVectorEnv`.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 8}  # noqa: RUF012  (Gymnasium's)
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 6}  # noqa: RUF012  (Gymnasium's)
 
     def __init__(self, task: str | ClothTask = "fold", *, render_mode: str | None = None, **options: Any) -> None:
         mode = AutoresetMode.DISABLED
@@ -43,7 +43,7 @@ class ClothEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return observations[0], _own(infos)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Run the world for 1/8 s; see `ClothVectorEnv.step`."""
+        """Run the world for 5/32 s; see `ClothVectorEnv.step`."""
         seen, rewards, terminations, truncations, infos = self.batch.step(np.asarray(action)[None])
         return seen[0], float(rewards[0]), bool(terminations[0]), bool(truncations[0]), _own(infos)
 

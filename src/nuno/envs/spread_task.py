@@ -20,7 +20,7 @@ class SpreadTask(ClothTask):
     """The score is the area that the cloth covers, over its own."""
 
     name = "spread"
-    horizon = 48
+    horizon = 40
     done_at = 0.9
 
     @cached_property
