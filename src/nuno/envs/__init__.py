@@ -9,6 +9,7 @@ from nuno.envs.scripted_policy import ScriptedPolicy
 from nuno.envs.single_env import ClothEnv
 from nuno.envs.spread_task import SpreadTask
 from nuno.envs.tasks import TASKS
+from nuno.envs.top_view import TopView
 from nuno.envs.vector_env import ClothVectorEnv
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "ScriptedPolicy",
     "SpreadTask",
     "Start",
+    "TopView",
     "Waypoint",
 ]
 
