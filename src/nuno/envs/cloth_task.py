@@ -23,6 +23,8 @@ TABLE = 0.9
 """[m], the side of the square table, whose top is at z = 0."""
 LIFT = 0.002
 """[m] above the table at which a cloth that lies flat begins."""
+ABOVE = 0.02
+"""[m] above two corners at which the hands begin: within their reach."""
 FRAME_RATE = 64.0
 """[1/s] A power of two: times of frames are then exact, and an episode does not depend on when it begins."""
 

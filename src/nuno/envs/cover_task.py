@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nuno.bodies.make_bodies import box
-from nuno.envs.cloth_task import SIDE, ClothTask, Start, Waypoint, moved, waypoints
+from nuno.envs.cloth_task import ABOVE, SIDE, ClothTask, Start, Waypoint, moved, waypoints
 from nuno.envs.top_view import TopView
 from nuno.world.world import World
 
@@ -31,7 +31,7 @@ class CoverTask(ClothTask):
         """Return the flat cloth before the box; both are moved by up to 4 cm, the cloth turned by up to 0.2 rad."""
         flat = self.flat((random.uniform(-0.04, 0.04), -0.12 + random.uniform(-0.04, 0.04)), random.uniform(-0.2, 0.2))
         place = np.array((random.uniform(-0.04, 0.04), 0.22 + random.uniform(-0.04, 0.04), 0.5 * TALL))
-        return Start(flat, flat[self.corners[2:]] + (0.0, 0.0, 0.1), place)
+        return Start(flat, moved(flat[self.corners[2:]], 0.0, 0.0, ABOVE), place)
 
     def score(self, vertices: np.ndarray, places: np.ndarray, view: TopView) -> np.ndarray:
         """Return the share of the box's points over which the cloth lies."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nuno.envs.cloth_task import SIDE, ClothTask, Start, Waypoint, moved, waypoints
+from nuno.envs.cloth_task import ABOVE, SIDE, ClothTask, Start, Waypoint, moved, waypoints
 from nuno.envs.top_view import TopView
 
 
@@ -22,7 +22,7 @@ class FoldTask(ClothTask):
         """Return the flat cloth, moved by up to 5 cm and turned by up to 0.3 rad."""
         place = random.uniform(-0.05, 0.05, size=2)
         flat = self.flat(place, random.uniform(-0.3, 0.3))
-        return Start(flat, flat[self.corners[:2]] + (0.0, -0.05, 0.1), np.array([*place, 0.0]))
+        return Start(flat, moved(flat[self.corners[:2]], 0.0, 0.0, ABOVE), np.array([*place, 0.0]))
 
     def score(self, vertices: np.ndarray, places: np.ndarray, view: TopView) -> np.ndarray:
         """Return how well the halves lie on each other."""

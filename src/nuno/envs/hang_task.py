@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nuno.bodies.make_bodies import capsule
-from nuno.envs.cloth_task import SIDE, ClothTask, Start, Waypoint, moved, waypoints
+from nuno.envs.cloth_task import ABOVE, SIDE, ClothTask, Start, Waypoint, moved, waypoints
 from nuno.envs.top_view import TopView
 from nuno.world.world import World
 
@@ -36,7 +36,7 @@ class HangTask(ClothTask):
     def start(self, random: np.random.Generator) -> Start:
         """Return the flat cloth before the rod, moved by up to 4 cm and turned by up to 0.2 rad."""
         flat = self.flat((random.uniform(-0.04, 0.04), -0.12 + random.uniform(-0.04, 0.04)), random.uniform(-0.2, 0.2))
-        return Start(flat, flat[self.corners[2:]] + (0.0, 0.0, 0.1), np.array((0.0, 0.1, HEIGHT)))
+        return Start(flat, moved(flat[self.corners[2:]], 0.0, 0.0, ABOVE), np.array((0.0, 0.1, HEIGHT)))
 
     def score(self, vertices: np.ndarray, places: np.ndarray, view: TopView) -> np.ndarray:
         """Return how much of the cloth is lifted, and how evenly it is shared by the rod."""
