@@ -27,13 +27,14 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from nuno.envs import TASKS, ClothVectorEnv, ScriptedPolicy
 
-ROLLOUT = 40  # steps of each world between two updates
+ROLLOUT = 32  # steps of each world between two updates
 
 
 class Adapter(VecEnv):  # its methods are stable-baselines3's
     """A batch in the interface of stable-baselines3, whose worlds begin anew in the step that ends an episode."""
 
     def __init__(self, env: ClothVectorEnv, seed: int = 0) -> None:
+        self.render_mode = None
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.env, self._seed, self._actions = env, seed, np.zeros(0)
         self.ended: deque[tuple[float, bool]] = deque(maxlen=200)
@@ -112,8 +113,11 @@ def main() -> None:
     cells = (asked.cells, asked.cells)
     env = ClothVectorEnv(asked.task, asked.worlds, cells=cells, device=asked.device, autoreset_mode="SameStep")
     batch = Adapter(env)
-    size = min(4096, asked.worlds * ROLLOUT // 4)
-    model = PPO("MlpPolicy", batch, n_steps=ROLLOUT, batch_size=size, n_epochs=5, gamma=0.98, device="cpu", seed=0)
+    size = max(256, asked.worlds * ROLLOUT // 16)
+    model = PPO(
+        "MlpPolicy", batch, n_steps=ROLLOUT, batch_size=size, n_epochs=10, learning_rate=1e-3, gamma=0.97, device="cpu",
+        seed=0, policy_kwargs={"log_std_init": -0.5},
+    )  # fmt: skip
     clock = Clock(batch, 60.0 * asked.minutes)
     print("| s | environment steps | score | solved |\n|---|---|---|---|")
     model.learn(10**9, callback=clock)
