@@ -23,6 +23,7 @@ IMAGES = ROOT / "docs" / "images"
 PICTURES = {
     "all_kinds": (["--film"], {"kinds.png": "all_kinds.png", "film.webp": "all_kinds.webp"}),
     "closed_loop": ([], {"closed-loop.png": "closed_loop.png"}),
+    "learn_fold": ([], {"learn_fold.png": "learn_fold.png"}),
     "pick_estimate": ([], {"pick.png": "result.png"}),
     "replay_fold": ([], {"fold.png": "strip.png", "layers.png": "layers.png", "hands.png": "hands.png"}),
     "talos_fold": ([], {"talos-fold.png": "talos-fold.png", "talos-fold-layers.png": "talos-fold-layers.png"}),

@@ -71,6 +71,7 @@ from nuno.world.world import World
 if TYPE_CHECKING:
     from nuno.bodies.element_state import ElementState, elements
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
+    from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
@@ -281,6 +282,8 @@ __all__ = [
     "read_fold_case",
     "read_sweep",
     "replay_fold",
+    "segment_after",
+    "segment_before",
     "sheet",
     "similarity",
     "slider",
@@ -316,6 +319,8 @@ _LAZY = {
     "PickCase": "nuno.estimate.case",
     "PickResult": "nuno.estimate.pick_result",
     "Table": "nuno.camera.table",
+    "segment_after": "nuno.camera.segmentation",
+    "segment_before": "nuno.camera.segmentation",
     "estimate_pick": "nuno.estimate.pick",
     "read_case": "nuno.estimate.case",
     "similarity": "nuno.estimate.similarity",

@@ -148,16 +148,38 @@ def test_bad_arguments_are_refused():
     with pytest.raises(UnknownNameError, match="chamfer"):
         similarity(masks, real, "dice")
     with pytest.raises(InvalidInputError, match="12 x 10"):
-        similarity(np.zeros((2, 5, 6)), real)
+        similarity(np.zeros((2, 5, 6), bool), real)
     with pytest.raises(InvalidInputError, match="do not fit"):
         score_masks(masks, Silhouette(real), region=Region(1, 0, 12, 10))
     with pytest.raises(InvalidInputError, match="mask must be"):
-        similarity(masks, np.zeros((3, 10, 12)))
+        similarity(masks, np.zeros((3, 10, 12), bool))
     with pytest.raises(InvalidInputError, match="ignore mask has shape"):
-        similarity(masks, real, ignore=np.zeros((9, 12)))
+        similarity(masks, real, ignore=np.zeros((9, 12), bool))
     with pytest.raises(InvalidInputError, match="ignore"):
         similarity(masks, Silhouette(real), ignore=real)
     with pytest.raises(InvalidInputError, match="masks must be"):
-        similarity(np.zeros(12), real)
+        similarity(np.zeros(12, bool), real)
     with pytest.raises(InvalidInputError, match="bool or uint8"):
         similarity(wp.zeros((2, 10, 12), dtype=wp.int32, device="cpu"), real)
+
+
+@pytest.mark.parametrize("on_device", [False, True])
+def test_masks_of_real_numbers_are_refused_or_cut_at_a_threshold(on_device):
+    """Probabilities are no masks: without a threshold they are refused, with one they are what is above it."""
+    chances = np.random.default_rng(3).uniform(size=(2, HEIGHT, WIDTH)).astype(np.float32)
+    real = _blobs(1, 2)[0]
+    given = wp.array(chances, dtype=wp.float32, device="cpu") if on_device else chances
+    with pytest.raises(InvalidInputError, match=r"threshold=0\.5"):
+        similarity(given, real)
+    for level in (0.25, 0.75):
+        np.testing.assert_array_equal(similarity(given, real, threshold=level), similarity(chances > level, real))
+        assert similarity(given[0], real, threshold=level) == similarity(chances[0] > level, real)
+    with pytest.raises(InvalidInputError, match="real_mask"):
+        similarity(chances > 0.5, real.astype(float))
+    assert similarity(real, real.astype(float), threshold=0.5) == 1.0
+    with pytest.raises(InvalidInputError, match="whole numbers"):
+        similarity(chances > 0.5, real, threshold=0.5)
+    with pytest.raises(InvalidInputError, match="ignore"):
+        similarity(chances > 0.5, real, ignore=chances[0])
+    with pytest.raises(InvalidInputError, match="finite"):
+        similarity(np.full((4, 5), np.nan), np.zeros((4, 5), bool), threshold=0.5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,13 @@ class Camera:
     cy: float
     camera_to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     distortion: np.ndarray | None = None
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, width: int, height: int, fx: float, fy: float, cx: float, cy: float,
+            camera_to_world: ArrayLike = ..., distortion: ArrayLike | None = None,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         pose = finite_array("camera_to_world", self.camera_to_world, (4, 4))
@@ -80,6 +87,50 @@ class Camera:
             return cls(**{name: data[name] for name in names}, distortion=data.get("distortion"))
         except InvalidInputError as error:
             raise InvalidInputError(f"camera: {error}") from error
+
+    @classmethod
+    def look_at(
+        cls, eye: ArrayLike, target: ArrayLike, fov: float, *, width: int = 640, height: int = 480,
+        up: ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Camera:  # fmt: skip
+        """Return a camera at a point that looks at another, upright, with square pixels and no distortion.
+
+        Args:
+            eye: (3,) [m], where the camera is.
+            target: (3,) [m], what is in the middle of the image.
+            fov: Field of view from the image's upper edge to its lower one [rad], below pi.
+            width: Image width [px].
+            height: Image height [px].
+            up: (3,), the direction that points up in the image. Where the camera looks along it, straight down say,
+                +y points up, or +x where that is the same line.
+
+        Raises:
+            InvalidInputError: the two points are one, or a value that is not finite or out of range.
+        """
+        place, aim = finite_array("eye", eye, (3,)), finite_array("target", target, (3,))
+        upward = finite_array("up", up, (3,))
+        angle = number("fov", fov)
+        if not 0.0 < angle < np.pi:
+            raise InvalidInputError(
+                f"fov must be in (0, pi) rad, got {angle!r}" + (f"; np.radians({angle:g})?" if angle >= np.pi else "")
+            )
+        forward = aim - place
+        distance, length = float(np.linalg.norm(forward)), float(np.linalg.norm(upward))
+        if distance < 1e-9:
+            raise InvalidInputError(f"eye and target are the same point, {place.tolist()}")
+        if length < 1e-9:
+            raise InvalidInputError(f"up must be a direction, got {upward.tolist()}")
+        forward /= distance
+        for upright in (upward / length, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
+            right = np.cross(forward, upright)
+            if np.linalg.norm(right) > 1e-6:
+                break
+        right /= np.linalg.norm(right)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = np.stack([right, np.cross(forward, right), forward], axis=1), place
+        columns, rows = _pixels("width", width), _pixels("height", height)
+        focal = 0.5 * rows / float(np.tan(0.5 * angle))
+        return cls(columns, rows, focal, focal, 0.5 * (columns - 1), 0.5 * (rows - 1), pose)
 
     @property
     def matrix(self) -> np.ndarray:

@@ -7,20 +7,24 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from nuno.camera import raster, shading
+from nuno.camera.body_masks import masks_by_name
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
-from nuno.camera.render import _hidden, _index, _split
+from nuno.camera.render import _hidden, _split, body_index
 from nuno.errors import InvalidInputError
 from nuno.files.whole_file import replacing
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
 from nuno.validation import count, finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.numbers.device_array import DeviceArray
 
 SHADOW_PIXELS = 1024
 SHADOW_SLACK = 1e-3
@@ -87,9 +91,9 @@ class Picture:
 
     camera: Camera
     time: float
-    color: Any
-    depth: Any
-    ids: Any
+    color: DeviceArray
+    depth: DeviceArray
+    ids: DeviceArray
     bodies: tuple[Any, ...] = field(repr=False)
 
     def __repr__(self) -> str:
@@ -122,8 +126,16 @@ class Picture:
         Raises:
             UnknownNameError: a body that was not there.
         """
-        wanted = [_index(self, body) for body in bodies]
+        wanted = [body_index(self, body) for body in bodies]
         return np.isin(self.ids.numpy(), wanted)
+
+    def masks(self, *bodies: Any) -> dict[str, DeviceArray]:
+        """Return where each of some bodies, or of all, is seen: by name, bool Warp arrays of the shape of ``ids``.
+
+        Raises:
+            UnknownNameError: a body that was not there.
+        """
+        return masks_by_name(self.ids, self, bodies)
 
 
 def take_picture(
@@ -202,8 +214,8 @@ class _Drawn:
         instead: Mapping[Any, Sequence[Any]],
     ) -> None:  # fmt: skip
         self.device, self.worlds = world.device, int(world.world_count)
-        chequers = {_index(world, body): pattern for body, pattern in patterns.items()}
-        replaced = {_index(world, body): others for body, others in instead.items()}
+        chequers = {body_index(world, body): pattern for body, pattern in patterns.items()}
+        replaced = {body_index(world, body): others for body, others in instead.items()}
         shown = [
             (k, each) for k, body in enumerate(world.bodies) if k not in hidden for each in replaced.get(k, (body,))
         ]

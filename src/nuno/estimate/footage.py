@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
@@ -57,6 +58,14 @@ class Footage:
     masks: Sequence[np.ndarray] | np.ndarray
     ignored: Sequence[np.ndarray] | np.ndarray | None = None
     drawn_thickness: float = DRAWN_THICKNESS
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, world: World, cloth: str, move: Callable[[World], Any], camera: Camera, times: ArrayLike,
+            masks: Sequence[ArrayLike] | ArrayLike, ignored: Sequence[ArrayLike] | ArrayLike | None = None,
+            drawn_thickness: float = DRAWN_THICKNESS,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         number("drawn_thickness", self.drawn_thickness, low=0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,12 @@ class HandPath:
     times: np.ndarray
     positions: np.ndarray
     held: np.ndarray
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, times: ArrayLike, positions: ArrayLike, held: ArrayLike,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         times = finite_array("a hand's times", self.times, ("k",))

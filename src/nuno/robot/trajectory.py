@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.validation import finite_array
@@ -38,6 +40,13 @@ class JointTrajectory:
     positions: np.ndarray
     velocities: np.ndarray | None = None
     accelerations: np.ndarray | None = None
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, names: Sequence[str], times: ArrayLike, positions: ArrayLike,
+            velocities: ArrayLike | None = None, accelerations: ArrayLike | None = None,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         names = (self.names,) if isinstance(self.names, str) else tuple(self.names)

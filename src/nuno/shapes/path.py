@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,13 @@ class Path:
     positions: np.ndarray
     quaternions: np.ndarray | None = None
     interpolation: Literal["linear", "minimum_jerk"] = "linear"
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, times: ArrayLike, positions: ArrayLike, quaternions: ArrayLike | None = None,
+            interpolation: Literal["linear", "minimum_jerk"] = "linear",
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         times = finite_array("times", self.times, ("k",))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
 from nuno.validation import finite_array, index_array
@@ -28,6 +29,12 @@ class SurfacePoints:
 
     faces: np.ndarray
     barycentric: np.ndarray
+
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, faces: ArrayLike, barycentric: ArrayLike,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         faces = np.atleast_1d(np.array(self.faces))
