@@ -55,7 +55,7 @@ class Material:
         Raises:
             UnknownNameError: there is no such preset.
         """
-        if name not in cls.PRESETS:
+        if not isinstance(name, str) or name not in cls.PRESETS:
             raise UnknownNameError(f"{cls.__name__.lower()} preset", name, list(cls.PRESETS))
         return cls(**cls.PRESETS[name])
 

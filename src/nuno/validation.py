@@ -5,13 +5,15 @@ Every check runs before any state changes, and its message says what was receive
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, UnknownNameError
 
 Shape = tuple[int | str, ...]
+Kind = TypeVar("Kind")
 
 
 def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError) -> np.ndarray:
@@ -28,8 +30,8 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
     """
     try:
         array = np.array(value)
-        if array.dtype.kind in "SU":
-            raise ValueError("text is no number")
+        if array.dtype.kind not in "iufO":
+            raise ValueError(f"{array.dtype} is no real number")
         array = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as problem:
         raise error(f"{name} must be numbers of shape {_shape_text(shapes)}, got {_short(value)}") from problem
@@ -49,8 +51,8 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     """
     try:
         array = np.array(value)
-    except ValueError as problem:
-        raise error(f"{name} must be indices of shape {_shape_text(shapes)}, got {value!r}") from problem
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise error(f"{name} must be indices of shape {_shape_text(shapes)}, got {_short(value)}") from problem
     if array.dtype.kind not in "iu":
         raise error(f"{name} must be whole numbers of shape {_shape_text(shapes)}, got {array.dtype}")
     if not any(_fits(array.shape, shape) for shape in shapes):
@@ -70,7 +72,7 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     if high < np.inf:
         valid += f" and <= {high:g}"
     try:
-        if isinstance(value, str | bytes | bool):
+        if isinstance(value, str | bytes | bool | np.bool_ | np.datetime64 | np.timedelta64) or np.ndim(value):
             raise TypeError("no number")
         result = float(value)
     except (TypeError, ValueError, OverflowError) as problem:
@@ -81,15 +83,72 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     return result
 
 
-def count(name: str, value: Any, *, low: int = 1) -> int:
-    """Return ``value`` as an int of at least ``low``.
+def count(name: str, value: Any, *, low: int = 1, high: int | None = None) -> int:
+    """Return ``value`` as an int of at least ``low`` and, where one is given, at most ``high``.
 
     Raises:
-        InvalidInputError: not a whole number, or too small.
+        InvalidInputError: not a whole number, too small or too large.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-        raise InvalidInputError(f"{name} must be a whole number of at least {low}, got {value!r}")
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < low or (high is not None and value > high):
+        valid = f"of at least {low}" if high is None else f"from {low} to {high}"
+        raise InvalidInputError(f"{name} must be a whole number {valid}, got {_short(value)}")
     return int(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return ``value`` as a bool.
+
+    Raises:
+        InvalidInputError: neither True nor False.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInputError(f"{name} must be True or False, got {_short(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
+    """Return ``value``, of a class.
+
+    Raises:
+        InvalidInputError: of another class.
+    """
+    if not isinstance(value, kind):
+        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+    return value
+
+
+def function(name: str, value: Any) -> Any:
+    """Return ``value``, which can be called.
+
+    Raises:
+        InvalidInputError: it cannot.
+    """
+    if not callable(value):
+        raise InvalidInputError(f"{name} must be a function, got {_short(value)}")
+    return value
+
+
+def choice(name: str, value: Any, valid: Sequence[str]) -> str:
+    """Return ``value``, one of the valid names.
+
+    Raises:
+        UnknownNameError: it is none of them.
+    """
+    if not isinstance(value, str) or value not in valid:
+        raise UnknownNameError(name, value, list(valid))
+    return value
+
+
+def text(name: str, value: Any) -> str:
+    """Return ``value``, text that is not empty.
+
+    Raises:
+        InvalidInputError: no text, or none in it.
+    """
+    if not isinstance(value, str) or not value:
+        raise InvalidInputError(f"{name} must be text that is not empty, got {_short(value)}")
+    return value
 
 
 def _short(value: Any) -> str:

@@ -93,7 +93,7 @@ def compound(parts: Sequence[Any], **options: Unpack[BodyOptions]) -> Body:
     Raises:
         InvalidInputError: no parts, or a plane or cloth among them.
     """
-    return Body(Compound(tuple(parts)), **options)
+    return Body(Compound(tuple(parts) if isinstance(parts, Sequence) else parts), **options)
 
 
 def mesh(source: MeshSource, **options: Unpack[BodyOptions]) -> Body:

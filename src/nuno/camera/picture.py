@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _index, _split
 from nuno.errors import InvalidInputError
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
 from nuno.validation import count, finite_array, number
@@ -101,20 +100,18 @@ class Picture:
 
         Raises:
             InvalidInputError: the picture of a batch, or an ending that OpenCV cannot write.
-            OSError: the file cannot be written.
+            FileWriteError: the file cannot be written.
         """
         import cv2
 
-        colors = self.color.numpy()
+        goal, colors = file_path(path), self.color.numpy()
         if colors.ndim != 3:
             raise InvalidInputError(f"one world's picture can be saved, got those of {len(colors)}")
-        ending = FilePath(path).suffix
         try:
-            _, packed = cv2.imencode(ending, colors[..., ::-1])
+            _, packed = cv2.imencode(goal.suffix, colors[..., ::-1])
         except cv2.error as error:
             raise InvalidInputError(f"a picture's file ends in .png, .jpg or the like, got {str(path)!r}") from error
-        with replacing(path) as partial:
-            partial.write_bytes(packed.tobytes())
+        write_whole(goal, packed.tobytes())
 
     def mask(self, *bodies: Any) -> np.ndarray:
         """Return where any of the bodies, or of their names, is seen: bool (h, w), in a batch (worlds, h, w).

@@ -342,6 +342,24 @@ def _from_sums(sums: np.ndarray, real: Silhouette, with_contour: bool) -> dict[s
     return scores
 
 
+def _mask_array(mask: ArrayLike, name: str) -> np.ndarray:
+    """Return masks as an array of bool, or of whole numbers.
+
+    Raises:
+        InvalidInputError: something else: of probabilities it is not known from where on they mean the cloth.
+    """
+    try:
+        array = np.asarray(mask)
+    except ValueError as error:
+        raise InvalidInputError(f"{name} must be an image of bool or whole numbers: {error}") from error
+    if array.dtype.kind not in "biu" or array.ndim < 2:
+        raise InvalidInputError(
+            f"{name} must be images (h, w) of bool, or of whole numbers of which the non-zero ones are the mask, got "
+            f"{array.dtype} {array.shape}; of probabilities p pass p > 0.5, or another threshold"
+        )
+    return array
+
+
 def similarity(
     masks: ArrayLike | wp.array,
     real_mask: ArrayLike | Silhouette,
@@ -355,11 +373,11 @@ def similarity(
     [px] to the nearest pixel of the other contour:
 
     - "eq1" = (``|S and R|`` + ``|not S and not R|``) / N, the paper's eq. (1); 0 to 1, higher is better;
-    - "iou" = ``|S and R|`` / ``|S or R|``; 1 if both are empty;
+    - "iou" = ``|S and R|`` / ``|S or R|``;
     - "chamfer" = (mean of d over S's contour + mean of d over R's contour) / 2 [px], lower is better.
 
     Args:
-        masks: (worlds, h, w), or one mask (h, w): a NumPy array of bool or numbers of which the non-zero are
+        masks: (worlds, h, w), or one mask (h, w): a NumPy array of bool or whole numbers of which the non-zero are
             the mask, or a Warp array of bool or uint8.
         real_mask: (h, w) likewise, or a prepared `Silhouette`.
         score: "eq1", "iou", "chamfer", or "all".
@@ -370,17 +388,20 @@ def similarity(
 
     Raises:
         UnknownNameError: there is no such score.
-        InvalidInputError: shapes or types do not fit.
+        InvalidInputError: shapes or types do not fit, or the real mask is empty.
     """
-    if score not in (*SCORES, "all"):
+    if not isinstance(score, str) or score not in (*SCORES, "all"):
         raise UnknownNameError("score", score, [*SCORES, "all"])
     if isinstance(real_mask, Silhouette):
         if ignore is not None:
             raise InvalidInputError("a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead")
         real = real_mask
     else:
-        real = Silhouette(real_mask, ignore)
-    batch = masks if isinstance(masks, wp.array) else np.asarray(masks)
+        hidden = None if ignore is None else _mask_array(ignore, "ignore")
+        real = Silhouette(_mask_array(real_mask, "real_mask"), hidden)
+    if not real.mask.any():
+        raise InvalidInputError("the real mask is empty: there is nothing that masks could be alike to")
+    batch = masks if isinstance(masks, wp.array) else _mask_array(masks, "masks")
     if isinstance(batch, wp.array) and batch.dtype not in (wp.bool, wp.uint8):
         raise InvalidInputError(f"masks on a device must be bool or uint8, got {batch.dtype.__name__}")
     single = batch.ndim == 2

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, UnknownNameError
 from nuno.files.export import check_extension, one_world
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, replacing, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.soft_shape import SoftShape
 from nuno.validation import count, finite_array, index_array, number
@@ -75,6 +75,8 @@ class Recording:
     """
 
     def __init__(self, world: World, bodies: Iterable[Body | str] | None = None) -> None:
+        if not hasattr(world, "_own"):
+            raise InvalidInputError(f"a recording needs a World, got {type(world).__name__}")
         chosen = list(world.bodies) if bodies is None else [world._own(body) for body in bodies]
         if not chosen:
             raise InvalidInputError("a recording needs at least one body")
@@ -216,8 +218,7 @@ class Recording:
             for body in self.bodies
         ]
         written = glb_bytes(meshes, (self.times - self.times[0])[::step])
-        with replacing(goal) as partial:
-            partial.write_bytes(written)
+        write_whole(goal, written)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recording:
@@ -252,7 +253,7 @@ class Recording:
         return recording
 
     def _goal(self, path: str | os.PathLike[str], extension: str) -> FilePath:
-        goal = FilePath(path)
+        goal = file_path(path)
         check_extension(goal, extension)
         if not self._times:
             raise InvalidInputError("the recording is empty; add a frame first")

@@ -115,12 +115,26 @@ def chosen_points(
         InvalidInputError: an index out of range, or of another shape.
     """
     if not isinstance(where, SurfacePoints):
-        indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        given = [where] if isinstance(where, int | np.integer) else where
+        indices = index_array("where", given, ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        _check_once(indices)
         return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
     chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
     corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
     shape = (worlds, *corners.shape[-2:])
     return None, np.array(np.broadcast_to(corners, shape)), np.array(np.broadcast_to(where.barycentric, shape))
+
+
+def _check_once(indices: np.ndarray) -> None:
+    """Check that no row of vertices (k,) or (worlds, k), -1 for none, names one twice.
+
+    Raises:
+        InvalidInputError: one does.
+    """
+    ordered = np.sort(np.atleast_2d(indices), axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
+    if twice.any():
+        raise InvalidInputError(f"where names vertex {ordered[:, 1:][twice][0]} twice; each can be held once")
 
 
 def _closest_weights(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

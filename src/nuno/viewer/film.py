@@ -7,7 +7,6 @@ import logging
 import math
 import os
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.export import check_extension, one_world
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.mesh.primitives import PLANE_HALF
 from nuno.shapes.color import rgb
 from nuno.viewer.message import pack
@@ -104,7 +103,7 @@ class Film:
 
     def __init__(self, scene: Scene | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
         if path is not None:
-            check_extension(FilePath(path), ".html")  # now, not when all is done
+            check_extension(file_path(path), ".html")  # now, not when all is done
         self._scene, self._rate, self._path = scene, rate, path
         self._tracks: dict[int, Track] = {}
         self._times: list[float] = []
@@ -237,11 +236,10 @@ class Film:
         Raises:
             InvalidInputError: the path does not end with .html.
         """
-        goal = FilePath(path)
+        goal = file_path(path)
         check_extension(goal, ".html")
         written = film_page(self.message(), title).encode()
-        with replacing(goal) as partial:
-            partial.write_bytes(written)
+        write_whole(goal, written)
 
     def message(self) -> bytes:
         """Return the film as the page takes it.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.validation import finite_array, number
+from nuno.validation import finite_array, flag, function, number
 from nuno.world.background import Background
 from nuno.world.progress import with_bar
 from nuno.world.simulation import CHUNK, CUDA_CHUNK, SOON, Simulation
@@ -61,6 +61,10 @@ class Running(Simulation):
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
         span = number("seconds", seconds, low=0.0)
+        if progress is not None:
+            flag("progress", progress)
+        if each_frame is not None:
+            function("each_frame", each_frame)
         with self._change("run"):
             begin = self._time
         if self.is_running:
