@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import count, finite_array
+from nuno.validation import checked, count, finite_array
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -80,6 +80,7 @@ class Material:
                 result[f"{item.name}_{side}"] = _by_world(item.name, part, worlds, own)
         return result
 
+    @checked
     def of_world(self, world: int, world_count: int) -> Self:
         """Return the material of one world of a batch of ``world_count``."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 _DISTORTIONS = (4, 5, 8, 12, 14)  # how many coefficients OpenCV's models have
 
@@ -91,6 +91,7 @@ class Camera:
         """(4, 4) float, the inverse of ``camera_to_world``."""
         return np.linalg.inv(self.camera_to_world)
 
+    @checked
     def scaled(self, factor: float) -> Camera:
         """The same view with ``factor`` times as many pixels each way (pixel centres stay centres)."""
         return replace(
@@ -99,11 +100,13 @@ class Camera:
             cx=(self.cx + 0.5) * factor - 0.5, cy=(self.cy + 0.5) * factor - 0.5,
         )  # fmt: skip
 
+    @checked
     def depth_of(self, points: ArrayLike) -> np.ndarray:
         """Depth [m] (..., ) of world points (..., 3) along the optical axis; negative behind the camera."""
         pose = self.camera_to_world
         return (np.asarray(points, dtype=float) - pose[:3, 3]) @ pose[:3, 2]
 
+    @checked
     def project(self, points: ArrayLike) -> np.ndarray:
         """Pixels (..., 2) of world points (..., 3) [m]; NaN for points behind the camera."""
         points = np.asarray(points, dtype=float)
@@ -119,6 +122,7 @@ class Camera:
             return pixels.reshape((*points.shape[:-1], 2))
         return xy * (self.fx, self.fy) + (self.cx, self.cy)
 
+    @checked
     def rays(self, pixels: ArrayLike) -> np.ndarray:
         """Directions (..., 3) in the world through pixels (..., 2), scaled to one metre of depth."""
         pixels = np.asarray(pixels, dtype=float)
@@ -131,6 +135,7 @@ class Camera:
         local = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
         return local @ self.camera_to_world[:3, :3].T
 
+    @checked
     def back_project(self, pixels: ArrayLike, height: float) -> np.ndarray:
         """World points (..., 3) [m] where the rays of pixels (..., 2) meet the plane z = height.
 

@@ -19,7 +19,7 @@ from nuno.errors import InvalidInputError
 from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
-from nuno.validation import count, finite_array, number
+from nuno.validation import check_fields, checked, count, finite_array, number
 
 SHADOW_PIXELS = 1024
 SHADOW_SLACK = 1e-3
@@ -47,6 +47,9 @@ class Lamp:
     shadows: bool = True
     radius: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def points(self) -> np.ndarray:
         """Return the points (n, 3) [m] of the disc that stand for it, each for the same area (Vogel 1979)."""
         place = finite_array("the lamp's position", self.position, (3,))
@@ -69,6 +72,9 @@ class Chequer:
 
     size: float
     color: Any = "black"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +129,7 @@ class Picture:
         return np.isin(self.ids.numpy(), wanted)
 
 
+@checked
 def take_picture(
     world: Any, camera: Camera, *, lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7),
     patterns: Mapping[Any, Chequer] | None = None, without: Iterable[Any] = (),

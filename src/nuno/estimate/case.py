@@ -15,7 +15,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_position_m")
 
@@ -57,6 +57,7 @@ class PickCase:
         )  # fmt: skip
 
 
+@checked
 def read_case(folder: str | os.PathLike[str]) -> PickCase:
     """Read input.json of a folder and the two images that it names; nothing else there is opened.
 

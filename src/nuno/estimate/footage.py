@@ -23,7 +23,7 @@ from nuno.estimate.hand_sight import disc
 from nuno.estimate.imagined_fold import imagine_fold
 from nuno.estimate.similarity import Silhouette, score_masks
 from nuno.materials import Cloth
-from nuno.validation import finite_array, number
+from nuno.validation import check_fields, finite_array, number
 from nuno.world.world import World
 
 Scores = dict[str, np.ndarray]
@@ -59,6 +59,7 @@ class Footage:
     drawn_thickness: float = DRAWN_THICKNESS
 
     def __post_init__(self) -> None:
+        check_fields(self)
         number("drawn_thickness", self.drawn_thickness, low=0.0)
         times = finite_array("times", self.times, ("k",))
         if (np.diff(times) <= 0.0).any() or times[0] < self.world.time:

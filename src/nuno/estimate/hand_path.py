@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +62,13 @@ class HandPath:
             ends.append(np.inf)
         return [(float(a), float(b)) for a, b in zip(begins, ends, strict=True)]
 
+    @checked
     def at(self, time: ArrayLike) -> np.ndarray:
         """Return positions (..., 3) [m] at ``time`` (...) [s]; before the first and after the last it rests."""
         when = np.asarray(time, dtype=float)
         return np.stack([np.interp(when, self.times, self.positions[:, axis]) for axis in range(3)], axis=-1)
 
+    @checked
     def holds_at(self, time: float) -> bool:
         """Return whether it holds at ``time`` [s]."""
         return any(begin <= time < end for begin, end in self.holds)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, index_array, number
+from nuno.validation import checked, finite_array, index_array, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +46,7 @@ class Layers:
         cell = (self.x[1] - self.x[0]) * (self.y[1] - self.y[0])
         return [float((self.count == n).sum() * cell) for n in range(1, self.height.shape[-1] + 1)]
 
+    @checked
     def over(self, u: float, v: float) -> list[tuple[float, float]]:
         """Return the points (u, v) of the cloth that lie over the point (u, v), the top one first.
 

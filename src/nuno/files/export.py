@@ -11,6 +11,7 @@ import numpy as np
 from nuno.errors import InvalidInputError
 from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import rgb
+from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -36,6 +37,7 @@ def to_trimesh(body: Body, world: int | None = None) -> Any:
     return trimesh.Trimesh(points, faces, vertex_colors=np.tile(color, (len(points), 1)), process=False)
 
 
+@checked
 def export_body(path: str | os.PathLike[str], body: Body, world: int | None = None) -> None:
     """Write a body's surface as it is now to a mesh file; a file that is there is replaced.
 

@@ -18,7 +18,7 @@ from nuno.files.export import check_extension, one_world
 from nuno.files.whole_file import file_path, replacing, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.soft_shape import SoftShape
-from nuno.validation import count, finite_array, index_array, number
+from nuno.validation import checked, count, finite_array, index_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -87,6 +87,7 @@ class Recording:
         self._loaded: tuple[RecordedBody, ...] = ()
 
     @classmethod
+    @checked
     def of(cls, world: World, seconds: float, bodies: Iterable[Body | str] | None = None) -> Recording:
         """Run a world and return a recording of how it is now and after each frame.
 
@@ -105,6 +106,7 @@ class Recording:
         return recording
 
     @classmethod
+    @checked
     def from_frames(cls, times: ArrayLike, bodies: Iterable[RecordedBody]) -> Recording:
         """Return a recording of frames that are known, without a world.
 
@@ -196,6 +198,7 @@ class Recording:
         with replacing(goal) as partial, open(partial, "wb") as stream:
             np.savez_compressed(stream, header=np.array(header), **arrays)  # type: ignore[arg-type]
 
+    @checked
     def export(self, path: str | os.PathLike[str], *, world: int | None = None, every: int = 1) -> None:
         """Write the recording as an animation, .glb, that other programs show; a file that is there is replaced.
 
@@ -221,6 +224,7 @@ class Recording:
         write_whole(goal, written)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Recording:
         """Return a recording that ``save`` wrote.
 

@@ -16,6 +16,7 @@ from nuno.mesh.relaxed import relaxed
 from nuno.mesh.surface_targets import surface_targets
 from nuno.mesh.tetrahedra import FACES, Tetrahedra, boundary_faces, volumes, voxel_tetrahedra
 from nuno.mesh.voxel_occupancy import inside_nodes
+from nuno.validation import checked
 
 FLAT = 0.35
 """Of its volume in the lattice: what a tetrahedron must keep that has all its corners on the surface."""
@@ -35,6 +36,7 @@ class UnresolvedMeshError(MeshError):
     """The lattice is too coarse to be fitted to a mesh."""
 
 
+@checked
 def fitted_tetrahedra(
     vertices: np.ndarray, faces: np.ndarray, cell: float, skin: tuple[np.ndarray, np.ndarray] | None = None,
     mean: tuple[float, float, float] | None = None,

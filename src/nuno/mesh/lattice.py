@@ -8,12 +8,14 @@ from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
 from nuno.mesh.tetrahedra import Tetrahedra, volumes, voxel_tetrahedra
 from nuno.mesh.voxel_occupancy import filled_fraction
+from nuno.validation import checked
 
 FLOOR = 0.1  # least fraction: a softer and lighter voxel would ask for smaller steps than all others
 MAX_VOXELS = 2_000_000  # ten million tetrahedra: more takes gigabytes, and the size was a slip
 CLOSE = 1e-6  # in edges of a voxel: what is nearer to a voxel's face is on it
 
 
+@checked
 def lattice_tetrahedra(
     vertices: np.ndarray, faces: np.ndarray, cell: float, skin: tuple[np.ndarray, np.ndarray] | None = None
 ) -> Tetrahedra:

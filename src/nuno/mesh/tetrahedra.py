@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.validation import checked
+
 # The corner of a voxel at (x, y, z) in {0, 1} has the number x + 2 y + 4 z. A voxel's four outer tetrahedra stand on
 # every other corner, about the fifth; in the neighbours, which have the other corners, the diagonals of the common face
 # agree.
@@ -51,6 +53,7 @@ class Tetrahedra:
         return np.einsum("kc,...kcx->...kx", self.skin_weights, corners)
 
 
+@checked
 def box_tetrahedra(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return a box about the origin as five tetrahedra per voxel.
 
@@ -78,6 +81,7 @@ def voxel_tetrahedra(voxels: np.ndarray, cells: tuple[int, int, int]) -> np.ndar
     return (first[:, None, None] + offset[FIVE[voxels.sum(axis=1) % 2]]).reshape(-1, 4)
 
 
+@checked
 def boundary_faces(tets: np.ndarray) -> np.ndarray:
     """Return the faces of the boundary: those that belong to one tetrahedron only.
 

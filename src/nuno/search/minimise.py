@@ -16,7 +16,7 @@ from nuno.search.sampler import check_bounds, scaled, share_of
 from nuno.search.sweep import check_trial, outcomes
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, make_source
-from nuno.validation import count, number
+from nuno.validation import checked, count, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -71,6 +71,7 @@ class Minimum:
         return {name: (float(column[close].min()), float(column[close].max())) for name, column in self.tried.items()}
 
 
+@checked
 def minimise(
     trial: Callable[[Any, Any], Any] | Each,
     bounds: Bounds,

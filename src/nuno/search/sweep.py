@@ -23,7 +23,7 @@ from nuno.search.results_file import ResultsFile, make_header, read_entries, rea
 from nuno.search.rows import run_rows
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, WorldSource, make_source
-from nuno.validation import count
+from nuno.validation import checked, count
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -69,6 +69,7 @@ class SweepResult:
         """The names of what trials returned."""
         return sorted({name for trial in self.trials if trial is not None for name in trial.values})
 
+    @checked
     def values(self, name: str) -> np.ndarray:
         """Return one value of all trials, (n, ...).
 
@@ -89,6 +90,7 @@ class SweepResult:
         missing: Any = np.full(first.shape, "" if first.dtype.kind == "U" else np.nan)
         return np.array([missing if row is None else row for row in rows])
 
+    @checked
     def best(self, name: str, *, highest: bool = False) -> int:
         """Return the index of the trial whose value is lowest, or highest; failed ones do not count.
 
@@ -101,10 +103,12 @@ class SweepResult:
             raise InvalidInputError(f"{name!r} is no single number for each trial, so none is best")
         return int(np.nanargmax(values) if highest else np.nanargmin(values))
 
+    @checked
     def row(self, index: int) -> dict[str, Any]:
         """Return the parameters of one trial, as numbers, strings and lists."""
         return {name: column[index].tolist() for name, column in self.params.items()}
 
+    @checked
     def save_csv(self, path: str | os.PathLike[str]) -> None:
         """Write a table: a line for each finished trial, with its parameters, its single values, and its error."""
         done = [trial for trial in self.trials if trial is not None]
@@ -117,6 +121,7 @@ class SweepResult:
                 table.writerow([trial.index, *self.row(trial.index).values(), *values, trial.error or ""])
 
 
+@checked
 def sweep(
     trial: Callable[[Any, Any], Any] | Each,
     params: Any,
@@ -178,6 +183,7 @@ def sweep(
         return _run(trial, parameters, source, world, executor, file, together, stop, repeats, progress)
 
 
+@checked
 def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
     """Read a results file, also one that a sweep is writing to: the trials that it holds, in their order.
 

@@ -17,6 +17,7 @@ from nuno.files.export import check_extension, one_world
 from nuno.files.whole_file import file_path, write_whole
 from nuno.mesh.primitives import PLANE_HALF
 from nuno.shapes.color import rgb
+from nuno.validation import checked
 from nuno.viewer.message import pack
 from nuno.viewer.outline import CREASE, outline
 from nuno.viewer.page import film_page
@@ -116,6 +117,7 @@ class Film:
                 scene.world._watchers.append(self)
 
     @classmethod
+    @checked
     def of(cls, recording: Recording, *, world: int | None = None) -> Film:
         """Return a film of a recording.
 
@@ -226,6 +228,7 @@ class Film:
             logger.exception("the recording ended at t = %.3f s", now)
             self._failed = error
 
+    @checked
     def save(self, path: str | os.PathLike[str], title: str = "Nuno") -> None:
         """Write one .html file with all that it needs; a file that is there is replaced.
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError
 from nuno.mesh.tetrahedra import FACES, Tetrahedra, boundary_by_element
 from nuno.shapes.soft_shape import SoftShape
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -36,6 +36,7 @@ class Drawing:
     elements: np.ndarray | None = None
 
 
+@checked
 def draw(
     body: Body, mode: Mode = "surface", *, explode: float = 1.3, slice_at: tuple[ArrayLike, ArrayLike] | None = None
 ) -> Drawing:

@@ -21,9 +21,10 @@ from nuno.joints.joint_drives import (
 )
 from nuno.joints.tie import force_limit
 from nuno.shapes.coordinates import compose, invert
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 
+@checked
 def hinge(
     a: Body, b: Body | None, *, point: ArrayLike, axis: ArrayLike, limits: Any = None, friction: Any = 0.0,
     motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
@@ -55,6 +56,7 @@ def hinge(
     return _join("hinge", a, b, point, axis, values, max_force, contact)
 
 
+@checked
 def slider(
     a: Body, b: Body | None, *, axis: ArrayLike, point: ArrayLike | None = None, limits: Any = None,
     friction: Any = 0.0, motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None,
@@ -85,6 +87,7 @@ def slider(
     return _join("slider", a, b, point, axis, values, max_force, contact)
 
 
+@checked
 def ball_joint(
     a: Body, b: Body | None, *, point: ArrayLike, limit: Any = None, axis: ArrayLike | None = None,
     friction: Any = 0.0, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
@@ -110,6 +113,7 @@ def ball_joint(
     return _join("ball", a, b, point, axis, values, max_force, contact)
 
 
+@checked
 def fixed_joint(a: Body, b: Body | None, *, max_force: Any = None, contact: bool = False) -> Joint:
     """Join a rigid body to another so that they move as one, from now on; as accurate as the other joints.
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from nuno.validation import check_fields
+
 # Of Nuno's own server, beside what robots with ROS 2 have
 ADVANCE = "/simulation/advance"
 CLOCK_KIND = "/simulation/clock_kind"
@@ -52,6 +54,9 @@ class Names:
     depth: str = "{camera}/depth/image_raw"
     camera_info: str = "{camera}/camera_info"
     transforms: str = "/tf"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def state_of(self, controller: Mapping[str, Any]) -> str:
         """Return the topic on which a controller tells where its joints are to be, in full."""
