@@ -6,16 +6,26 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from hostile_recipes import CALLS, OF_ROBOTS, OWNERS, SETTERS, Robots, Scene
-from hostile_values import VALUES, may_accept
 
 import nuno
+from hostile_recipes import CALLS, OF_ROBOTS, OWNERS, SETTERS, Robots, Scene
+from hostile_values import TEXTS, VALUES, may_accept
 from nuno.bodies.body import BodyOptions
 
 # Arguments that may accept more than their annotation says, by name and argument
 MORE = {
     ("World.start", "real_time_factor"): {"inf"},
     ("Motor", "max_effort"): {"inf"},
+    ("World.grip", "max_force"): {"inf"},
+    ("World.weld", "max_force"): {"inf"},
+    ("Camera", "distortion"): {"no items"},  # as files without one have it
+    ("Cloth", "stretch_stiffness"): {"ragged"},  # (warp, weft) of arrays by world
+    ("Cloth", "bending_rigidity"): {"ragged"},
+    ("HandPath.at", "time"): {"no items"},
+    ("JointTrajectory", "names"): TEXTS,  # of one joint
+    ("JointTrajectory.of", "names"): TEXTS,
+    ("ServoCommand", "names"): TEXTS,
+    ("World.reset", "worlds"): {"no items"},  # none of them
 }
 # Arguments of which only those values are tried that must be refused: what they accept would take long
 LONG = {

@@ -36,6 +36,9 @@ class Scene:
         self.grip = world.grip(self.towel, [0], to=self.towel.vertices[0], compliance=1e-3)
         self.hinge = nuno.hinge(self.lid, self.brick, point=(-0.5, 0, 0.4), axis=(1, 0, 0))
         self.camera = nuno.Camera(64, 48, 60.0, 60.0, 32.0, 24.0)
+        aside = np.eye(4)
+        aside[0, 3] = 0.1
+        self.beside = nuno.Camera(64, 48, 60.0, 60.0, 32.0, 24.0, aside)
         self.path = nuno.Path([0.0, 1.0], [POINT, (0, 0, 0.2)])
         self.points = nuno.SurfacePoints([0], [[1.0, 0.0, 0.0]])
         self.hand = nuno.HandPath([0.0, 1.0], [POINT, POINT], [True, False])
@@ -96,7 +99,7 @@ class Robots:
 
     @cached_property
     def hand(self):
-        return nuno.Hand(self.links, "left")
+        return nuno.Hand(self.links, "left_hand")
 
     @cached_property
     def cameras(self):
@@ -115,7 +118,7 @@ def trial(world, params):
 BOUNDS = {"x": (0.0, 1.0)}
 STEREO = {
     "left_images": lambda s: {0: IMAGE}, "right_images": lambda s: {0: IMAGE}, "frame_times": lambda s: [0.0],
-    "left": lambda s: s.camera, "right": lambda s: s.camera, "start": lambda s: [POINT],
+    "left": lambda s: s.camera, "right": lambda s: s.beside, "start": lambda s: [POINT],
 }  # fmt: skip
 RIGID_JOINT = {"a": lambda s: s.world.find("brick"), "b": lambda s: None}
 # The arguments that a call needs; a function gets the scene or the robots
@@ -202,7 +205,7 @@ CALLS = {
     "lattice_tetrahedra": {"vertices": CUBE[0], "faces": CUBE[1], "cell": 0.5},
     "lift_soft_cube": {"device": "cpu"},
     "locate_marker": {
-        "left_image": IMAGE, "right_image": IMAGE, "left": lambda s: s.camera, "right": lambda s: s.camera, "marker": 0,
+        "left_image": IMAGE, "right_image": IMAGE, "left": lambda s: s.camera, "right": lambda s: s.beside, "marker": 0,
     },
     "mesh": {"source": TRIANGLES},
     "minimise": {"trial": lambda s: trial, "bounds": BOUNDS, "progress": False},
@@ -237,12 +240,12 @@ CALLS = {
     },
     "track_hands_in_stereo": STEREO,
     "triangulate": {
-        "left": lambda s: s.camera, "right": lambda s: s.camera, "left_pixels": [[1.0, 2.0]],
+        "left": lambda s: s.camera, "right": lambda s: s.beside, "left_pixels": [[1.0, 2.0]],
         "right_pixels": [[1.0, 2.0]],
     },
     # robots
     "Humanoid": {},
-    "Hand": {"links": lambda r: r.links, "name": "left"},
+    "Hand": {"links": lambda r: r.links, "name": "left_hand"},
     "HeadCameras": {"links": lambda r: r.links},
     "Links": {"robot": lambda r: r.robot, "world": lambda r: nuno.World(device="cpu")},
     "Sensors": {"robot": lambda r: r.robot},
@@ -254,15 +257,15 @@ CALLS = {
     # methods
     "Body.angular_momentum": {}, "Body.at": {"u": 0.5, "v": 0.5}, "Body.closest": {"points": POINT},
     "Body.export": {"path": "out.obj"}, "Body.to_trimesh": {},
-    "Camera.back_project": {"pixels": [[1.0, 2.0]], "height": -1.0}, "Camera.depth_of": {"points": POINT},
-    "Camera.from_dict": {"data": {"width": 8, "height": 8, "fx": 8.0, "fy": 8.0, "cx": 4.0, "cy": 4.0}},
+    "Camera.back_project": {"pixels": [[1.0, 2.0]], "height": 1.0}, "Camera.depth_of": {"points": POINT},
+    "Camera.from_dict": {"data": {"camera_to_world": np.eye(4), "width": 8, "height": 8, "fx": 8.0, "fy": 8.0, "cx": 4.0, "cy": 4.0}},
     "Camera.project": {"points": (0.0, 0.0, 1.0)}, "Camera.rays": {"pixels": [[1.0, 2.0]]},
     "Camera.scaled": {"factor": 2.0},
     "Cloth.preset": {"name": "towel"}, "Cloth.of_world": {"world": 0, "world_count": 1},
     "Cloth.resolved": {"world_count": 1, "element_count": 1},
     "Coordinates.assoc": {"child": lambda s: nuno.Coordinates()}, "Coordinates.dissoc": None,
     "Coordinates.locate": {"position": POINT}, "Coordinates.rotate": {"angle": 0.1, "axis": "x"},
-    "Coordinates.to_local": {"points": POINT}, "Coordinates.to_world": {"points": POINT},
+    "Coordinates.to_local": {"points": [POINT]}, "Coordinates.to_world": {"points": [POINT]},
     "Coordinates.transform": {"other": lambda s: nuno.Coordinates()}, "Coordinates.translate": {"offset": POINT},
     "Film.save": {"path": "out.html"}, "Grip.release": {},
     "HandPath.at": {"time": 0.5}, "HandPath.holds_at": {"time": 0.5},
@@ -295,7 +298,7 @@ CALLS = {
     "Humanoid.angle_vector": {}, "Humanoid.camera": {}, "Humanoid.checked_angles": {"angles": {"head_1_joint": 0.1}},
     "Humanoid.enter": {"world": lambda r: nuno.World(device="cpu")}, "Humanoid.frame_index": {"frame": "torso_2_link"},
     "Humanoid.frame_pose": {"frame": "torso_2_link"}, "Humanoid.joint_index": {"joint": "head_1_joint"},
-    "Humanoid.reach": {"targets": {"left": POINT}}, "Humanoid.stand": {},
+    "Humanoid.reach": {"targets": {"left_hand": POINT}}, "Humanoid.stand": {},
     "Humanoid.move_to": {"angles": lambda r: r.robot.angle_vector()},
     "Humanoid.angles_of": {"q": lambda r: r.robot.configuration()},
     "Humanoid.configuration_of": {

@@ -22,6 +22,7 @@ Rule = tuple[str, Callable[[Any], bool]]  # what a value must be, in words, and 
 Kind = TypeVar("Kind")
 P = ParamSpec("P")
 R = TypeVar("R")
+NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
 MOST = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
 
@@ -72,6 +73,18 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     return array.astype(np.int32)
 
 
+def as_array(name: str, value: Any, error: type[Exception] = InvalidInputError) -> np.ndarray:
+    """Return ``value`` as an array, of whatever type and shape; a copy only where it is none yet.
+
+    Raises:
+        InvalidInputError: (or ``error``) rows of different lengths.
+    """
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise error(f"{name} must be an array, got {_short(value)}: {problem}") from problem
+
+
 def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.inf, high: float = np.inf) -> float:
     """Return ``value`` as a finite float with low <= value <= high and value > above.
 
@@ -82,7 +95,7 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     if high < np.inf:
         valid += f" and <= {high:g}"
     try:
-        if isinstance(value, str | bytes | bool | np.bool_ | np.datetime64 | np.timedelta64) or np.ndim(value):
+        if isinstance(value, NO_NUMBERS) or np.ndim(value):
             raise TypeError("no number")
         result = float(value)
     except (TypeError, ValueError, OverflowError) as problem:
@@ -294,6 +307,8 @@ def _is_whole(value: Any) -> bool:
 def _is_array(value: Any) -> bool:
     if type(value).__module__.partition(".")[0] == "warp":
         return True
+    if isinstance(value, bool):
+        return False
     try:
         array = np.asarray(value)
         if array.dtype.kind == "O":
@@ -316,7 +331,7 @@ SIMPLE: dict[str, Rule] = {
     "Literal": ("text", lambda value: isinstance(value, str)),
     "Callable": ("a function", callable),
     "ArrayLike": ("finite numbers", _is_array),
-    "ndarray": ("finite numbers", _is_array),
+    "ndarray": ("finite numbers", lambda value: _is_array(value) and np.size(value) > 0),
     "PathLike": ("a path", _is_path),
     "FileName": ("a path", _is_path),
     "Any": ("anything", lambda value: True),

@@ -49,6 +49,9 @@ class Lamp:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        finite_array("the lamp's position", self.position, (3,))
+        for name in ("strength", "sky", "radius"):
+            number(f"the lamp's {name}", getattr(self, name), low=0.0)
 
     def points(self) -> np.ndarray:
         """Return the points (n, 3) [m] of the disc that stand for it, each for the same area (Vogel 1979)."""
@@ -75,6 +78,8 @@ class Chequer:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        number("size", self.size, above=0.0)
+        rgb(self.color)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +164,8 @@ def take_picture(
     lamp = Lamp() if lamp is None else lamp
     samples = count("samples", samples)
     number("noise", noise, low=0.0)
+    if not hasattr(world, "lock") or not hasattr(world, "bodies"):
+        raise InvalidInputError(f"world must be a World, got {type(world).__name__}")
     with world.lock:
         drawn = _Drawn(world, camera, patterns or {}, _hidden(world, without), instead or {})
         time, bodies = world.time, tuple(world.bodies)

@@ -15,7 +15,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
-from nuno.validation import checked, finite_array
+from nuno.validation import check_fields, checked, finite_array
 
 NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_position_m")
 
@@ -43,6 +43,9 @@ class PickCase:
     table_half_extents: tuple[float, float] | None
     table_centre: tuple[float, float] | None
     table_thickness: float
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"

@@ -64,6 +64,9 @@ class Footage:
         times = finite_array("times", self.times, ("k",))
         if (np.diff(times) <= 0.0).any() or times[0] < self.world.time:
             raise InvalidInputError(f"times must increase from the world's {self.world.time:g} s on")
+        for name in ("masks", "ignored"):
+            if np.ndim(getattr(self, name)) == 0 and getattr(self, name) is not None:
+                raise InvalidInputError(f"{name} must be images, one for each time, got {getattr(self, name)!r}")
         if len(self.masks) != len(times):
             raise InvalidInputError(f"there must be a mask for each of {len(times)} times, got {len(self.masks)}")
         if self.ignored is not None and len(self.ignored) != len(times):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import checked, finite_array
+from nuno.validation import as_array, checked, finite_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class HandPath:
                 f"a hand's times must increase; number {k + 1} is {times[k + 1]} s, after {times[k]} s"
             )
         positions = finite_array("a hand's positions", self.positions, (len(times), 3))
-        held = np.asarray(self.held)
+        held = as_array("held", self.held)
         if held.shape != times.shape or held.dtype != bool:
             raise InvalidInputError(
                 f"held must be bool of shape ({len(times)},), one for each time, got {held.dtype} of shape {held.shape}"

@@ -100,7 +100,7 @@ def find_layers(vertices: np.ndarray, faces: np.ndarray, fractions: np.ndarray, 
     points = finite_array("vertices", vertices, ("n", 3))
     triangles = index_array("faces", faces, ("m", 3), low=0, high=len(points))
     uv = finite_array("fractions", fractions, (len(points), 2))
-    width = number("step", step, above=0.0)
+    width = number("step", step, low=1e-6)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     x, y = (np.arange(a - 1.5 * width, b + 2.5 * width, width) for a, b in zip(low, high, strict=True))
     if len(x) * len(y) > 4_000_000:

@@ -77,6 +77,8 @@ class Recording:
     def __init__(self, world: World, bodies: Iterable[Body | str] | None = None) -> None:
         if not hasattr(world, "_own"):
             raise InvalidInputError(f"a recording needs a World, got {type(world).__name__}")
+        if isinstance(bodies, str) or not isinstance(bodies, Iterable | None):
+            raise InvalidInputError(f"bodies must be a sequence of bodies or names, or None, got {bodies!r}")
         chosen = list(world.bodies) if bodies is None else [world._own(body) for body in bodies]
         if not chosen:
             raise InvalidInputError("a recording needs at least one body")

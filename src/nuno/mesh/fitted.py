@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
-from nuno.mesh.lattice import CLOSE, divided_box, whole_fraction
+from nuno.mesh.lattice import CLOSE, divided_box, triangles_of, whole_fraction
 from nuno.mesh.nearest import NearestOn
 from nuno.mesh.relaxed import relaxed
 from nuno.mesh.surface_targets import surface_targets
@@ -65,6 +65,8 @@ def fitted_tetrahedra(
         MeshError: too many voxels, or the mesh overlaps itself.
         UnresolvedMeshError: the mesh has parts that the lattice is too coarse for.
     """
+    vertices, faces = triangles_of("vertices", vertices, faces)
+    skin = None if skin is None else triangles_of("skin", *skin)
     low, edges, cells = divided_box(vertices, cell)
     points = (vertices - low) / edges
     fraction = whole_fraction(points, faces, cells)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class JointTrajectory:
     accelerations: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        names = (self.names,) if isinstance(self.names, str) else tuple(self.names)
+        names = joint_names(self.names)
         if not names or not all(isinstance(name, str) for name in names):
             raise InvalidInputError(f"a trajectory needs the names of its joints, got {self.names!r}")
         if len(set(names)) < len(names):
@@ -61,7 +62,7 @@ class JointTrajectory:
         object.__setattr__(self, "times", times)
         for what in ("positions", "velocities", "accelerations"):
             value = getattr(self, what)
-            if value is not None:
+            if value is not None or what == "positions":
                 value = finite_array(what, value, (len(times), len(names)))
                 value.setflags(write=False)
                 object.__setattr__(self, what, value)
@@ -215,3 +216,16 @@ def evaluate(polynomials: np.ndarray, t: float | np.ndarray) -> Motion:
         motion *= t
         motion += coefficients
     return motion[0], motion[1], motion[2]
+
+
+def joint_names(names: Any) -> tuple[str, ...]:
+    """Return names of joints, of one or several.
+
+    Raises:
+        InvalidInputError: neither text nor a sequence.
+    """
+    if isinstance(names, str):
+        return (names,)
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise InvalidInputError(f"names must be those of joints, got {names!r}")
+    return tuple(names)

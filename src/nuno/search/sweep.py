@@ -199,7 +199,7 @@ def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
     file = FilePath(path)
     try:
         data = file.read_bytes()
-    except OSError as problem:
+    except (OSError, ValueError) as problem:
         raise FileFormatError(f"{file} cannot be read: {problem}") from problem
     data = data[: data.rfind(b"\n") + 1]
     planned = read_header(data, file).get("trials")

@@ -224,6 +224,6 @@ def apply(pose: Pose, points: np.ndarray) -> np.ndarray:
 
 
 def _checked_frame(wrt: Any) -> str:
-    if wrt not in ("local", "world"):
+    if not isinstance(wrt, str) or wrt not in ("local", "world"):
         raise InvalidInputError(f"wrt must be 'local' or 'world', got {wrt!r}")
     return str(wrt)

@@ -130,9 +130,8 @@ class Running(Simulation):
         with self._change("start"):
             if self.is_running:
                 raise BodyStateError("the world runs in the background already")
-            factor = math.inf if real_time_factor == math.inf else real_time_factor
-            if factor != math.inf:
-                factor = number("real_time_factor", factor, above=0.0)
+            endless = isinstance(real_time_factor, float) and real_time_factor == math.inf
+            factor = math.inf if endless else number("real_time_factor", real_time_factor, above=0.0)
             self._background = Background(self, factor)
 
     def stop(self) -> None:
