@@ -46,29 +46,35 @@ class Scene:
 
     @cached_property
     def snapshot(self):
+        """What is saved of it."""
         return self.world.save()
 
     @cached_property
     def futures(self):
+        """Two copies of it."""
         return self.world.imagine(2)
 
     @cached_property
     def recording(self):
+        """One frame of it."""
         recording = nuno.Recording(self.world)
         recording.add()
         return recording
 
     @cached_property
     def film(self):
+        """The recording as a film."""
         return nuno.Film.of(self.recording)
 
     @cached_property
     def result(self):
+        """Two trials of a sweep."""
         trials = [nuno.Trial(k, {"y": np.array(float(k))}) for k in range(2)]
         return nuno.SweepResult({"x": np.arange(2.0)}, trials)
 
     @cached_property
     def layers(self):
+        """The towel's layers."""
         u, v = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 3))
         fractions = np.stack([u.ravel(), v.ravel()], axis=1)
         return nuno.find_layers(self.towel.vertices, self.towel.faces, fractions)
@@ -79,34 +85,42 @@ class Robots:
 
     @cached_property
     def robot(self):
+        """Talos."""
         return nuno.Humanoid("talos")
 
     @cached_property
     def links(self):
+        """Another one in a world."""
         return self.robot.copy().enter(nuno.World(device="cpu"))
 
     @cached_property
     def driver(self):
+        """Its driver."""
         return nuno.SimulatedRobot(self.links.robot, self.links.world, links=self.links)
 
     @cached_property
     def walk(self):
+        """A short walk."""
         return nuno.plan_walk(self.robot, 0.1, check_collisions=False)
 
     @cached_property
     def sensors(self):
+        """Its sensors."""
         return nuno.Sensors(self.robot)
 
     @cached_property
     def hand(self):
+        """Its left hand."""
         return nuno.Hand(self.links, "left_hand")
 
     @cached_property
     def cameras(self):
+        """Its cameras."""
         return nuno.HeadCameras(self.links)
 
     @cached_property
     def trajectory(self):
+        """A motion of its head."""
         return nuno.JointTrajectory(("head_1_joint",), [0.0, 1.0], [[0.0], [0.1]])
 
 
@@ -258,7 +272,9 @@ CALLS = {
     "Body.angular_momentum": {}, "Body.at": {"u": 0.5, "v": 0.5}, "Body.closest": {"points": POINT},
     "Body.export": {"path": "out.obj"}, "Body.to_trimesh": {},
     "Camera.back_project": {"pixels": [[1.0, 2.0]], "height": 1.0}, "Camera.depth_of": {"points": POINT},
-    "Camera.from_dict": {"data": {"camera_to_world": np.eye(4), "width": 8, "height": 8, "fx": 8.0, "fy": 8.0, "cx": 4.0, "cy": 4.0}},
+    "Camera.from_dict": {
+        "data": {"camera_to_world": np.eye(4), "width": 8, "height": 8, "fx": 8.0, "fy": 8.0, "cx": 4.0, "cy": 4.0},
+    },
     "Camera.project": {"points": (0.0, 0.0, 1.0)}, "Camera.rays": {"pixels": [[1.0, 2.0]]},
     "Camera.scaled": {"factor": 2.0},
     "Cloth.preset": {"name": "towel"}, "Cloth.of_world": {"world": 0, "world_count": 1},
@@ -272,7 +288,8 @@ CALLS = {
     "JointTrajectory.of": {"names": ("head_1_joint",)},
     "Layers.over": {"u": 0.5, "v": 0.5},
     "Path.at": {"time": 0.5}, "Path.quaternion_at": {"time": 0.5}, "Path.sampled": {"times": [0.0, 0.5]},
-    "Recording.export": {"path": "out.glb"}, "Recording.save": {"path": "out.npz"}, "Recording.load": {"path": "no.npz"},
+    "Recording.export": {"path": "out.glb"}, "Recording.save": {"path": "out.npz"},
+    "Recording.load": {"path": "no.npz"},
     "Snapshot.at": {"time": 1.0}, "Snapshot.pick": {"world": 0}, "Snapshot.spread": {"world_count": 2},
     "SweepResult.best": {"name": "y"}, "SweepResult.row": {"index": 0}, "SweepResult.values": {"name": "y"},
     "SweepResult.save_csv": {"path": "out.csv"},

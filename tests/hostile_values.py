@@ -15,6 +15,7 @@ class Shut:
     closed = True
 
     def read(self):
+        """Fail as a closed file does."""
         raise ValueError("I/O operation on closed file")
 
 

@@ -14,7 +14,7 @@ from nuno.robot.description import HandOnFrame
 from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
 from nuno.shapes.surface import SurfacePoints
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -42,6 +42,7 @@ class Hand:
         InvalidInputError: no link of the hand has a shape in the world.
     """
 
+    @checked
     def __init__(self, links: Links, name: str) -> None:
         robot = links.robot
         if name not in robot.description.hands:

@@ -17,7 +17,7 @@ from nuno.robot.hands import carrier
 from nuno.robot.looks import looks_of
 from nuno.robot.sensor_model import EARLY
 from nuno.shapes.coordinates import Coordinates, compose
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -51,6 +51,7 @@ class HeadCameras:
         InvalidInputError: a value that cannot be used.
     """
 
+    @checked
     def __init__(
         self, links: Links, names: Sequence[str] = STEREO, *, size: float = 1.0, looks: str = "visual",
         lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7), patterns: Mapping[Any, Chequer] | None = None,

@@ -19,7 +19,7 @@ from nuno.robot.placement import pose_of
 from nuno.robot.support import convex_outline
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, compose, invert
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -49,6 +49,7 @@ class Humanoid(Coordinates):
         MeshError: the URDF names a mesh that is not there.
     """
 
+    @checked
     def __init__(
         self, name: FileName = "talos", *, srdf: FileName | None = None,
         package_dirs: Sequence[FileName] | None = None, robots: FileName | None = None,
@@ -163,6 +164,7 @@ class Humanoid(Coordinates):
 
     # Where everything is
 
+    @checked
     def stand(self, position: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
         """Take the description's posture, the point between the soles at ``position`` (3,) [m], facing ``yaw`` [rad].
 
@@ -183,6 +185,7 @@ class Humanoid(Coordinates):
         """All frames: the roles of the description, links and joints."""
         return (*self.description.frames, *(f.name for f in self.model.frames if f.name not in self.description.frames))
 
+    @checked
     def frame_pose(self, frame: str) -> Coordinates:
         """Return where a frame is: a role ("left_hand", "head_camera", "imu" ...), a link or a joint.
 
@@ -191,6 +194,7 @@ class Humanoid(Coordinates):
         """
         return Coordinates(*self._pose_of_frame(frame))
 
+    @checked
     def camera(self, name: str = "head") -> Camera:
         """Return a camera of the description, where it is now.
 
@@ -312,6 +316,7 @@ class Humanoid(Coordinates):
 
         return Geometry(self)
 
+    @checked
     def enter(self, world: World, meshes: str = "collision") -> Links:
         """Put the links into a world, as static bodies that can follow the robot; see ``Links``.
 

@@ -13,7 +13,7 @@ from nuno.robot.spatial_arrays import placement_arrays
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
 from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -43,6 +43,7 @@ class Links:
         MeshError: a mesh that cannot be read.
     """
 
+    @checked
     def __init__(self, robot: Humanoid, world: World, meshes: str = "collision") -> None:
         if meshes not in MESHES:
             raise InvalidInputError(f"meshes must be one of {MESHES}, got {meshes!r}")

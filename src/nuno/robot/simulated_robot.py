@@ -26,7 +26,7 @@ from nuno.robot.simulated_joints import SimulatedJoints, joined
 from nuno.robot.stance import Stance
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes.coordinates import Coordinates
-from nuno.validation import number
+from nuno.validation import checked, number
 from nuno.world.background import LATE
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ class SimulatedRobot(RobotInterface):
         hands: Its hands, by name.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
         sensors: Mapping[str, SensorModel] | None = None, cameras: HeadCameras | None = None, seed: int = 0,
