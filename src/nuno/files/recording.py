@@ -27,7 +27,17 @@ if TYPE_CHECKING:
 FORMAT, VERSION = "nuno-recording", 1
 UNITS = {"length": "m", "time": "s", "up": "+z"}
 # What NumPy and JSON raise over a file that is none of theirs, or damaged
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, EOFError, IndexError, AttributeError, zipfile.BadZipFile)
+UNREADABLE = (
+    OSError,
+    MemoryError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    IndexError,
+    AttributeError,
+    zipfile.BadZipFile,
+)
 ARRAYS = ("vertices", "faces", "skin_corners", "skin_weights")
 
 
@@ -186,6 +196,7 @@ class Recording:
 
         Raises:
             InvalidInputError: the recording is empty, or the path does not end with .npz.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
         goal = self._goal(path, ".npz")
         arrays: dict[str, np.ndarray] = {"times": self.times}
@@ -213,6 +224,7 @@ class Recording:
 
         Raises:
             InvalidInputError: the recording is empty, the path does not end with .glb, or a batch without ``world``.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
         from nuno.files.glb import MovingMesh, glb_bytes
 

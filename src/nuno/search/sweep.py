@@ -110,7 +110,11 @@ class SweepResult:
 
     @checked
     def save_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write a table: a line for each finished trial, with its parameters, its single values, and its error."""
+        """Write a table: a line for each finished trial, with its parameters, its single values, and its error.
+
+        Raises:
+            FileWriteError: the file cannot be written.
+        """
         done = [trial for trial in self.trials if trial is not None]
         single = [name for name in self.names if all(t.values[name].ndim == 0 for t in done if name in t.values)]
         with replacing(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
@@ -167,6 +171,7 @@ def sweep(
         ResultsInUseError: another sweep writes to the results file.
         ResultsMismatchError: the results file is of another trial or of other parameters.
         FileFormatError: the results file is none, or damaged.
+        FileWriteError: it cannot be written: a read-only folder, a full disk. What it holds stays whole.
         WorkerLostError: the executor is broken for good.
     """
     parameters = make_parameters(params, samples, seed)

@@ -238,6 +238,7 @@ class Film:
 
         Raises:
             InvalidInputError: the path does not end with .html.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
         goal = file_path(path)
         check_extension(goal, ".html")
