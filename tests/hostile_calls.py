@@ -3,12 +3,13 @@
 import inspect
 import traceback
 from dataclasses import fields, is_dataclass
+from fnmatch import fnmatch
 from pathlib import Path as FilePath
 
 import numpy as np
 
 import nuno
-from hostile_recipes import CALLS, OF_ROBOTS, OWNERS, SETTERS, Robots, Scene
+from hostile_recipes import CALLS, OF_ROBOTS, OWNERS, SETTERS, UNCALLED, Robots, Scene
 from hostile_values import TEXTS, VALUES, may_accept
 from nuno.bodies.body import BodyOptions
 
@@ -25,6 +26,8 @@ MORE = {
     ("JointTrajectory", "names"): TEXTS,  # of one joint
     ("JointTrajectory.of", "names"): TEXTS,
     ("ServoCommand", "names"): TEXTS,
+    ("RobotServer", "origins"): {"texts"},
+    ("RobotInterface.angle_vector", "velocities"): {"no items"},  # as None
     ("World.reset", "worlds"): {"no items"},  # none of them
 }
 # Arguments of which only those values are tried that must be refused: what they accept would take long
@@ -35,7 +38,8 @@ LONG = {
     "soft_cylinder", "soft_capsule", "SoftSphere", "SoftCylinder", "SoftCapsule", "RobotServer", "WireRobot",
     "take_picture", "track_hands", "track_hands_in_stereo", "locate_marker", "World.save", "Body.export",
     "export_body", "Film.save", "Recording.save", "Recording.export", "SweepResult.save_csv", "SimulatedRobot",
-    "Links", "Humanoid", "Humanoid.enter", "Humanoid.reach", "TowelPicker", "Snapshot.spread",
+    "Links", "Humanoid", "Humanoid.enter", "Humanoid.reach", "TowelPicker", "Snapshot.spread", "Picture.save",
+    "TaughtFold.from_hands", "Viewer",
 }  # fmt: skip
 
 
@@ -62,15 +66,30 @@ def parameters_of(name):
             yield parameter.name, str(parameter.annotation), parameter.default
 
 
+def is_of_robots(name):
+    """Return whether a call needs a robot."""
+    return name in OF_ROBOTS or name.split(".")[0] in OF_ROBOTS
+
+
 class Callers:
     """The scene and the robots, made anew where a call was accepted."""
 
     def __init__(self):
         self.scene, self.robots = Scene(), None
 
+    def renew(self):
+        """Make another scene, as a call has changed this one."""
+        self.close()
+        self.scene = Scene()
+
+    def close(self):
+        """Close the viewer, if one was opened."""
+        if "viewer" in vars(self.scene):
+            self.scene.viewer.close()
+
     def holder(self, name):
         """Return the scene, or the robots, that a call by that name needs."""
-        if name in OF_ROBOTS or name.split(".")[0] in OF_ROBOTS:
+        if is_of_robots(name):
             self.robots = self.robots or Robots()
             return self.robots
         return self.scene
@@ -86,7 +105,7 @@ class Callers:
         return getattr(OWNERS[owner](holder), method), given
 
 
-def hostile_calls(names, light=True):
+def hostile_calls(names):
     """Yield (name, argument, value's name, whether it must be refused)."""
     for name in names:
         if CALLS.get(name) is None:
@@ -96,7 +115,7 @@ def hostile_calls(names, light=True):
             for key in VALUES:
                 if key not in allowed:
                     yield name, argument, key, True
-                elif light and name not in LONG and name not in OF_ROBOTS and name.split(".")[0] not in OF_ROBOTS:
+                elif name not in LONG and not is_of_robots(name) and not name.startswith("Viewer"):
                     yield name, argument, key, False
     for kind, properties in SETTERS.items():
         for argument in properties:
@@ -150,3 +169,40 @@ def flat(value):
             yield from flat(item)
     else:
         yield value.tobytes() if isinstance(value, np.ndarray) else value
+
+
+def public_calls():
+    """Yield the names of all that ``nuno`` lets call with arguments: functions, classes and their methods."""
+    for name in nuno.__all__:
+        value = getattr(nuno, name)
+        if inspect.isclass(value) and issubclass(value, Exception):
+            continue
+        if callable(value):
+            yield name
+        if not inspect.isclass(value):
+            continue
+        for method in dir(value):
+            static = inspect.getattr_static(value, method)
+            if method.startswith("_") or not (inspect.isfunction(static) or isinstance(static, classmethod)):
+                continue
+            if list(parameters_of(f"{name}.{method}")):
+                yield f"{name}.{method}"
+
+
+def first_of(name):
+    """Return the name of the first public class from which a method is inherited, which stands for all."""
+    owner, _, method = name.partition(".")
+    if not method:
+        return name
+    static = inspect.getattr_static(getattr(nuno, owner), method)
+    for other in CALLS:
+        parent, _, same = other.partition(".")
+        if same == method and parent != owner and inspect.getattr_static(getattr(nuno, parent), method) is static:
+            return other
+    return name
+
+
+def is_named(name):
+    """Return whether a call is made, or it is said why it is not."""
+    stands = first_of(name)
+    return CALLS.get(stands) is not None or any(fnmatch(name, each) for names in UNCALLED.values() for each in names)

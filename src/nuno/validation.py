@@ -274,6 +274,8 @@ def _sequence_rule(rules: list[Rule], length: int | None, word: str) -> Rule:
             return word == "Iterable"
         if (isinstance(value, np.ndarray) and not value.ndim) or (length is not None and len(value) != length):
             return False
+        if isinstance(value, np.ndarray) and words and not any(of in words for of in ("number", "anything", "True")):
+            return False
         each = [rule for _, rule in rules]
         return not each or all(each[k % len(each)](item) for k, item in enumerate(value))
 

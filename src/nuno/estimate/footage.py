@@ -65,7 +65,8 @@ class Footage:
         if (np.diff(times) <= 0.0).any() or times[0] < self.world.time:
             raise InvalidInputError(f"times must increase from the world's {self.world.time:g} s on")
         for name in ("masks", "ignored"):
-            if np.ndim(getattr(self, name)) == 0 and getattr(self, name) is not None:
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, Sequence | np.ndarray):
                 raise InvalidInputError(f"{name} must be images, one for each time, got {getattr(self, name)!r}")
         if len(self.masks) != len(times):
             raise InvalidInputError(f"there must be a mask for each of {len(times)} times, got {len(self.masks)}")

@@ -126,7 +126,7 @@ class Humanoid(Coordinates):
         Raises:
             UnknownNameError: there is no such joint.
         """
-        if joint not in self._index:
+        if not isinstance(joint, str) or joint not in self._index:
             raise UnknownNameError("joint", joint, list(self.joint_names))
         return self._index[joint]
 

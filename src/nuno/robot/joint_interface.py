@@ -101,6 +101,7 @@ class JointInterface(LimbControllers, KnownJoints):
             for name, joints in controller_groups(self.robot).items()
         ]
 
+    @checked
     def add_controller(
         self, controller_type: str, joint_enable_check: bool = True, create_actions: bool | None = None
     ) -> list[ControllerClient]:

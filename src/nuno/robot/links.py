@@ -76,6 +76,7 @@ class Links:
                 body._position, body._quaternion = position, quaternion
                 world.add(body)
 
+    @checked
     def offset_of(self, k: int) -> Pose:
         """Return where the k-th body is in the frame of its joint."""
         return self._offsets[k], self._turns[k]

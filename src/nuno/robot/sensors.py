@@ -130,6 +130,7 @@ class Sensors:
         """The names that ``models`` may have."""
         return tuple(self._channels)
 
+    @checked
     def read(self, state: RobotState | None = None, stance: Sequence[str] | None = None) -> Readings:
         """Return what all sensors tell.
 

@@ -141,10 +141,12 @@ class SimulatedRobot(RobotInterface):
         """Return the world's time [s]."""
         return float(self.world.time)
 
+    @checked
     def sleep(self, seconds: float) -> None:
         """Let the world's clock go on by ``seconds`` [s]."""
         self._let_pass(number("seconds", seconds, low=0.0))
 
+    @checked
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
         """Step the world until a condition holds, up to ``timeout`` [s], None or 0 for ever; return whether it does."""
         end = None if not timeout else self.now() + timeout - 1e-9
@@ -205,6 +207,7 @@ class SimulatedRobot(RobotInterface):
         with self.world.lock:
             return self.joints.controllers[self._known(controller)].is_busy
 
+    @checked
     def servo(self, command: ServoCommand | None) -> None:
         """Put joints under a torque law, at once and until another command; see ``Servo``.
 
@@ -285,6 +288,7 @@ class SimulatedRobot(RobotInterface):
                 raise UnknownNameError("hand", hand, list(self.grippers))
             return self.grippers[hand].send(position)
 
+    @checked
     def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force (3,) [N] and torque (3,) [N m] of what lies beyond a sensor; see ``RobotInterface``.
 

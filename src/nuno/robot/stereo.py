@@ -119,6 +119,7 @@ class StereoTrack:
         """(k,) float [m], standard deviation along the most uncertain direction."""
         return np.sqrt(np.linalg.eigvalsh(self.covariances)[:, -1])
 
+    @checked
     def path(self, held: ArrayLike) -> HandPath:
         """Return the path for a replay; ``held`` (k,) bool says when the hand held."""
         return HandPath(self.times, self.positions, np.asarray(held))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 LONGEST = 1e9
 """[s] That a trajectory may take: the wire has 32 bits for it."""
@@ -73,6 +73,7 @@ class JointTrajectory:
         """Return when the last point is due [s]."""
         return float(self.times[-1])
 
+    @checked
     def of(self, names: Sequence[str]) -> JointTrajectory:
         """Return the part of some joints, in their order.
 

@@ -65,6 +65,7 @@ class Minimum:
     reason: str
     errors: tuple[str, ...]
 
+    @checked
     def near(self, excess: float) -> dict[str, tuple[float, float]]:
         """Return the range, by name, of the parameters whose value is at most ``excess`` above the lowest."""
         close = self.tried_values <= self.value + excess

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from nuno.validation import check_fields
+from nuno.validation import check_fields, checked
 
 # Of Nuno's own server, beside what robots with ROS 2 have
 ADVANCE = "/simulation/advance"
@@ -70,6 +70,7 @@ class Names:
         """Return the topic on which a controller takes trajectories, in full."""
         return self.full(f"{controller['controller_action'].rpartition('/')[0]}/joint_trajectory")
 
+    @checked
     def full(self, name: str, **parts: str) -> str:
         """Return a name in full, with its parts filled in: "/joint_states"."""
         filled = name.format(**parts)
