@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import count, finite_array
+from nuno.validation import checked, count, finite_array, flag
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -56,7 +56,7 @@ class Material:
         Raises:
             UnknownNameError: there is no such preset.
         """
-        if name not in cls.PRESETS:
+        if not isinstance(name, str) or name not in cls.PRESETS:
             raise UnknownNameError(f"{cls.__name__.lower()} preset", name, list(cls.PRESETS))
         return cls(**cls.PRESETS[name])
 
@@ -81,6 +81,7 @@ class Material:
                 result[f"{item.name}_{side}"] = _by_world(item.name, part, worlds, own)
         return result
 
+    @checked
     def of_world(self, world: int, world_count: int) -> Self:
         """Return the material of one world of a batch of ``world_count``."""
 
@@ -211,10 +212,10 @@ class Soft(Material):
     }
 
     def __post_init__(self) -> None:
-        if np.ndim(self.self_contact) or self.self_contact not in (False, True):
-            raise InvalidInputError(f"self_contact must be True or False, got {self.self_contact!r}")
+        touching = flag("self_contact", self.self_contact)
+        object.__setattr__(self, "self_contact", float(touching))  # a value as all others, while they are checked
         super().__post_init__()
-        object.__setattr__(self, "self_contact", bool(self.self_contact))
+        object.__setattr__(self, "self_contact", touching)
         if np.max(self.poisson_ratio) >= 0.5:
             raise InvalidInputError(f"poisson_ratio must be at least 0 and below 0.5, got {self.poisson_ratio!r}")
 
@@ -294,8 +295,11 @@ def _checked_centre(value: Any) -> np.ndarray:
 def _checked(name: str, value: Any, *, zero: bool, deepest: int) -> Any:
     valid = "finite and at least 0" if zero else "finite and greater than 0"
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = np.array(value)
+        if array.dtype.kind not in "iufO":
+            raise TypeError(f"{array.dtype} is no real number")
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}") from error
     if array.ndim > deepest or array.size == 0:
         raise InvalidInputError(f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}")

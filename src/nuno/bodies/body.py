@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.bodies.quantities import Quantities
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.materials import Cloth, Material
+from nuno.shapes.color import checked_color
 from nuno.shapes.coordinates import Coordinates, Pose, apply, compose, invert
 from nuno.shapes.path import Path
 from nuno.shapes.shape import Shape, Sheet
@@ -141,6 +142,15 @@ class Body(Quantities, Coordinates):
     def resolution(self) -> Resolution | None:
         """Return how a cloth's or soft body's substeps resolve its material, None for a static or rigid body."""
         return None if self._dynamics is None else self._dynamics.resolution
+
+    @property
+    def color(self) -> Color:
+        """A name or (r, g, b) in [0, 1], as it was given."""
+        return self._color
+
+    @color.setter
+    def color(self, value: Color) -> None:
+        self._color = checked_color(value)
 
     @property
     def friction(self) -> Any:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, number
+from nuno.validation import as_array, checked, finite_array, number
 
+MOST_PIXELS = 16384
+"""Of a side of an image: 1 GB of depth a world, where both sides have as many."""
 _DISTORTIONS = (4, 5, 8, 12, 14)  # how many coefficients OpenCV's models have
 
 
@@ -65,7 +67,7 @@ class Camera:
             number(name, getattr(self, name))
         object.__setattr__(self, "camera_to_world", pose)
         if self.distortion is not None:
-            distortion = np.asarray(self.distortion)
+            distortion = as_array("distortion", self.distortion)
             if distortion.size:
                 distortion = finite_array("distortion", distortion.ravel(), *((n,) for n in _DISTORTIONS))
             object.__setattr__(self, "distortion", distortion if distortion.size else None)
@@ -142,6 +144,7 @@ class Camera:
         """(4, 4) float, the inverse of ``camera_to_world``."""
         return np.linalg.inv(self.camera_to_world)
 
+    @checked
     def scaled(self, factor: float) -> Camera:
         """The same view with ``factor`` times as many pixels each way (pixel centres stay centres)."""
         return replace(
@@ -150,14 +153,16 @@ class Camera:
             cx=(self.cx + 0.5) * factor - 0.5, cy=(self.cy + 0.5) * factor - 0.5,
         )  # fmt: skip
 
+    @checked
     def depth_of(self, points: ArrayLike) -> np.ndarray:
         """Depth [m] (..., ) of world points (..., 3) along the optical axis; negative behind the camera."""
         pose = self.camera_to_world
-        return (np.asarray(points, dtype=float) - pose[:3, 3]) @ pose[:3, 2]
+        return (_rows("points", points, 3) - pose[:3, 3]) @ pose[:3, 2]
 
+    @checked
     def project(self, points: ArrayLike) -> np.ndarray:
         """Pixels (..., 2) of world points (..., 3) [m]; NaN for points behind the camera."""
-        points = np.asarray(points, dtype=float)
+        points = _rows("points", points, 3)
         pose = self.camera_to_world
         local = (points - pose[:3, 3]) @ pose[:3, :3]
         depth = np.where(local[..., 2] > 1e-9, local[..., 2], np.nan)
@@ -170,9 +175,10 @@ class Camera:
             return pixels.reshape((*points.shape[:-1], 2))
         return xy * (self.fx, self.fy) + (self.cx, self.cy)
 
+    @checked
     def rays(self, pixels: ArrayLike) -> np.ndarray:
         """Directions (..., 3) in the world through pixels (..., 2), scaled to one metre of depth."""
-        pixels = np.asarray(pixels, dtype=float)
+        pixels = _rows("pixels", pixels, 2)
         if self.distortion is not None:
             import cv2
 
@@ -182,6 +188,7 @@ class Camera:
         local = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
         return local @ self.camera_to_world[:3, :3].T
 
+    @checked
     def back_project(self, pixels: ArrayLike, height: float) -> np.ndarray:
         """World points (..., 3) [m] where the rays of pixels (..., 2) meet the plane z = height.
 
@@ -197,8 +204,15 @@ class Camera:
         return origin + distance[..., None] * rays
 
 
+def _rows(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    rows = np.asarray(value, dtype=float)
+    if rows.ndim < 1 or rows.shape[-1] != size:
+        raise InvalidInputError(f"{name} must have the shape (..., {size}), got {rows.shape}")
+    return rows
+
+
 def _pixels(name: str, value: Any) -> int:
-    pixels = number(f"{name} in pixels", value, low=1.0)
+    pixels = number(f"{name} in pixels", value, low=1.0, high=MOST_PIXELS)
     if pixels != int(pixels):
         raise InvalidInputError(f"{name} must be a whole number of pixels, got {value!r}")
     return int(pixels)

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +17,10 @@ from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _split, body_index
 from nuno.errors import InvalidInputError
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
-from nuno.validation import count, finite_array, number
+from nuno.validation import check_fields, checked, count, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.numbers.device_array import DeviceArray
@@ -52,6 +51,12 @@ class Lamp:
     shadows: bool = True
     radius: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+        finite_array("the lamp's position", self.position, (3,))
+        for name in ("strength", "sky", "radius"):
+            number(f"the lamp's {name}", getattr(self, name), low=0.0)
+
     def points(self) -> np.ndarray:
         """Return the points (n, 3) [m] of the disc that stand for it, each for the same area (Vogel 1979)."""
         place = finite_array("the lamp's position", self.position, (3,))
@@ -74,6 +79,11 @@ class Chequer:
 
     size: float
     color: Any = "black"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        number("size", self.size, above=0.0)
+        rgb(self.color)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,20 +115,18 @@ class Picture:
 
         Raises:
             InvalidInputError: the picture of a batch, or an ending that OpenCV cannot write.
-            OSError: the file cannot be written.
+            FileWriteError: the file cannot be written.
         """
         import cv2
 
-        colors = self.color.numpy()
+        goal, colors = file_path(path), self.color.numpy()
         if colors.ndim != 3:
             raise InvalidInputError(f"one world's picture can be saved, got those of {len(colors)}")
-        ending = FilePath(path).suffix
         try:
-            _, packed = cv2.imencode(ending, colors[..., ::-1])
+            _, packed = cv2.imencode(goal.suffix, colors[..., ::-1])
         except cv2.error as error:
             raise InvalidInputError(f"a picture's file ends in .png, .jpg or the like, got {str(path)!r}") from error
-        with replacing(path) as partial:
-            partial.write_bytes(packed.tobytes())
+        write_whole(goal, packed.tobytes())
 
     def mask(self, *bodies: Any) -> np.ndarray:
         """Return where any of the bodies, or of their names, is seen: bool (h, w), in a batch (worlds, h, w).
@@ -138,6 +146,7 @@ class Picture:
         return masks_by_name(self.ids, self, bodies)
 
 
+@checked
 def take_picture(
     world: Any, camera: Camera, *, lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7),
     patterns: Mapping[Any, Chequer] | None = None, without: Iterable[Any] = (),
@@ -167,6 +176,8 @@ def take_picture(
     lamp = Lamp() if lamp is None else lamp
     samples = count("samples", samples)
     number("noise", noise, low=0.0)
+    if not hasattr(world, "lock") or not hasattr(world, "bodies"):
+        raise InvalidInputError(f"world must be a World, got {type(world).__name__}")
     with world.lock:
         drawn = _Drawn(world, camera, patterns or {}, _hidden(world, without), instead or {})
         time, bodies = world.time, tuple(world.bodies)

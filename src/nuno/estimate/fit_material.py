@@ -22,7 +22,7 @@ from nuno.estimate.seeing import HAND_MARGIN
 from nuno.materials import Cloth
 from nuno.search.minimise import Minimum, minimise
 from nuno.shapes.path import Path
-from nuno.validation import count, finite_array, number
+from nuno.validation import checked, count, finite_array, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -73,6 +73,7 @@ class MaterialFit:
     warnings: list[str] = field(default_factory=list)
 
 
+@checked
 def fit_material(
     seen: Footage | FoldCase | FoldResult | PickCase,
     *,

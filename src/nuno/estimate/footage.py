@@ -24,7 +24,7 @@ from nuno.estimate.hand_sight import disc
 from nuno.estimate.imagined_fold import imagine_fold
 from nuno.estimate.similarity import Silhouette, score_masks
 from nuno.materials import Cloth
-from nuno.validation import finite_array, number
+from nuno.validation import check_fields, finite_array, number
 from nuno.world.world import World
 
 Scores = dict[str, np.ndarray]
@@ -68,10 +68,15 @@ class Footage:
         ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
+        check_fields(self)
         number("drawn_thickness", self.drawn_thickness, low=0.0)
         times = finite_array("times", self.times, ("k",))
         if (np.diff(times) <= 0.0).any() or times[0] < self.world.time:
             raise InvalidInputError(f"times must increase from the world's {self.world.time:g} s on")
+        for name in ("masks", "ignored"):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, Sequence | np.ndarray):
+                raise InvalidInputError(f"{name} must be images, one for each time, got {getattr(self, name)!r}")
         if len(self.masks) != len(times):
             raise InvalidInputError(f"there must be a mask for each of {len(times)} times, got {len(self.masks)}")
         if self.ignored is not None and len(self.ignored) != len(times):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, index_array, number
+from nuno.validation import checked, finite_array, index_array, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +46,7 @@ class Layers:
         cell = (self.x[1] - self.x[0]) * (self.y[1] - self.y[0])
         return [float((self.count == n).sum() * cell) for n in range(1, self.height.shape[-1] + 1)]
 
+    @checked
     def over(self, u: float, v: float) -> list[tuple[float, float]]:
         """Return the points (u, v) of the cloth that lie over the point (u, v), the top one first.
 
@@ -99,7 +100,7 @@ def find_layers(vertices: np.ndarray, faces: np.ndarray, fractions: np.ndarray, 
     points = finite_array("vertices", vertices, ("n", 3))
     triangles = index_array("faces", faces, ("m", 3), low=0, high=len(points))
     uv = finite_array("fractions", fractions, (len(points), 2))
-    width = number("step", step, above=0.0)
+    width = number("step", step, low=1e-6)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     x, y = (np.arange(a - 1.5 * width, b + 2.5 * width, width) for a, b in zip(low, high, strict=True))
     if len(x) * len(y) > 4_000_000:

@@ -6,7 +6,6 @@ import json
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.ranking import confidence, probabilities
 from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
+from nuno.files.whole_file import made_folder, write_figure, write_whole
 from nuno.shapes.shape import Plane
 
 if TYPE_CHECKING:
@@ -186,13 +186,16 @@ class PickResult:
         return contact_sheet(self)
 
     def save(self, folder: str | os.PathLike[str], *, picture: bool = True) -> None:
-        """Write result.json, and result.png where ``picture`` is set, into a folder that is made if need be."""
-        folder = FilePath(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "result.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        """Write result.json, and result.png where ``picture`` is set, into a folder that is made if need be.
+
+        Raises:
+            FileWriteError: the folder or a file in it cannot be written.
+        """
+        folder = made_folder(folder)
+        write_whole(folder / "result.json", json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
         if picture:
             # packed no harder than is quick: a third larger, in a third of the time
-            self.figure().savefig(folder / "result.png", dpi=110, pil_kwargs={"compress_level": 1})
+            write_figure(folder / "result.png", self.figure(), pil_kwargs={"compress_level": 1})
 
     def _label(self, k: int) -> tuple[Any, Any]:
         a, b = self.labels[k]

@@ -343,6 +343,24 @@ def _from_sums(sums: np.ndarray, real: Silhouette, with_contour: bool) -> dict[s
     return scores
 
 
+def _images(masks: ArrayLike, name: str) -> np.ndarray:
+    """Return masks as an array of images.
+
+    Raises:
+        InvalidInputError: something else.
+    """
+    try:
+        array = np.asarray(masks)
+    except ValueError as error:
+        raise InvalidInputError(f"{name} must be an image of bool or whole numbers: {error}") from error
+    if array.dtype.kind not in "biuf" or array.ndim < 2:
+        raise InvalidInputError(
+            f"{name} must be images (h, w) of bool, or of whole numbers of which the non-zero ones are the mask, got "
+            f"{array.dtype} {array.shape}"
+        )
+    return array
+
+
 def similarity(
     masks: ArrayLike | wp.array, real_mask: ArrayLike | Silhouette, score: str = "eq1", *,
     ignore: ArrayLike | None = None, threshold: float | None = None,
@@ -353,7 +371,7 @@ def similarity(
     [px] to the nearest pixel of the other contour:
 
     - "eq1" = (``|S and R|`` + ``|not S and not R|``) / N, the paper's eq. (1); 0 to 1, higher is better;
-    - "iou" = ``|S and R|`` / ``|S or R|``; 1 if both are empty;
+    - "iou" = ``|S and R|`` / ``|S or R|``;
     - "chamfer" = (mean of d over S's contour + mean of d over R's contour) / 2 [px], lower is better.
 
     Args:
@@ -368,23 +386,26 @@ def similarity(
 
     Raises:
         UnknownNameError: there is no such score.
-        InvalidInputError: shapes or types do not fit, or masks of real numbers without a threshold.
+        InvalidInputError: shapes or types do not fit, the real mask is empty, or masks of real numbers without a
+            threshold.
     """
-    if score not in (*SCORES, "all"):
+    if not isinstance(score, str) or score not in (*SCORES, "all"):
         raise UnknownNameError("score", score, [*SCORES, "all"])
-    batch = masks if isinstance(masks, wp.array) else np.asarray(masks)
+    batch = masks if isinstance(masks, wp.array) else _images(masks, "masks")
     has_real = is_real(batch)
     if isinstance(real_mask, Silhouette):
         if ignore is not None:
             raise InvalidInputError("a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead")
         real = real_mask
     else:
-        given = np.asarray(real_mask)
+        given = _images(real_mask, "real_mask")
         has_real = has_real or is_real(given)
-        outside = None if ignore is None else cut(np.asarray(ignore), None, "ignore")
+        outside = None if ignore is None else cut(_images(ignore, "ignore"), None, "ignore")
         real = Silhouette(cut(given, threshold, "real_mask"), outside)
     if threshold is not None and not has_real:
         raise InvalidInputError("threshold is for masks of real numbers; these are bool or whole numbers")
+    if not real.mask.any():
+        raise InvalidInputError("the real mask is empty: there is nothing that masks could be alike to")
     batch = cut(batch, threshold, "masks")
     if isinstance(batch, wp.array) and batch.dtype not in (wp.bool, wp.uint8):
         raise InvalidInputError(f"masks on a device must be bool or uint8, got {batch.dtype.__name__}")

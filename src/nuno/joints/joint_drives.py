@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array
+from nuno.validation import as_array, finite_array
 
 DRIVES = (
     "lower", "upper", "friction", "stiffness", "damping", "position", "velocity", "max_effort", "spring", "rest",
@@ -105,7 +105,7 @@ def drive_table(worlds: int, values: dict[str, Any], before: np.ndarray | None =
 
 
 def _checked(name: str, value: Any, *, low: float = -np.inf, endless: bool = False) -> np.ndarray:
-    if endless and np.ndim(value) == 0 and value == np.inf:
+    if endless and as_array(name, value).ndim == 0 and value == np.inf:
         return np.array(np.inf)
     checked = finite_array(name, value, (), ("worlds",))
     if (checked < low).any():

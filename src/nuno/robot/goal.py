@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
-from nuno.validation import number
+from nuno.validation import check_fields, number
 
 _numbers = itertools.count(1)
 
@@ -111,6 +111,7 @@ class Tolerances:
     goal_time: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for what in ("path", "goal"):
             given = {name: number(f"the {what} tolerance of {name!r}", value, low=0.0)
                      for name, value in getattr(self, what).items()}  # fmt: skip

@@ -20,7 +20,7 @@ from nuno.robot.placement import frame_called, pose_of
 from nuno.robot.support import convex_outline
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, compose, invert
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -50,6 +50,7 @@ class Humanoid(Coordinates):
         MeshError: the URDF names a mesh that is not there.
     """
 
+    @checked
     def __init__(
         self, name: FileName = "talos", *, srdf: FileName | None = None,
         package_dirs: Sequence[FileName] | None = None, robots: FileName | None = None,
@@ -127,7 +128,7 @@ class Humanoid(Coordinates):
         Raises:
             UnknownNameError: there is no such joint.
         """
-        if joint not in self._index:
+        if not isinstance(joint, str) or joint not in self._index:
             raise UnknownNameError("joint", joint, list(self.joint_names))
         return self._index[joint]
 
@@ -165,6 +166,7 @@ class Humanoid(Coordinates):
 
     # Where everything is
 
+    @checked
     def stand(self, position: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
         """Take the description's posture, the point between the soles at ``position`` (3,) [m], facing ``yaw`` [rad].
 
@@ -185,6 +187,7 @@ class Humanoid(Coordinates):
         """All frames: the roles of the description, links and joints."""
         return (*self.description.frames, *(f.name for f in self.model.frames if f.name not in self.description.frames))
 
+    @checked
     def frame_pose(self, frame: str) -> Coordinates:
         """Return where a frame is: a role ("left_hand", "head_camera", "imu" ...), a link or a joint.
 
@@ -193,6 +196,7 @@ class Humanoid(Coordinates):
         """
         return Coordinates(*self._pose_of_frame(frame))
 
+    @checked
     def camera(self, name: str = "head") -> Camera:
         """Return a camera of the description, where it is now.
 
@@ -314,6 +318,7 @@ class Humanoid(Coordinates):
 
         return Geometry(self)
 
+    @checked
     def enter(self, world: World, meshes: str = "collision") -> Links:
         """Put the links into a world, as static bodies that can follow the robot; see ``Links``.
 

@@ -13,7 +13,7 @@ from nuno.robot.spatial_arrays import placement_arrays
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
 from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -45,6 +45,7 @@ class Links:
         MeshError: a mesh that cannot be read.
     """
 
+    @checked
     def __init__(self, robot: Humanoid, world: World, meshes: str = "collision") -> None:
         if meshes not in MESHES:
             raise InvalidInputError(f"meshes must be one of {MESHES}, got {meshes!r}")
@@ -81,6 +82,7 @@ class Links:
                 body._position, body._quaternion = position, quaternion
                 world.add(body)
 
+    @checked
     def offset_of(self, k: int) -> Pose:
         """Return where the k-th body is in the frame of its joint."""
         return self._offsets[k], self._turns[k]

@@ -19,7 +19,7 @@ from nuno.robot.spatial_arrays import placement_arrays, spatial_array
 from nuno.robot.support import zero_moment_point
 from nuno.robot.wrenches import WrenchSensor
 from nuno.shapes import quaternion as quat
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -85,6 +85,7 @@ class Sensors:
         InvalidInputError: a model that does not fit its channel, or links of another robot.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, links: Links | None = None, *, models: Mapping[str, SensorModel] | None = None,
         ground: float = 0.0, seed: int = 0,
@@ -129,6 +130,7 @@ class Sensors:
         """The names that ``models`` may have."""
         return tuple(self._channels)
 
+    @checked
     def read(self, state: RobotState | None = None, stance: Sequence[str] | None = None) -> Readings:
         """Return what all sensors tell.
 

@@ -25,7 +25,7 @@ from nuno.robot.simulated_gripper import SimulatedGripper
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.coordinates import Coordinates
-from nuno.validation import number
+from nuno.validation import checked, number
 from nuno.world.background import LATE
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ class SimulatedRobot(SimulatedBody):
         hands: Its hands, by name.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
         sensors: Mapping[str, SensorModel] | None = None, cameras: HeadCameras | None = None, seed: int = 0,
@@ -141,10 +142,12 @@ class SimulatedRobot(SimulatedBody):
         """Return the world's time [s]."""
         return float(self.world.time)
 
+    @checked
     def sleep(self, seconds: float) -> None:
         """Let the world's clock go on by ``seconds`` [s]."""
         self._let_pass(number("seconds", seconds, low=0.0))
 
+    @checked
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
         """Step the world until a condition holds, up to ``timeout`` [s], None or 0 for ever; return whether it does."""
         end = None if not timeout else self.now() + timeout - 1e-9
@@ -205,6 +208,7 @@ class SimulatedRobot(SimulatedBody):
         with self.world.lock:
             return self.joints.controllers[self._known(controller)].is_busy
 
+    @checked
     def servo(self, command: ServoCommand | None) -> None:
         """Put joints under a torque law, at once and until another command; see ``Servo``.
 

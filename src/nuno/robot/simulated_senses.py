@@ -10,6 +10,7 @@ import numpy as np
 from nuno.errors import RobotModelError
 from nuno.robot.interface import RobotInterface
 from nuno.robot.readings import ImageReading, ImuReading
+from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.camera.camera import Camera
@@ -44,6 +45,7 @@ class SimulatedSenses(RobotInterface):
                 self._readings = (state.time, self.sensors.read(state))
             return self._readings[1]
 
+    @checked
     def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return force (3,) [N] and torque (3,) [N m] of what lies beyond a sensor; see ``RobotInterface``.
 

@@ -47,7 +47,7 @@ class Path:
             raise InvalidInputError("times must increase from key to key")
         k = len(times)
         positions = finite_array("positions", self.positions, (k, 3), ("worlds", k, 3))
-        if self.interpolation not in INTERPOLATIONS:
+        if not isinstance(self.interpolation, str) or self.interpolation not in INTERPOLATIONS:
             raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {self.interpolation!r}")
         turns = self.quaternions
         if turns is not None:

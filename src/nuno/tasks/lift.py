@@ -17,7 +17,7 @@ from nuno.errors import EstimationError, InvalidInputError
 from nuno.materials import Soft
 from nuno.search.sweep import sweep
 from nuno.shapes.path import Path
-from nuno.validation import count, number
+from nuno.validation import checked, count, number
 from nuno.world.world import World
 
 RUBBER = Soft(density=200.0, youngs_modulus=2e4, poisson_ratio=0.3, friction=0.5, damping=0.01)
@@ -118,6 +118,7 @@ class LiftTrials:
         }  # fmt: skip
 
 
+@checked
 def lift_soft_cube(
     edge: float = 0.1, cells: int = 5, material: Soft | None = None, *, most: float | None = None, tries: int = 16,
     rounds: int = 2, device: str = "auto", substeps: int | None = None,

@@ -22,9 +22,10 @@ from nuno.joints.joint_drives import (
 from nuno.joints.tie import force_limit
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose, invert
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 
+@checked
 def hinge(
     a: Body, b: Body | None, *, point: ArrayLike, axis: ArrayLike, limits: Any = None, friction: Any = 0.0,
     motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
@@ -59,6 +60,7 @@ def hinge(
     return _join("hinge", a, b, point, axis, values, max_force, contact, position)
 
 
+@checked
 def slider(
     a: Body, b: Body | None, *, axis: ArrayLike, point: ArrayLike | None = None, limits: Any = None,
     friction: Any = 0.0, motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None,
@@ -90,6 +92,7 @@ def slider(
     return _join("slider", a, b, point, axis, values, max_force, contact, position)
 
 
+@checked
 def ball_joint(
     a: Body, b: Body | None, *, point: ArrayLike, limit: Any = None, axis: ArrayLike | None = None,
     friction: Any = 0.0, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
@@ -115,6 +118,7 @@ def ball_joint(
     return _join("ball", a, b, point, axis, values, max_force, contact)
 
 
+@checked
 def fixed_joint(a: Body, b: Body | None, *, max_force: Any = None, contact: bool = False) -> Joint:
     """Join a rigid body to another so that they move as one, from now on; as accurate as the other joints.
 

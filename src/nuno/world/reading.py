@@ -9,6 +9,7 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import ParticleDynamics
 from nuno.errors import BodyStateError
+from nuno.validation import flag
 from nuno.world.saving import Saving
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Reading(Saving):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
-            return contact_points(self, own, itself)
+            return contact_points(self, own, flag("itself", itself))
 
     def contact_force(self, body: Body | str) -> DeviceArray:
         """Return the sum of the forces that contacts exert on a dynamic body [N], a Warp array (worlds,) of vec3.
@@ -84,7 +85,7 @@ class Reading(Saving):
                 raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
             dynamics = own._dynamics
             names = ("positions", "velocities")
-            kept = {} if copy else self._views.get(dynamics, {})
+            kept = {} if flag("copy", copy) else self._views.get(dynamics, {})
             if isinstance(dynamics, ParticleDynamics):
                 made = (dynamics.solver.positions_on_device, dynamics.solver.velocities_on_device)
                 arrays = {name: make(kept.get(name)) for name, make in zip(names, made, strict=True)}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.files.whole_file import file_path
 from nuno.validation import count
 from nuno.world.memory import check_memory
 from nuno.world.reset import checked_worlds, reset_worlds
@@ -27,7 +28,14 @@ class Saving(Running):
     """A simulation with the verbs of time, and those of copies."""
 
     def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
-        """Return everything that the world is, and write it to ``path`` (.npz) where one is given."""
+        """Return everything that the world is, and write it to ``path`` (.npz) where one is given.
+
+        Raises:
+            InvalidInputError: ``path`` is no path.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
+        """
+        if path is not None:
+            file_path(path)
         with self._change("save"):
             snapshot = capture(self)
         if path is not None:

@@ -20,7 +20,7 @@ from nuno.materials import Material, Rigid
 from nuno.shapes.path import Path
 from nuno.solvers.resolution import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
-from nuno.validation import finite_array, number
+from nuno.validation import finite_array, flag, number
 from nuno.world.setting import Setting
 
 
@@ -131,6 +131,7 @@ class World(Setting):
         """
         with self._change("attach"):
             own = self._own(body)
+            flag("keep_velocity", keep_velocity)
             if own._dynamics is not None and not keep_velocity:
                 raise BodyStateError(
                     f"{own.name!r} is dynamic already; detach it first to change its material, or set keep_velocity"
@@ -260,6 +261,8 @@ class World(Setting):
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
             target = self._own(to) if isinstance(to, Body) else None
+            if ignore is not None and (isinstance(ignore, str) or not isinstance(ignore, Sequence)):
+                raise InvalidInputError(f"ignore must be a sequence of bodies or names, got {ignore!r}")
             if target is own:
                 raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
             if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
@@ -341,6 +344,7 @@ class World(Setting):
         """
         with self._change("ignore_contact"):
             own = self._own(a)
+            flag("ignore", ignore)
             pair = frozenset((own.key,)) if own is self._own(b) else self._pair(a, b)
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
@@ -354,4 +358,5 @@ class World(Setting):
         """
         with self._change("sum_impulses"):
             own = self._own(body)
+            flag("on", on)
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)

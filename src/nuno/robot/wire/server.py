@@ -20,7 +20,7 @@ from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import ADVANCE, CLOCK_KIND, RUNNING, STEPPED, Names
 from nuno.robot.wire.protocol import Message
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -77,6 +77,7 @@ class RobotServer:
         InvalidInputError: a value out of range.
     """
 
+    @checked
     def __init__(
         self, robot: RobotInterface, host: str = "127.0.0.1", port: int = 9090, *,
         real_time_factor: float | None = 1.0, names: Names | None = None, max_message: int = 2**23,
