@@ -16,6 +16,7 @@ from nuno.camera import raster, shading
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _index, _split
+from nuno.camera.small_png import small_png
 from nuno.errors import InvalidInputError
 from nuno.files.whole_file import replacing
 from nuno.shapes.color import linear, rgb
@@ -95,6 +96,10 @@ class Picture:
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"
         return f"<Picture of {size} at t = {self.time:.3f} s, {len(self.bodies)} bodies>"
+
+    def _repr_png_(self) -> bytes:
+        """Return a small PNG, of a batch its first worlds side by side."""
+        return small_png(self.color.numpy())
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the colours to a file, whose ending names the format (PNG loses nothing).
