@@ -44,7 +44,7 @@ nitpick_ignore_regex = [
     ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
     # What a result holds for other functions to take
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
-    ("py:class", r"(.*\.)?(Scene|SoftTopology)"),
+    ("py:class", r"(.*\.)?(GripSpec|ImageReading|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
 ]
 
 

