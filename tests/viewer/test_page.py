@@ -1,7 +1,5 @@
 """What a browser shows is where Nuno's own renderer sees it."""
 
-import time
-
 import cv2
 import numpy as np
 import pytest
@@ -178,7 +176,7 @@ def test_the_live_page_follows_in_all_modes(browser, tmp_path):
             viewer.draw(ball, mode, explode=1.6)
             world.run(0.1)
             browser.wait_for(f"nuno.messages > {seen} && [...nuno.things.values()].some((t) => t.path[1] === 'ball')")
-            time.sleep(0.3)  # of thirty looks a second
+            browser.wait_for(f"document.getElementById('clock').textContent === 't = {world.time:.2f} s'")
             picture = browser.picture()
             save_picture(picture, tmp_path / f"{mode}.png")
             covered[mode] = blue(picture)
