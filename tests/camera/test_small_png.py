@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from nuno.camera.small_png import LARGEST, WORLDS, small_png
+from nuno.camera.small_png import MAX_SIDE, WORLDS, small_png
 
 
 def read(png):
@@ -19,7 +19,7 @@ def test_a_small_picture_is_as_it_is():
 
 def test_a_large_one_is_made_smaller():
     """To the longest side that is shown; its shape is kept."""
-    assert read(small_png(np.zeros((1000, 2000, 3), np.uint8))).shape == (LARGEST // 2, LARGEST, 3)
+    assert read(small_png(np.zeros((1000, 2000, 3), np.uint8))).shape == (MAX_SIDE // 2, MAX_SIDE, 3)
 
 
 def test_worlds_stand_in_rows():

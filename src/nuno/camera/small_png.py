@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-LARGEST = 640
+MAX_SIDE = 640
 """[px] the longer side, at most."""
 
 WORLDS = 36
@@ -23,7 +23,7 @@ def small_png(colors: np.ndarray) -> bytes:
     for k, image in enumerate(images):
         row, column = divmod(k, columns)
         sheet[row * height : (row + 1) * height, column * width : (column + 1) * width] = image
-    scale = LARGEST / max(sheet.shape[:2])
+    scale = MAX_SIDE / max(sheet.shape[:2])
     if scale < 1.0:
         sheet = cv2.resize(sheet, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return bytes(cv2.imencode(".png", sheet[..., ::-1])[1])
