@@ -34,6 +34,7 @@ PICTURES: dict[str, list[tuple[list[str], dict[str, str]]]] = {
     "replay_fold": [([], {"fold.webp": "strip.png", "layers.png": "layers.png", "hands.png": "hands.png"})],
     "talos_fold": [([], {"talos-fold.png": "talos-fold.png", "talos-fold-layers.png": "talos-fold-layers.png"})],
     "talos_walk": [([], {"walk.png": "talos_walk.png"})],
+    "viewer_page": [([], {"viewer.webp": "viewer_page.png"})],
 } | {
     name: [([], {f"examples/{name}.webp": f"{name}.png"})]  # for the gallery alone
     for name in (
@@ -68,9 +69,14 @@ def main() -> None:
     for name in names:
         for more, files in PICTURES[name]:
             with tempfile.TemporaryDirectory() as folder:
-                subprocess.run([sys.executable, str(ROOT / f"examples/{name}.py"), "--out", folder, *more], check=True)
+                subprocess.run([sys.executable, str(script(name)), "--out", folder, *more], check=True)
                 for picture, file in files.items():
                     keep(Path(folder) / file, IMAGES / picture)
+
+
+def script(name: str) -> Path:
+    """Return the program that draws: an example, or the one that takes pictures of the viewer's page in Chromium."""
+    return ROOT / ("tests/viewer" if name == "viewer_page" else "examples") / f"{name}.py"
 
 
 def keep(drawn: Path, picture: Path) -> None:

@@ -63,7 +63,7 @@ def test_the_film_ends_as_the_picture():
     picture = cv2.imread(str(IMAGES / "kinds.png"))[..., ::-1]
     same = cv2.resize(picture, (640, 360), interpolation=cv2.INTER_AREA)
     assert np.abs(last - same).mean() < 4.0, "WebP is lossy"
-    assert (IMAGES / "film.webp").stat().st_size < 1.5e6
+    assert (IMAGES / "film.webp").stat().st_size < 1e6
 
 
 def test_a_change_of_the_picture_is_seen(tmp_path):

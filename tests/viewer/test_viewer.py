@@ -15,7 +15,7 @@ import pytest
 from feed import Feed
 
 import nuno
-from nuno.viewer import Film, Viewer
+from nuno.viewer import Film, Viewer, page_server
 from nuno.viewer import following as following_module
 from nuno.viewer.scene import Scene
 
@@ -394,6 +394,16 @@ def test_a_closed_viewer_says_so():
     film.stop()
     assert film.duration == pytest.approx(0.1)
     assert "closed" in repr(viewer) and "iframe" not in viewer._repr_html_()
+
+
+def test_a_port_is_found_where_the_first_ones_are_taken(monkeypatch):
+    """Programs that leave many viewers open keep nobody from opening one more."""
+    with Viewer(make_world()) as first:
+        monkeypatch.setattr(page_server, "FIRST_PORT", int(first.url.rstrip("/").rpartition(":")[2]))
+        monkeypatch.setattr(page_server, "PORTS", 1)
+        with Viewer(make_world()) as second:
+            assert second.url != first.url
+            assert Feed(second).paths()
 
 
 def test_a_viewer_that_is_dropped_ends():
