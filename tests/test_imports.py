@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import nuno
@@ -25,13 +26,16 @@ REPLACED = {
 }  # fmt: skip
 
 
+@cache
 def modules():
-    """Yield each module's name below ``nuno`` and its tree."""
+    """Return each module's name below ``nuno`` and its tree."""
+    found = []
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
         if parts[-1] == "__init__" and len(parts) > 1:
             parts.pop()
-        yield ".".join(parts), ast.parse(path.read_text(encoding="utf-8"))
+        found.append((".".join(parts), ast.parse(path.read_text(encoding="utf-8"))))
+    return found
 
 
 def layer_of(module):
@@ -59,6 +63,7 @@ def imports_of(tree, names):
                 yield inner if inner in names else package or "__init__"
 
 
+@cache
 def edges():
     """Return which module imports which, by name below ``nuno``."""
     found = dict(modules())
@@ -79,7 +84,7 @@ def test_folders_import_one_way():
 
 def test_modules_import_in_no_circle():
     """No module imports one that imports it, by whatever way round."""
-    left = edges()
+    left = dict(edges())
     while ready := [name for name, others in left.items() if not others & left.keys()]:
         for name in ready:
             del left[name]

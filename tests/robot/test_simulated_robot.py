@@ -93,7 +93,7 @@ def test_waiting_in_the_background(simulated):
     simulated.angle_vector(BENT, 1.0)
     simulated.wait_interpolation()
     assert simulated.now() - begin >= 1.0 - 1e-9
-    assert 0.04 < time.perf_counter() - start < 20.0  # 1 s at 20 times real time is 0.05; a busy machine takes longer
+    assert time.perf_counter() - start > 0.04  # 1 s at 20 times real time is 0.05; a busy machine takes longer
     simulated.sleep(0.2)
     simulated.world.stop()
 

@@ -16,6 +16,7 @@ from nuno.camera.body_masks import masks_by_name
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.camera.render import _hidden, _split, body_index
+from nuno.camera.small_png import small_png
 from nuno.errors import InvalidInputError
 from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import linear, rgb
@@ -109,6 +110,10 @@ class Picture:
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"
         return f"<Picture of {size} at t = {self.time:.3f} s, {len(self.bodies)} bodies>"
+
+    def _repr_png_(self) -> bytes:
+        """Return a small PNG, of a batch its first worlds side by side."""
+        return small_png(self.color.numpy())
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the colours to a file, whose ending names the format (PNG loses nothing).

@@ -17,6 +17,7 @@ from nuno.estimate.fold_view import CLOTH_COLOUR, hand_spheres
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.imagined_fold import ImaginedFold
 from nuno.estimate.layers import Layers, find_layers
+from nuno.files.html_table import html_table
 from nuno.files.recording import RecordedBody, Recording
 from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.materials import Cloth
@@ -83,6 +84,12 @@ class FoldResult:
         rated = f", agreement {np.mean(agreement):.3f}" if agreement else ""
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
         return f"<FoldResult: {len(self.times)} frames as {self.material_name}{rated}{odd}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(name, f"{score:.3f}") for name, score in self.scores.items()]
+        title = f"FoldResult: {len(self.times)} frames as {self.material_name}"
+        columns = ("material", "mean overlap") if rows else ()
+        return html_table(title, rows, columns=columns, notes=self.warnings, figure=self.figure())
 
     @property
     def final(self) -> np.ndarray:

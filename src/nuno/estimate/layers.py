@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.errors import InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.validation import checked, finite_array, index_array, number
 
 if TYPE_CHECKING:
@@ -55,6 +56,10 @@ class Layers:
         away = np.linalg.norm(self.material - (u, v), axis=-1)
         row, column, layer = np.unravel_index(np.nanargmin(away), away.shape)
         return [(float(a), float(b)) for a, b in self.material[row, column, :layer]]
+
+    def _repr_html_(self) -> str:
+        rows = [(n, f"{1e4 * area:.1f}") for n, area in enumerate(self.area, 1)]
+        return html_table("Layers", rows, columns=("layers", "area [cm2]"), figure=self.figure())
 
     def figure(self) -> Figure:
         """Two maps: how many layers lie where, from above; and, on the cloth spread flat, how deep each part lies."""

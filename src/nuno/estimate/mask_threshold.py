@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
 from nuno.validation import number
@@ -61,3 +62,21 @@ def cut(masks: Any, threshold: float | None, name: str) -> Any:
     found: Any = wp.empty(batch.shape, dtype=wp.bool, device=masks.device)
     wp.launch(_above, dim=batch.shape, inputs=[batch, wp.float64(level), found], device=masks.device)
     return found.reshape(masks.shape)
+
+
+def images_of(masks: ArrayLike, name: str) -> np.ndarray:
+    """Return masks as an array of images.
+
+    Raises:
+        InvalidInputError: something else.
+    """
+    try:
+        array = np.asarray(masks)
+    except ValueError as error:
+        raise InvalidInputError(f"{name} must be an image of bool or whole numbers: {error}") from error
+    if array.dtype.kind not in "biuf" or array.ndim < 2:
+        raise InvalidInputError(
+            f"{name} must be images (h, w) of bool, or of whole numbers of which the non-zero ones are the mask, got "
+            f"{array.dtype} {array.shape}"
+        )
+    return array

@@ -15,6 +15,7 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.ranking import confidence, probabilities
 from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
+from nuno.files.html_table import html_table
 from nuno.files.whole_file import made_folder, write_figure, write_whole
 from nuno.shapes.shape import Plane
 
@@ -83,6 +84,17 @@ class PickResult:
     def __repr__(self) -> str:
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
         return f"<PickResult: {self.best} of {len(self.labels)}, confidence {self.confidence:.2f}{odd}>"
+
+    def _repr_html_(self) -> str:
+        likely = self.probabilities
+        rows = [
+            (self._label(int(k)), f"{self.scores[k]:.4g}", "" if likely is None else f"{likely[k]:.3f}")
+            for k in self.order[:5]
+        ]
+        title = f"PickResult: {self.best} of {len(self.labels)}, confidence {self.confidence:.2f}"
+        columns = ("candidate", self.score_name.replace("_", " "), "probability")
+        seen = self.image_before is not None
+        return html_table(title, rows, columns=columns, notes=self.warnings, figure=self.figure() if seen else None)
 
     @property
     def best(self) -> tuple[Any, Any]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.estimate.mask_threshold import cut, is_real
+from nuno.estimate.mask_threshold import cut, images_of, is_real
 
 wp.set_module_options({"enable_backward": False})
 
@@ -343,24 +343,6 @@ def _from_sums(sums: np.ndarray, real: Silhouette, with_contour: bool) -> dict[s
     return scores
 
 
-def _images(masks: ArrayLike, name: str) -> np.ndarray:
-    """Return masks as an array of images.
-
-    Raises:
-        InvalidInputError: something else.
-    """
-    try:
-        array = np.asarray(masks)
-    except ValueError as error:
-        raise InvalidInputError(f"{name} must be an image of bool or whole numbers: {error}") from error
-    if array.dtype.kind not in "biuf" or array.ndim < 2:
-        raise InvalidInputError(
-            f"{name} must be images (h, w) of bool, or of whole numbers of which the non-zero ones are the mask, got "
-            f"{array.dtype} {array.shape}"
-        )
-    return array
-
-
 def similarity(
     masks: ArrayLike | wp.array, real_mask: ArrayLike | Silhouette, score: str = "eq1", *,
     ignore: ArrayLike | None = None, threshold: float | None = None,
@@ -391,16 +373,16 @@ def similarity(
     """
     if not isinstance(score, str) or score not in (*SCORES, "all"):
         raise UnknownNameError("score", score, [*SCORES, "all"])
-    batch = masks if isinstance(masks, wp.array) else _images(masks, "masks")
+    batch = masks if isinstance(masks, wp.array) else images_of(masks, "masks")
     has_real = is_real(batch)
     if isinstance(real_mask, Silhouette):
         if ignore is not None:
             raise InvalidInputError("a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead")
         real = real_mask
     else:
-        given = _images(real_mask, "real_mask")
+        given = images_of(real_mask, "real_mask")
         has_real = has_real or is_real(given)
-        outside = None if ignore is None else cut(_images(ignore, "ignore"), None, "ignore")
+        outside = None if ignore is None else cut(images_of(ignore, "ignore"), None, "ignore")
         real = Silhouette(cut(given, threshold, "real_mask"), outside)
     if threshold is not None and not has_real:
         raise InvalidInputError("threshold is for masks of real numbers; these are bool or whole numbers")

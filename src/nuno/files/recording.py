@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, UnknownNameError
 from nuno.files.export import check_extension, one_world
+from nuno.files.html_table import html_table
 from nuno.files.whole_file import file_path, replacing, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.soft_shape import SoftShape
@@ -146,6 +147,15 @@ class Recording:
 
     def __repr__(self) -> str:
         return f"<Recording of {len(self._times)} frames, {', '.join(body.name for body in self.bodies)}>"
+
+    def _repr_html_(self) -> str:
+        span = f", t = {self._times[0]:.3f} to {self._times[-1]:.3f} s" if self._times else ""
+        rows = []
+        for body in self.bodies if self._times else ():
+            moves = np.ptp(body.vertices, axis=0).any()
+            rows.append((body.name, body.vertices.shape[-2], len(body.faces), "yes" if moves else "no"))
+        columns = ("body", "vertices", "triangles", "moves")
+        return html_table(f"Recording of {len(self._times)} frames{span}", rows, columns=columns if rows else ())
 
     def __getitem__(self, name: str) -> RecordedBody:
         found = next((body for body in self.bodies if body.name == name), None)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import EstimationError, InvalidInputError, MissingPackageError, UnknownNameError
+from nuno.files.html_table import html_table
 from nuno.search.parameters import from_rows
 from nuno.search.sampler import check_bounds, scaled, share_of
 from nuno.search.sweep import check_trial, outcomes
@@ -64,6 +65,11 @@ class Minimum:
     tried_values: np.ndarray
     reason: str
     errors: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        rows = [(name, f"{value:.4g}") for name, value in self.params.items()]
+        title = f"Minimum: {self.value:.4g} after {len(self.tried_values)} trials"
+        return html_table(title, rows, columns=("parameter", "value"), notes=(self.reason, *self.errors))
 
     @checked
     def near(self, excess: float) -> dict[str, tuple[float, float]]:

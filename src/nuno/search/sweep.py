@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, UnknownNameError
+from nuno.files.html_table import html_table
 from nuno.files.whole_file import replacing
 from nuno.search.chunk_size import LANES, ChunkSize
 from nuno.search.dispatch import run_on_executor
@@ -50,6 +51,21 @@ class SweepResult:
         finished = sum(trial is not None for trial in self.trials)
         finished_text = f"{finished} of {self.planned or len(self)} trials, {len(self.failures)} failed"
         return f"<SweepResult: {finished_text}; {', '.join(self.params)} -> {', '.join(self.names) or 'nothing'}>"
+
+    def _repr_html_(self) -> str:
+        names = [name for name in self.names if np.ndim(self._first(name)) == 0]
+        done = [(k, trial) for k, trial in enumerate(self.trials) if trial is not None]
+        rows = [
+            [k, *(_short(value) for value in self.row(k).values()),
+             *(_short(trial.values[name].item()) if name in trial.values else trial.error or "" for name in names)]
+            for k, trial in done
+        ]  # fmt: skip
+        failed = f"{len(self.failures)} failed" if self.failures else "none failed"
+        title = f"SweepResult: {len(done)} of {len(self)} trials, {failed}"
+        return html_table(title, rows, columns=("trial", *self.params, *names) if rows else ())
+
+    def _first(self, name: str) -> np.ndarray:
+        return next(trial.values[name] for trial in self.trials if trial is not None and name in trial.values)
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -304,3 +320,7 @@ def _checked_batch(batch: Any) -> int | None:
     if isinstance(batch, bool | np.bool_):
         return None if batch else 1
     return count("batch", batch)
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.tasks.arm_tracks import FRAME_RATE
 from nuno.tasks.carry_trials import CarryPlan, carry, make_room
@@ -67,6 +68,16 @@ class CarryResult:
 
     def __repr__(self) -> str:
         return f"<CarryResult: {len(self.trials)} trials, the mat fell in {int(self.failed.sum())}>"
+
+    def _repr_html_(self) -> str:
+        held = [k for k in np.argsort(self.values) if not self.failed[k]]
+        rows = [
+            (f"{trial.arm_distance:.3f}", f"{trial.offset_x:+.3f}", f"{trial.offset_y:+.3f}", f"{1000 * value:.1f}")
+            for trial, value in ((self.trials[k], self.values[k]) for k in held[:5])
+        ]
+        title = f"CarryResult: {len(self.trials)} trials, the mat fell in {int(self.failed.sum())}"
+        columns = ("arms apart [m]", "hands ahead [m]", "aside [m]", "F [mm s]")
+        return html_table(title, rows, columns=columns if rows else ())
 
     @property
     def values(self) -> np.ndarray:

@@ -64,7 +64,7 @@ class Viewer(Orders):
         robots: Links whose bodies came into the world as copies, as in an imagined one.
         frame_rate: Looks per second of real time [1/s], at most: fewer where they would take over 2 % of it.
         host: Which of this machine's addresses the page is served at; by default, nothing outside it gets it.
-        port: The page's port; None is the first that is free from 7000 on.
+        port: The page's port; None is the first that is free from 7000 to 7099, or any other.
 
     Raises:
         InvalidInputError: no such mode or world, or a value out of range.

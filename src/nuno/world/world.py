@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
+from nuno.bodies.body_facts import place_text
 from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
 from nuno.bodies.make_dynamics import start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.joints.grip import Grip, make_grip, warn_shared
 from nuno.joints.joint import Joint, check_joined
 from nuno.joints.tie import check_leader, check_weld, tie_to_leader
@@ -40,6 +42,18 @@ class World(Setting):
     Raises:
         InvalidInputError: a value that is not finite or out of range.
     """
+
+    def _repr_html_(self) -> str:
+        with self.lock:
+            bodies = tuple(self._bodies.values())
+            rows = [
+                (body.name, body.shape.kind, place_text(body),
+                 "static" if body.material is None else type(body.material).__name__)
+                for body in bodies
+            ]  # fmt: skip
+            batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
+            title = f"World at t = {self.time:.3f} s{batch}"
+        return html_table(title, rows, columns=("body", "shape", "position", "dynamics") if rows else ())
 
     # Bodies
 
