@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.bodies.dynamics import topology_of
+from nuno.bodies.shape_topology import topology_of
 from nuno.errors import InvalidInputError
 from nuno.materials import Soft
 
