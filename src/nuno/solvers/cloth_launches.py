@@ -22,13 +22,21 @@ from nuno.plans.block_plan import (
     run_double_blocks,
     run_double_blocks_partly,
 )
-from nuno.plans.cloth_substep import run_double_lanes, run_double_worlds, run_lanes, run_worlds
+from nuno.plans.cloth_worlds import (
+    run_double_lanes,
+    run_double_simd,
+    run_double_worlds,
+    run_lanes,
+    run_simd,
+    run_worlds,
+)
 from nuno.plans.cpu_groups import run_groups
+from nuno.plans.group_figures import SHARED_FIGURES
 from nuno.plans.group_kernels import THREADS, run_double_grid, run_grid
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.plans.shared_memory import DOUBLE_PARTICLES, SHARED_PARTICLES, WHOLE_PARTICLES
-from nuno.plans.simd_plan import pack_topology, run_double_simd, run_simd
+from nuno.plans.simd_elements import pack_topology
 from nuno.plans.stage_kernels import divide, make_work
 from nuno.solvers.particle_solver import ParticleSolver
 from nuno.solvers.resolution import Resolution
@@ -149,10 +157,10 @@ class ClothLaunches(ParticleSolver):
             block_groups, blocks = block_groups_of(self.world_count, cores_of(self.device), SHARED_OUT)
         if self._lists is None:
             self._lists = make_lists(self._topology, self.world_count, self.device)
-        speeds = wp.zeros(2 * self.world_count, dtype=float, device=self.device)
+        shared = wp.zeros(SHARED_FIGURES * self.world_count, dtype=float, device=self.device)
 
         def after(blocks: int) -> tuple[Any, ...]:
-            return self._shapes, self._work(blocks), self._lists, speeds
+            return self._shapes, self._work(blocks), self._lists, shared
 
         return GridPlan(
             (run_grid, run_double_grid), self._state, (self._topology, self._size), after, self.device,
