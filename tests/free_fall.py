@@ -8,20 +8,14 @@ import numpy as np
 import pytest
 
 import nuno.bodies.dynamics
+import nuno.bodies.shape_topology
 
 
-class Topology:
-    """Remembers what it was made of."""
-
-    @classmethod
-    def sheet(cls, cells, size):
-        """Take what a sheet is made of."""
-        return SimpleNamespace(cells=cells, size=size)
-
-    @classmethod
-    def mesh(cls, rest, faces):
-        """Take what a cloth mesh is made of."""
-        return SimpleNamespace(rest=rest, faces=faces)
+def topology_of(shape):
+    """Return what a sheet or a cloth mesh is made of."""
+    return SimpleNamespace(
+        **{name: getattr(shape, name) for name in ("cells", "size", "rest", "faces") if hasattr(shape, name)}
+    )
 
 
 class Colliders:
@@ -150,7 +144,8 @@ class FreeFall:
 @pytest.fixture
 def free_fall(monkeypatch):
     """Let worlds use the stand-in."""
-    monkeypatch.setattr(nuno.bodies.dynamics, "backend", lambda: (FreeFall, Topology, Colliders))
+    monkeypatch.setattr(nuno.bodies.dynamics, "backend", lambda: (FreeFall, Colliders))
+    monkeypatch.setattr(nuno.bodies.shape_topology, "_cloth_topology", topology_of)
     monkeypatch.setattr(FreeFall, "diverging", False)
     # it never touches itself
     monkeypatch.setattr(

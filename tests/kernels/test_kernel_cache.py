@@ -67,7 +67,7 @@ from nuno.kernels.kernel_modules import kernel_modules
 print([each.module.get_module_identifier(block_dim=1) for each in kernel_modules()])
 """
     first = run(tmp_path, "-c", told, PYTHONHASHSEED="1")
-    late = "import nuno.tasks.mat_sight, nuno.plans.simd_plan, nuno.plans.block_plan, nuno.camera.picture\n"
+    late = "import nuno.tasks.mat_sight, nuno.plans.cloth_worlds, nuno.plans.block_plan, nuno.camera.picture\n"
     assert run(tmp_path, "-c", late + told, PYTHONHASHSEED="2") == first
 
 

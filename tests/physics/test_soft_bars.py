@@ -7,7 +7,7 @@ from scipy.optimize import fsolve
 from soft_with import GRAVITY, block, hold, solver, traction
 
 import nuno
-from nuno.bodies.dynamics import topology_of
+from nuno.bodies.shape_topology import topology_of
 from nuno.bodies.soft_measures import deformation_gradients, elastic_energy, element_volumes, strains, stresses
 from nuno.topology.soft_topology import OWN_SHARE
 

@@ -8,7 +8,7 @@ from test_soft_bars import bend, stretches, twist
 
 import nuno
 from nuno import InvalidInputError
-from nuno.bodies.dynamics import topology_of
+from nuno.bodies.shape_topology import topology_of
 from nuno.bodies.soft_measures import deformation_gradients, elastic_energy, element_volumes, stresses
 
 YOUNG = 5e4

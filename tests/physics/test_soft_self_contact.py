@@ -8,7 +8,7 @@ from nuno.mesh.tetrahedra import box_tetrahedra
 
 CELL = 0.01  # [m]
 FORCE = 0.075  # [N] on each prong; without contact they would be 9 mm past each other
-SKIN = 5e-4  # [m], what is kept on each side (`nuno.world.coupled_bodies.SKIN`)
+SKIN = 5e-4  # [m], what is kept on each side (`nuno.world.coupled_tables.SKIN`)
 FOAM = {"density": 1000.0, "youngs_modulus": 5e4, "damping": 0.02}
 
 

@@ -112,7 +112,7 @@ def test_parts_of_substeps_that_found_no_room_are_gone_through_again(monkeypatch
     ends, cores = [], wp.get_device("cuda:0").sm_count
     for crowded in (False, True):
         if crowded:
-            monkeypatch.setattr("nuno.solvers.cloth_solver.cores_of", lambda _: 3 * cores)
+            monkeypatch.setattr("nuno.solvers.cloth_launches.cores_of", lambda _: 3 * cores)
         world = nuno.World(device="cuda:0", substeps=40)
         world.add(nuno.plane())
         cloth = world.add(nuno.sheet((0.5, 0.5), cells=(SIDE, SIDE), position=(0.0, 0.0, 0.02)))

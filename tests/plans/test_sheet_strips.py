@@ -8,7 +8,7 @@ import nuno
 from nuno.constraints.bending import bend_alpha
 from nuno.constraints.membrane import shear_alpha
 from nuno.numbers.warps import WARP
-from nuno.plans.cloth_substep import bend_lines, bend_twists, shear_cells
+from nuno.plans.cloth_elastic import bend_lines, bend_twists, shear_cells
 from nuno.plans.sheet_strips import fits_strips, line_strips, shear_strips, twist_strips
 from nuno.state.cloth_state import Settings, StateFloat, Topology
 from played_lanes import SUBSTEP, keep_moved, launch, played_lane, put_back, wrinkled_sheet

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.bodies.dynamics import vertex_shares
+from nuno.bodies.shape_topology import vertex_shares
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.hands import Hand, hands_of
 from nuno.robot.sensors import Sensors

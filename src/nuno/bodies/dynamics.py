@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -15,13 +14,13 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_particles
 from nuno.bodies.given_velocity import GivenVelocity
+from nuno.bodies.shape_topology import element_count, topology_of, vertex_shares
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import Grip
 from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
-from nuno.shapes.shape import ClothMesh, Plane, Shape, Sheet
-from nuno.shapes.soft_shape import SoftShape
+from nuno.shapes.shape import Plane, Shape
 from nuno.solvers.resolution import Resolution
 from nuno.validation import finite_array, number
 
@@ -239,7 +238,7 @@ class ParticleDynamics(Dynamics):
 
     def set_vertices(self, vertices: np.ndarray, velocities: np.ndarray, worlds: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s] (worlds, n, 3), in some worlds (k,)."""
-        from nuno.solvers.particle_solver import state_from
+        from nuno.solvers.particle_state import state_from
 
         self.load_worlds(worlds, state_from(vertices[worlds], velocities[worlds]))
 
@@ -380,38 +379,17 @@ def make_push(body: Body, force: ArrayLike, torque: Any, duration: float | None,
     return Push(np.array(np.broadcast_to(given, (worlds, n, 3)), dtype=np.float32), end)
 
 
-def element_count(shape: Shape) -> int:
-    """Return how many elements a material may tell apart: cells, faces of a cloth mesh, or tetrahedra."""
-    if isinstance(shape, Sheet):
-        return shape.cells[0] * shape.cells[1]
-    return len(shape.tetrahedra().tets) if isinstance(shape, SoftShape) else len(shape.mesh()[1])
-
-
-def vertex_shares(shape: Shape) -> np.ndarray:
-    """Return (n,) float, the area at rest around each vertex of a cloth [m2], or the volume of a soft body's [m3]."""
-    if shape.is_soft:
-        topology = topology_of(shape)
-        return np.asarray(topology.masses(np.ones((1, 1))))[0]
-    vertices, faces = shape.mesh()
-    if isinstance(shape, ClothMesh) and shape.rest is not None:
-        vertices = np.pad(shape.rest, ((0, 0), (0, 3 - shape.rest.shape[1])))
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
-
-
-def backend() -> tuple[Any, Any, Any]:
-    """Return the classes of the cloth solver, of its topology and of static shapes' tables; imported on first use."""
+def backend() -> tuple[Any, Any]:
+    """Return the classes of the cloth solver and of static shapes' tables; imported on first use."""
     from nuno.solvers.cloth_solver import ClothSolver
     from nuno.tables.colliders import Colliders
-    from nuno.topology.cloth_topology import ClothTopology
 
-    return ClothSolver, ClothTopology, Colliders
+    return ClothSolver, Colliders
 
 
 def make_colliders(bodies: list[Body], pair_friction: dict[str, Any], world: Simulation) -> Any:
     """Return what solvers need of the static bodies that they touch; ``pair_friction`` is by name."""
-    return backend()[2].from_bodies(bodies, world.world_count, world.device, pair_friction=pair_friction)
+    return backend()[1].from_bodies(bodies, world.world_count, world.device, pair_friction=pair_friction)
 
 
 def _solver_class(material: Material) -> Any:
@@ -420,24 +398,3 @@ def _solver_class(material: Material) -> Any:
 
         return SoftSolver
     return backend()[0]
-
-
-def topology_of(shape: Shape) -> Any:
-    """Return the elements of a cloth's or soft body's shape, made once."""
-    return _soft_topology(shape) if isinstance(shape, SoftShape) else _cloth_topology(shape, backend()[1])
-
-
-@lru_cache(maxsize=64)
-def _soft_topology(shape: SoftShape) -> Any:
-    from nuno.topology.soft_topology import SoftTopology
-
-    made = shape.tetrahedra()
-    return SoftTopology.of(made.vertices, made.tets, made.fraction, getattr(shape, "mean_strain", False))
-
-
-@lru_cache(maxsize=64)
-def _cloth_topology(shape: Shape, topology_class: Any) -> Any:
-    if isinstance(shape, Sheet):
-        return topology_class.sheet(shape.cells, shape.size)
-    assert isinstance(shape, ClothMesh)
-    return topology_class.mesh(shape.rest, shape.faces)

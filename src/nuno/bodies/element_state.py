@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import topology_of
+from nuno.bodies.shape_topology import topology_of
 from nuno.errors import InvalidInputError
 from nuno.materials import Soft
 from nuno.validation import instance

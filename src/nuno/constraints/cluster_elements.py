@@ -10,10 +10,11 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.mean_strain import MEAN, OWN, solve_mean
-from nuno.constraints.tetrahedron import COLUMNS, loose_bulk, solve_tetrahedron
+from nuno.constraints.tetrahedron import COLUMNS, element, loose_bulk, solve_tetrahedron
 from nuno.constraints.viscosity import damp_tetrahedron
-from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import absolute, add, anywhere, choose, full_like, lane, mul, sub  # noqa: F401
+from nuno.numbers.element_access import at
+from nuno.numbers.lanes import absolute, add, anywhere, choose, full_like, lane, mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.vec3 import position, put_position, put_velocity, velocity
 from nuno.state.soft_state import CLUSTER, SimdClusters, Tetrahedra
 
 
@@ -32,22 +33,19 @@ def four(numbers: wp.array(dtype=wp.vec4), i: int) -> wp.vec4:
 
 @wp.func
 def numbers_of(numbers: wp.array(dtype=wp.vec4), row: int):
-    """An element's `nuno.constraints.tetrahedron.COLUMNS`; with sixteen elements in a vector, of all of them."""
+    """An element's rest shape and its filled fraction; with sixteen elements in a vector, those of all of them."""
     low = four(numbers, 2 * row)
     high = four(numbers, 2 * row + 1)
-    return low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3]
+    return element(low[0], low[1], low[2], low[3], high[0], high[1], high[2]), high[3]
 
 
 @wp.func
 def numbers_of(numbers: wp.array(dtype=lane), row: int):
     k = row * COLUMNS
-    m11 = numbers[k]
-    m22 = numbers[k + 1]
-    m33 = numbers[k + 2]
-    m12 = numbers[k + 3]
-    m13 = numbers[k + 4]
-    m23 = numbers[k + 5]
-    return m11, m22, m33, m12, m13, m23, numbers[k + 6], numbers[k + 7]
+    shape = element(
+        numbers[k], numbers[k + 1], numbers[k + 2], numbers[k + 3], numbers[k + 4], numbers[k + 5], numbers[k + 6]
+    )
+    return shape, numbers[k + 7]
 
 
 @wp.func
@@ -104,72 +102,48 @@ def own_viscosity(t: Any, table: SimdClusters, k: int, slot: int, time: float, e
 
 @wp.func
 def elastic_numbers(t: Any, table: Any, k: int, row: int, slot: int, square: float, mu: Any, bulk: Any):
-    """Return what `solve_tetrahedron` asks of an element."""
+    """An element's rest shape and moduli, as `solve_tetrahedron` asks for them."""
     own, firm = own_stiffness(t, table, k, slot, square, mu, bulk)
-    m11, m22, m33, m12, m13, m23, inverse, filled = numbers_of(table.number, row + slot)
-    return m11, m22, m33, m12, m13, m23, inverse, own * filled, firm * filled
+    shape, filled = numbers_of(table.number, row + slot)
+    return shape, own * filled, firm * filled
 
 
 @wp.func
 def viscous_numbers(t: Any, table: Any, k: int, row: int, slot: int, time: Any, eta: Any):
-    """Return what `damp_tetrahedron` asks of an element."""
+    """An element's rest shape and viscosity, as `damp_tetrahedron` asks for them."""
     own = own_viscosity(t, table, k, slot, time, eta)
-    m11, m22, m33, m12, m13, m23, inverse, filled = numbers_of(table.number, row + slot)
-    return m11, m22, m33, m12, m13, m23, inverse, own * absolute(filled)
+    shape, filled = numbers_of(table.number, row + slot)
+    return shape, own * absolute(filled)
 
 
 @wp.func
-def place_of(t: Any, i: Any):
-    """Return where vertex i is [m], and its inverse mass [1/kg]."""
-    return at(t.x, i), at(t.y, i), at(t.z, i), at(t.w, i)
+def vertex(t: Any, i: Any):
+    """Vertex i's position [m], and its inverse mass [1/kg]."""
+    return position(t, i), at(t.w, i)
 
 
 @wp.func
-def speed_of(t: Any, i: Any):
-    """Vertex i's velocity [m/s]."""
-    return at(t.vx, i), at(t.vy, i), at(t.vz, i)
+def put_inner(t: Any, i: Any, j: Any, k: Any, m: Any, a: Any, b: Any, c: Any, d: Any):
+    """Put the inner element's four vertices."""
+    put_position(t, i, a)
+    put_position(t, j, b)
+    put_position(t, k, c)
+    put_position(t, m, d)
 
 
 @wp.func
-def put_place(t: Any, i: Any, x: Any, y: Any, z: Any):
-    """Put vertex i there [m]."""
-    put(t.x, i, x)
-    put(t.y, i, y)
-    put(t.z, i, z)
-
-
-@wp.func
-def put_speed(t: Any, i: Any, x: Any, y: Any, z: Any):
-    """Give vertex i this velocity [m/s]."""
-    put(t.vx, i, x)
-    put(t.vy, i, y)
-    put(t.vz, i, z)
-
-
-@wp.func
-def put_inner(
-    x: Any, y: Any, z: Any, a: Any, b: Any, c: Any, d: Any, ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any,
-    cx: Any, cy: Any, cz: Any, dx: Any, dy: Any, dz: Any,
-):  # fmt: skip
-    """Put the inner element's four vertices, or their velocities."""
-    put(x, a, ax)
-    put(y, a, ay)
-    put(z, a, az)
-    put(x, b, bx)
-    put(y, b, by)
-    put(z, b, bz)
-    put(x, c, cx)
-    put(y, c, cy)
-    put(z, c, cz)
-    put(x, d, dx)
-    put(y, d, dy)
-    put(z, d, dz)
+def put_inner_velocities(t: Any, i: Any, j: Any, k: Any, m: Any, a: Any, b: Any, c: Any, d: Any):
+    """Give the inner element's four vertices their velocities."""
+    put_velocity(t, i, a)
+    put_velocity(t, j, b)
+    put_velocity(t, k, c)
+    put_velocity(t, m, d)
 
 
 @wp.func
 def solve_cluster(
-    t: Any, table: Any, k: int, row: int, count: int, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any,
-    square: float, stiff: Any, bulky: Any, limit: float,
+    t: Any, table: Any, k: int, row: int, count: int, i0: Any, i1: Any, i2: Any, i3: Any, i4: Any, i5: Any, i6: Any,
+    i7: Any, square: float, stiff: Any, bulky: Any, limit: float,
 ):  # fmt: skip
     """The elasticity of cluster k: of the inner element (a, b, c, d), then of ``count`` outer ones.
 
@@ -179,150 +153,112 @@ def solve_cluster(
         k: Which.
         row: Where its numbers begin.
         count: How many outer elements it has.
-        a: The inner element's first vertex.
-        b: Its second.
-        c: Its third.
-        d: Its fourth.
-        e: The vertex of the outer element across from the first.
-        f: From the second.
-        g: From the third.
-        h: From the fourth.
+        i0: The inner element's first vertex.
+        i1: Its second.
+        i2: Its third.
+        i3: Its fourth.
+        i4: The vertex of the outer element across from the first.
+        i5: From the second.
+        i6: From the third.
+        i7: From the fourth.
         square: dt^2 [s2].
         stiff: The moduli where all elements have the same, as `stiffness` gives them.
         bulky: The second.
         limit: As `solve_tetrahedron` has it [m].
     """
-    ax, ay, az, wa = place_of(t, a)
-    bx, by, bz, wb = place_of(t, b)
-    cx, cy, cz, wc = place_of(t, c)
-    dx, dy, dz, wd = place_of(t, d)
-    m11, m22, m33, m12, m13, m23, inverse, mu, bulk = elastic_numbers(t, table, k, row, 0, square, stiff, bulky)
+    a, wa = vertex(t, i0)
+    b, wb = vertex(t, i1)
+    c, wc = vertex(t, i2)
+    d, wd = vertex(t, i3)
+    shape, mu, bulk = elastic_numbers(t, table, k, row, 0, square, stiff, bulky)
     own = full_like(mu, 1.0)
     if anywhere(0.0 - mu):  # a negative filled fraction: the voxel's mean has the rest of the stiffness
         part = choose(mu, 0.0, MEAN)
         own = choose(mu, own, OWN)
         mu = absolute(mu)
         bulk = absolute(bulk)
-        ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz = solve_mean(
-            t, e, f, g, h, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, wa, wb, wc, wd,
-            m11, m22, m33, m12, m13, m23, inverse, part * mu, part * bulk,
-        )  # fmt: skip
-    n11, n22, n33, n12, n13, n23, there, nu, firm = elastic_numbers(t, table, k, row, 1, square, stiff, bulky)
-    ex, ey, ez, we = place_of(t, e)
-    ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz = solve_tetrahedron(
-        t, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz, wa, wb, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
-    )  # fmt: skip
+        a, b, c, d = solve_mean(t, i4, i5, i6, i7, a, b, c, d, wa, wb, wc, wd, shape, part * mu, part * bulk)
+    other, nu, firm = elastic_numbers(t, table, k, row, 1, square, stiff, bulky)
+    e, we = vertex(t, i4)
+    a, b, c, d = solve_tetrahedron(t, i0, i1, i2, i3, a, b, c, d, wa, wb, wc, wd, shape, own * mu, own * bulk, limit)
     if count < 1:
-        put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
+        put_inner(t, i0, i1, i2, i3, a, b, c, d)
         return
-    m11, m22, m33, m12, m13, m23, inverse, mu, bulk = elastic_numbers(t, table, k, row, 2, square, stiff, bulky)
-    fx, fy, fz, wf = place_of(t, f)
-    ex, ey, ez, bx, by, bz, dx, dy, dz, cx, cy, cz = solve_tetrahedron(
-        t, e, b, d, c, ex, ey, ez, bx, by, bz, dx, dy, dz, cx, cy, cz, we, wb, wd, wc,
-        n11, n22, n33, n12, n13, n23, there, own * nu, own * firm, limit,
-    )  # fmt: skip
-    put_place(t, e, ex, ey, ez)
+    shape, mu, bulk = elastic_numbers(t, table, k, row, 2, square, stiff, bulky)
+    f, wf = vertex(t, i5)
+    e, b, d, c = solve_tetrahedron(t, i4, i1, i3, i2, e, b, d, c, we, wb, wd, wc, other, own * nu, own * firm, limit)
+    put_position(t, i4, e)
     if count < 2:
-        put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
+        put_inner(t, i0, i1, i2, i3, a, b, c, d)
         return
-    n11, n22, n33, n12, n13, n23, there, nu, firm = elastic_numbers(t, table, k, row, 3, square, stiff, bulky)
-    gx, gy, gz, wg = place_of(t, g)
-    fx, fy, fz, ax, ay, az, cx, cy, cz, dx, dy, dz = solve_tetrahedron(
-        t, f, a, c, d, fx, fy, fz, ax, ay, az, cx, cy, cz, dx, dy, dz, wf, wa, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
-    )  # fmt: skip
-    put_place(t, f, fx, fy, fz)
+    other, nu, firm = elastic_numbers(t, table, k, row, 3, square, stiff, bulky)
+    g, wg = vertex(t, i6)
+    f, a, c, d = solve_tetrahedron(t, i5, i0, i2, i3, f, a, c, d, wf, wa, wc, wd, shape, own * mu, own * bulk, limit)
+    put_position(t, i5, f)
     if count < 3:
-        put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
+        put_inner(t, i0, i1, i2, i3, a, b, c, d)
         return
-    m11, m22, m33, m12, m13, m23, inverse, mu, bulk = elastic_numbers(t, table, k, row, 4, square, stiff, bulky)
-    hx, hy, hz, wh = place_of(t, h)
-    gx, gy, gz, dx, dy, dz, bx, by, bz, ax, ay, az = solve_tetrahedron(
-        t, g, d, b, a, gx, gy, gz, dx, dy, dz, bx, by, bz, ax, ay, az, wg, wd, wb, wa,
-        n11, n22, n33, n12, n13, n23, there, own * nu, own * firm, limit,
-    )  # fmt: skip
-    put_place(t, g, gx, gy, gz)
+    shape, mu, bulk = elastic_numbers(t, table, k, row, 4, square, stiff, bulky)
+    h, wh = vertex(t, i7)
+    g, d, b, a = solve_tetrahedron(t, i6, i3, i1, i0, g, d, b, a, wg, wd, wb, wa, other, own * nu, own * firm, limit)
+    put_position(t, i6, g)
     if count < 4:
-        put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
+        put_inner(t, i0, i1, i2, i3, a, b, c, d)
         return
-    hx, hy, hz, cx, cy, cz, ax, ay, az, bx, by, bz = solve_tetrahedron(
-        t, h, c, a, b, hx, hy, hz, cx, cy, cz, ax, ay, az, bx, by, bz, wh, wc, wa, wb,
-        m11, m22, m33, m12, m13, m23, inverse, own * mu, own * bulk, limit,
-    )  # fmt: skip
-    put_place(t, h, hx, hy, hz)
-    put_inner(t.x, t.y, t.z, a, b, c, d, ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz)
+    h, c, a, b = solve_tetrahedron(t, i7, i2, i0, i1, h, c, a, b, wh, wc, wa, wb, shape, own * mu, own * bulk, limit)
+    put_position(t, i7, h)
+    put_inner(t, i0, i1, i2, i3, a, b, c, d)
 
 
 @wp.func
 def damp_cluster(
-    t: Any, table: Any, k: int, row: int, count: int, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any,
-    time: Any, every: Any,
+    t: Any, table: Any, k: int, row: int, count: int, i0: Any, i1: Any, i2: Any, i3: Any, i4: Any, i5: Any, i6: Any,
+    i7: Any, time: Any, every: Any,
 ):  # fmt: skip
     """The viscosity of cluster k, as `solve_cluster`.
 
     ``time`` is 2 tau dt [s2], ``every`` is mu times that where all elements have the same.
     """
-    ax, ay, az, wa = place_of(t, a)
-    bx, by, bz, wb = place_of(t, b)
-    cx, cy, cz, wc = place_of(t, c)
-    dx, dy, dz, wd = place_of(t, d)
-    sax, say, saz = speed_of(t, a)
-    sbx, sby, sbz = speed_of(t, b)
-    scx, scy, scz = speed_of(t, c)
-    sdx, sdy, sdz = speed_of(t, d)
-    m11, m22, m33, m12, m13, m23, inverse, eta = viscous_numbers(t, table, k, row, 0, time, every)
-    n11, n22, n33, n12, n13, n23, there, thick = viscous_numbers(t, table, k, row, 1, time, every)
-    ex, ey, ez, we = place_of(t, e)
-    sex, sey, sez = speed_of(t, e)
-    sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz = damp_tetrahedron(
-        ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz,
-        sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz, wa, wb, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, eta,
-    )  # fmt: skip
+    a, wa = vertex(t, i0)
+    b, wb = vertex(t, i1)
+    c, wc = vertex(t, i2)
+    d, wd = vertex(t, i3)
+    va = velocity(t, i0)
+    vb = velocity(t, i1)
+    vc = velocity(t, i2)
+    vd = velocity(t, i3)
+    shape, eta = viscous_numbers(t, table, k, row, 0, time, every)
+    other, thick = viscous_numbers(t, table, k, row, 1, time, every)
+    e, we = vertex(t, i4)
+    ve = velocity(t, i4)
+    va, vb, vc, vd = damp_tetrahedron(a, b, c, d, va, vb, vc, vd, wa, wb, wc, wd, shape, eta)
     if count < 1:
-        put_inner(t.vx, t.vy, t.vz, a, b, c, d, sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz)
+        put_inner_velocities(t, i0, i1, i2, i3, va, vb, vc, vd)
         return
-    m11, m22, m33, m12, m13, m23, inverse, eta = viscous_numbers(t, table, k, row, 2, time, every)
-    fx, fy, fz, wf = place_of(t, f)
-    sfx, sfy, sfz = speed_of(t, f)
-    sex, sey, sez, sbx, sby, sbz, sdx, sdy, sdz, scx, scy, scz = damp_tetrahedron(
-        ex, ey, ez, bx, by, bz, dx, dy, dz, cx, cy, cz,
-        sex, sey, sez, sbx, sby, sbz, sdx, sdy, sdz, scx, scy, scz, we, wb, wd, wc,
-        n11, n22, n33, n12, n13, n23, there, thick,
-    )  # fmt: skip
-    put_speed(t, e, sex, sey, sez)
+    shape, eta = viscous_numbers(t, table, k, row, 2, time, every)
+    f, wf = vertex(t, i5)
+    vf = velocity(t, i5)
+    ve, vb, vd, vc = damp_tetrahedron(e, b, d, c, ve, vb, vd, vc, we, wb, wd, wc, other, thick)
+    put_velocity(t, i4, ve)
     if count < 2:
-        put_inner(t.vx, t.vy, t.vz, a, b, c, d, sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz)
+        put_inner_velocities(t, i0, i1, i2, i3, va, vb, vc, vd)
         return
-    n11, n22, n33, n12, n13, n23, there, thick = viscous_numbers(t, table, k, row, 3, time, every)
-    gx, gy, gz, wg = place_of(t, g)
-    sgx, sgy, sgz = speed_of(t, g)
-    sfx, sfy, sfz, sax, say, saz, scx, scy, scz, sdx, sdy, sdz = damp_tetrahedron(
-        fx, fy, fz, ax, ay, az, cx, cy, cz, dx, dy, dz,
-        sfx, sfy, sfz, sax, say, saz, scx, scy, scz, sdx, sdy, sdz, wf, wa, wc, wd,
-        m11, m22, m33, m12, m13, m23, inverse, eta,
-    )  # fmt: skip
-    put_speed(t, f, sfx, sfy, sfz)
+    other, thick = viscous_numbers(t, table, k, row, 3, time, every)
+    g, wg = vertex(t, i6)
+    vg = velocity(t, i6)
+    vf, va, vc, vd = damp_tetrahedron(f, a, c, d, vf, va, vc, vd, wf, wa, wc, wd, shape, eta)
+    put_velocity(t, i5, vf)
     if count < 3:
-        put_inner(t.vx, t.vy, t.vz, a, b, c, d, sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz)
+        put_inner_velocities(t, i0, i1, i2, i3, va, vb, vc, vd)
         return
-    m11, m22, m33, m12, m13, m23, inverse, eta = viscous_numbers(t, table, k, row, 4, time, every)
-    hx, hy, hz, wh = place_of(t, h)
-    shx, shy, shz = speed_of(t, h)
-    sgx, sgy, sgz, sdx, sdy, sdz, sbx, sby, sbz, sax, say, saz = damp_tetrahedron(
-        gx, gy, gz, dx, dy, dz, bx, by, bz, ax, ay, az,
-        sgx, sgy, sgz, sdx, sdy, sdz, sbx, sby, sbz, sax, say, saz, wg, wd, wb, wa,
-        n11, n22, n33, n12, n13, n23, there, thick,
-    )  # fmt: skip
-    put_speed(t, g, sgx, sgy, sgz)
+    shape, eta = viscous_numbers(t, table, k, row, 4, time, every)
+    h, wh = vertex(t, i7)
+    vh = velocity(t, i7)
+    vg, vd, vb, va = damp_tetrahedron(g, d, b, a, vg, vd, vb, va, wg, wd, wb, wa, other, thick)
+    put_velocity(t, i6, vg)
     if count < 4:
-        put_inner(t.vx, t.vy, t.vz, a, b, c, d, sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz)
+        put_inner_velocities(t, i0, i1, i2, i3, va, vb, vc, vd)
         return
-    shx, shy, shz, scx, scy, scz, sax, say, saz, sbx, sby, sbz = damp_tetrahedron(
-        hx, hy, hz, cx, cy, cz, ax, ay, az, bx, by, bz,
-        shx, shy, shz, scx, scy, scz, sax, say, saz, sbx, sby, sbz, wh, wc, wa, wb,
-        m11, m22, m33, m12, m13, m23, inverse, eta,
-    )  # fmt: skip
-    put_speed(t, h, shx, shy, shz)
-    put_inner(t.vx, t.vy, t.vz, a, b, c, d, sax, say, saz, sbx, sby, sbz, scx, scy, scz, sdx, sdy, sdz)
+    vh, vc, va, vb = damp_tetrahedron(h, c, a, b, vh, vc, va, vb, wh, wc, wa, wb, shape, eta)
+    put_velocity(t, i7, vh)
+    put_inner_velocities(t, i0, i1, i2, i3, va, vb, vc, vd)

@@ -87,29 +87,29 @@ def damp_patch(t: Any, table: Any, k: int, alpha: Any, gamma: Any):
 
 
 @wp.func
-def damp_bends(t: Any, table: Any, run: Settings, rank: int, size: int, those: Any):
-    """The damping of all bends, colour by colour, by ``those``: the threads of a block, so many, or a block group."""
+def damp_bends(t: Any, table: Any, run: Settings, crew: Any):
+    """The damping of all bends, colour by colour, by a crew that waits for itself."""
     rate = 1.0 / (run.dt * run.dt)
     damping = t.scalars[DAMPING] * (1.0 / run.dt)
     for colour in range(table.patch_colour.shape[0] - 1):
-        for k in range(table.patch_colour[colour] + rank, table.patch_colour[colour + 1], size):
+        for k in range(table.patch_colour[colour] + crew.rank, table.patch_colour[colour + 1], crew.size):
             alpha = product(at(t.bend_compliance, table.patch_compliance[k]), rate)
             damp_patch(t, table, k, alpha, factor_like(alpha, damping))
-        wait_for(those)
+        wait_for(crew)
     for colour in range(table.twist_colour.shape[0] - 1):
-        for k in range(table.twist_colour[colour] + rank, table.twist_colour[colour + 1], size):
+        for k in range(table.twist_colour[colour] + crew.rank, table.twist_colour[colour + 1], crew.size):
             alpha = bend_alpha(at(t.bend_compliance, table.twist_compliance[k]), table.twist_scale[k], rate)
             a = corner(table.twist, k, 0, 4)
             b = corner(table.twist, k, 1, 4)
             c = corner(table.twist, k, 2, 4)
             d = corner(table.twist, k, 3, 4)
             damp_twist(t, a, b, c, d, alpha, factor_like(alpha, damping))
-        wait_for(those)
+        wait_for(crew)
     for colour in range(table.line_colour.shape[0] - 1):
-        for k in range(table.line_colour[colour] + rank, table.line_colour[colour + 1], size):
+        for k in range(table.line_colour[colour] + crew.rank, table.line_colour[colour + 1], crew.size):
             alpha = bend_alpha(at(t.bend_compliance, table.line_compliance[k]), table.line_scale[k], rate)
             a = corner(table.line, k, 0, 3)
             b = corner(table.line, k, 1, 3)
             c = corner(table.line, k, 2, 3)
             damp_line(t, a, b, c, alpha, factor_like(alpha, damping))
-        wait_for(those)
+        wait_for(crew)

@@ -10,37 +10,42 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import add, anywhere, full_like, mul, sub  # noqa: F401
+from nuno.numbers.lanes import add, anywhere, full_like, mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.vec3 import dot, put_start_position, start_position, vec3
 
 
 @wp.func
-def shift_position(t: Any, i: Any, x: Any, y: Any, z: Any, s: Any):
-    """Note that particle i is moved by s (x, y, z) without speed."""
-    put(t.shift_x, i, at(t.shift_x, i) + s * x)
-    put(t.shift_y, i, at(t.shift_y, i) + s * y)
-    put(t.shift_z, i, at(t.shift_z, i) + s * z)
+def shift_of(t: Any, i: Any):
+    """Particle i's motion without speed in the substep [m]."""
+    return vec3(at(t.shift_x, i), at(t.shift_y, i), at(t.shift_z, i))
 
 
 @wp.func
-def motion_of(t: Any, i: Any, x: Any, y: Any, z: Any):
-    """Return what particle i, which is now at x, y, z, has moved in the substep with speed [m]."""
-    return (
-        x - at(t.px, i) - at(t.shift_x, i), y - at(t.py, i) - at(t.shift_y, i), z - at(t.pz, i) - at(t.shift_z, i)
-    )  # fmt: skip
+def put_shift(t: Any, i: Any, v: Any):
+    """Write particle i's motion without speed."""
+    put(t.shift_x, i, v.x)
+    put(t.shift_y, i, v.y)
+    put(t.shift_z, i, v.z)
+
+
+@wp.func
+def shift_position(t: Any, i: Any, way: Any, s: Any):
+    """Note that particle i is moved by s times a vector without speed."""
+    put_shift(t, i, shift_of(t, i) + s * way)
+
+
+@wp.func
+def motion_of(t: Any, i: Any, place: Any):
+    """Particle i's motion with speed in the substep, now that it is at a place [m]."""
+    return place - start_position(t, i) - shift_of(t, i)
 
 
 @wp.func
 def clear_shifts(t: Any, n: int, rank: int, size: int):
     """Let the substep have begun as much later on, before velocities are read."""
     for i in range(rank, n, size):
-        x = at(t.shift_x, i)
-        y = at(t.shift_y, i)
-        z = at(t.shift_z, i)
-        if anywhere(x * x + y * y + z * z):
-            put(t.px, i, at(t.px, i) + x)
-            put(t.py, i, at(t.py, i) + y)
-            put(t.pz, i, at(t.pz, i) + z)
-            zero = full_like(x, 0.0)
-            put(t.shift_x, i, zero)
-            put(t.shift_y, i, zero)
-            put(t.shift_z, i, zero)
+        shift = shift_of(t, i)
+        if anywhere(dot(shift, shift)):
+            put_start_position(t, i, start_position(t, i) + shift)
+            zero = full_like(shift.x, 0.0)
+            put_shift(t, i, vec3(zero, zero, zero))

@@ -6,7 +6,15 @@ import warp as wp
 
 from nuno.constraints.position_shifts import motion_of, shift_position
 from nuno.numbers.element_access import factor_like
-from nuno.numbers.lanes import (  # noqa: F401
+from nuno.numbers.fused_vec3 import (
+    combination,
+    fused_add_dot,
+    fused_cross,
+    fused_dot,
+    fused_subtract_vec,
+    fused_vec,
+)
+from nuno.numbers.lanes import (  # noqa: F401 (add, div, mul, sub: the operators)
     add,
     anywhere,
     choose,
@@ -22,6 +30,7 @@ from nuno.numbers.lanes import (  # noqa: F401
     sqrt,
     sub,
 )
+from nuno.numbers.vec3 import LaneMat3, Mat3, mat3, vec3
 from nuno.state.soft_state import INVERTED, SEEN
 
 COLUMNS = 8
@@ -48,155 +57,106 @@ STRETCHED = wp.constant(12.0)
 rest, 12 at twice its size."""
 
 
-@wp.func
-def dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
-    """The scalar product."""
-    return fused(az, bz, fused(ay, by, ax * bx))
+@wp.struct
+class Element:
+    """An element's rest shape: with B the inverse rest matrix and v the rest volume."""
+
+    m: Mat3  # v B B^T
+    inverse: float  # 1 / (6 v)
+
+
+@wp.struct
+class LaneElement:
+    """Sixteen elements' rest shapes."""
+
+    m: LaneMat3
+    inverse: lane
 
 
 @wp.func
-def cross(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any):
-    """The vector product."""
-    x = fused_subtract(az, by, ay * bz)
-    y = fused_subtract(ax, bz, az * bx)
-    z = fused_subtract(ay, bx, ax * by)
-    return x, y, z
+def element(m11: float, m22: float, m33: float, m12: float, m13: float, m23: float, inverse: float):
+    """The rest shape of the first of an element's `COLUMNS`."""
+    shape = Element()
+    shape.m = mat3(vec3(m11, m12, m13), vec3(m12, m22, m23), vec3(m13, m23, m33))
+    shape.inverse = inverse
+    return shape
 
 
 @wp.func
-def add_dot(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any, c: Any):
-    """The scalar product plus c."""
-    return fused(az, bz, fused(ay, by, fused(ax, bx, c)))
+def element(m11: lane, m22: lane, m33: lane, m12: lane, m13: lane, m23: lane, inverse: lane):
+    shape = LaneElement()
+    shape.m = mat3(vec3(m11, m12, m13), vec3(m12, m22, m23), vec3(m13, m23, m33))
+    shape.inverse = inverse
+    return shape
 
 
 @wp.func
-def element_reply(
-    ex: Any,
-    ey: Any,
-    ez: Any,
-    fx: Any,
-    fy: Any,
-    fz: Any,
-    gx: Any,
-    gy: Any,
-    gz: Any,
-    wa: Any,
-    wb: Any,
-    wc: Any,
-    wd: Any,
-    m11: Any,
-    m22: Any,
-    m33: Any,
-    m12: Any,
-    m13: Any,
-    m23: Any,
-    inverse: Any,
-    mu: Any,
-    bulk: Any,
-):
+def times_row(s: Any, row: Any):
+    """A row of a matrix times a number, which may be lanes where the row is of floats."""
+    return vec3(s * row.x, s * row.y, s * row.z)
+
+
+@wp.func
+def steepness(m: Any):
+    """The first corner's own number: the sum of all those of the other three, |grad N_a|^2 v."""
+    return m.x.x + m.y.y + m.z.z + (m.x.y + m.x.z + m.y.z) * 2.0
+
+
+@wp.func
+def element_reply(e: Any, f: Any, g: Any, wa: Any, wb: Any, wc: Any, wd: Any, shape: Any, mu: Any, bulk: Any):
     """The work of `solve_tetrahedron` on edges e, f and g from the first corner to the others, for any element.
 
     Returns:
-        The corners' steps -dx / (sigma w) of b, c and d, and dx / (sigma w) of a: x, y and z of a, b, c and d; sigma;
-        J; and a number that is positive where the element is inside out or stretched beyond `STRETCHED`.
+        The corners' steps dx / (sigma w) of a, and -dx / (sigma w) of b, c and d; sigma; J; and a number that is
+        positive where the element is inside out or stretched beyond `STRETCHED`.
     """
     # the gradient of six times the volume by b, c and d
-    nbx, nby, nbz = cross(fx, fy, fz, gx, gy, gz)
-    ncx, ncy, ncz = cross(gx, gy, gz, ex, ey, ez)
-    ndx, ndy, ndz = cross(ex, ey, ez, fx, fy, fz)
-    one = full_like(ex, 1.0)
-    j = dot(ex, ey, ez, nbx, nby, nbz) * inverse
-    maa = m11 + m22 + m33 + (m12 + m13 + m23) * 2.0
-    reply = fused(wd, factor_like(wd, m33), fused(wc, factor_like(wc, m22), fused(wb, factor_like(wb, m11), wa * maa)))
-    most_stiff = CARRIED / (reply + 1.0e-30)
-    mu = minimum(mu, most_stiff)
-    bulk = minimum(bulk, most_stiff)
+    nb = fused_cross(f, g)
+    nc = fused_cross(g, e)
+    nd = fused_cross(e, f)
+    one = full_like(e.x, 1.0)
+    m = shape.m
+    j = fused_dot(e, nb) * shape.inverse
+    reply = wa * steepness(m)
+    reply = fused(wb, factor_like(wb, m.x.x), reply)
+    reply = fused(wd, factor_like(wd, m.z.z), fused(wc, factor_like(wc, m.y.y), reply))
+    max_stiffness = CARRIED / (reply + 1.0e-30)
+    mu = minimum(mu, max_stiffness)
+    bulk = minimum(bulk, max_stiffness)
     pressure = (bulk * (j - one) - mu) * (1.0 / 6.0)
-    k11 = mu * m11
-    k22 = mu * m22
-    k33 = mu * m33
-    k12 = mu * m12
-    k13 = mu * m13
-    k23 = mu * m23
-    kbx, kby, kbz = combine(k11, k12, k13, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    kcx, kcy, kcz = combine(k12, k22, k23, ex, ey, ez, fx, fy, fz, gx, gy, gz)
-    kdx, kdy, kdz = combine(k13, k23, k33, ex, ey, ez, fx, fy, fz, gx, gy, gz)
+    kb = combination(times_row(mu, m.x), e, f, g)
+    kc = combination(times_row(mu, m.y), e, f, g)
+    kd = combination(times_row(mu, m.z), e, f, g)
     # |F|^2 mu v = e k: k is the gradient of half of it
-    squares = add_dot(ex, ey, ez, kbx, kby, kbz, add_dot(fx, fy, fz, kcx, kcy, kcz, dot(gx, gy, gz, kdx, kdy, kdz)))
+    squares = fused_add_dot(e, kb, fused_add_dot(f, kc, fused_dot(g, kd)))
     # |F|^2 mu
-    stretched = squares * inverse * 6.0
-    kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz = weakened(mu, stretched, kbx, kby, kbz, kcx, kcy, kcz, kdx, kdy, kdz)
+    stretched = squares * shape.inverse * 6.0
+    kb, kc, kd = weakened(mu, stretched, kb, kc, kd)
     # W n: how the edges go where the corners follow the volume's gradient
-    ux = wa * (nbx + ncx + ndx)
-    uy = wa * (nby + ncy + ndy)
-    uz = wa * (nbz + ncz + ndz)
-    ubx = fused(wb, nbx, ux)
-    uby = fused(wb, nby, uy)
-    ubz = fused(wb, nbz, uz)
-    ucx = fused(wc, ncx, ux)
-    ucy = fused(wc, ncy, uy)
-    ucz = fused(wc, ncz, uz)
-    udx = fused(wd, ndx, ux)
-    udy = fused(wd, ndy, uy)
-    udz = fused(wd, ndz, uz)
-    uk = add_dot(ubx, uby, ubz, kbx, kby, kbz, add_dot(ucx, ucy, ucz, kcx, kcy, kcz, dot(udx, udy, udz, kdx, kdy, kdz)))
-    un = add_dot(ubx, uby, ubz, nbx, nby, nbz, add_dot(ucx, ucy, ucz, ncx, ncy, ncz, dot(udx, udy, udz, ndx, ndy, ndz)))
+    u = wa * (nb + nc + nd)
+    ub = fused_vec(wb, nb, u)
+    uc = fused_vec(wc, nc, u)
+    ud = fused_vec(wd, nd, u)
+    uk = fused_add_dot(ub, kb, fused_add_dot(uc, kc, fused_dot(ud, kd)))
+    un = fused_add_dot(ub, nb, fused_add_dot(uc, nc, fused_dot(ud, nd)))
     shear = mu * reply
     sigma = one / fused(shear, fused(shear, full_like(one, SHARE_STIFF), full_like(one, SHARE)), one)
-    h = bulk * inverse * (1.0 / 6.0)
+    h = bulk * shape.inverse * (1.0 / 6.0)
     volume = sigma * h * un
     replied = fused(volume, fused(volume, full_like(one, VOLUME_STIFF), full_like(one, VOLUME_SHARE)), one)
     p = fused_subtract(h, sigma * fused(pressure, un, uk) / replied, pressure)
-    rbx = fused(p, nbx, kbx)
-    rby = fused(p, nby, kby)
-    rbz = fused(p, nbz, kbz)
-    rcx = fused(p, ncx, kcx)
-    rcy = fused(p, ncy, kcy)
-    rcz = fused(p, ncz, kcz)
-    rdx = fused(p, ndx, kdx)
-    rdy = fused(p, ndy, kdy)
-    rdz = fused(p, ndz, kdz)
-    rax = rbx + rcx + rdx
-    ray = rby + rcy + rdy
-    raz = rbz + rcz + rdz
+    rb = fused_vec(p, nb, kb)
+    rc = fused_vec(p, nc, kc)
+    rd = fused_vec(p, nd, kd)
     bad = maximum(0.0 - j, stretched - mu * STRETCHED)
-    return rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad
+    return rb + rc + rd, rb, rc, rd, sigma, j, bad
 
 
 @wp.func
 def solve_tetrahedron(
-    t: Any,
-    a: Any,
-    b: Any,
-    c: Any,
-    d: Any,
-    ax: Any,
-    ay: Any,
-    az: Any,
-    bx: Any,
-    by: Any,
-    bz: Any,
-    cx: Any,
-    cy: Any,
-    cz: Any,
-    dx: Any,
-    dy: Any,
-    dz: Any,
-    wa: Any,
-    wb: Any,
-    wc: Any,
-    wd: Any,
-    m11: Any,
-    m22: Any,
-    m33: Any,
-    m12: Any,
-    m13: Any,
-    m23: Any,
-    inverse: Any,
-    mu: Any,
-    bulk: Any,
-    limit: float,
-):
+    t: Any, i: Any, j: Any, k: Any, m: Any, a: Any, b: Any, c: Any, d: Any, wa: Any, wb: Any, wc: Any, wd: Any,
+    shape: Any, mu: Any, bulk: Any, limit: float,
+):  # fmt: skip
     """Energy v (mu / 2 (|F|^2 - 3) + bulk / 2 (J - 1 - mu / bulk)^2), F the deformation gradient, J its determinant.
 
     The stable neo-Hookean energy (Smith et al. 2018) in the form of Macklin and Mueller 2021, whose two constraints
@@ -219,33 +179,19 @@ def solve_tetrahedron(
 
     Args:
         t: The state.
-        a: The element's first vertex.
-        b: Its second.
-        c: Its third.
-        d: Its fourth.
-        ax: Where the first is, along x [m]; likewise the others.
-        ay: y.
-        az: z.
-        bx: x.
-        by: y.
-        bz: z.
-        cx: x.
-        cy: y.
-        cz: z.
-        dx: x.
-        dy: y.
-        dz: z.
-        wa: Inverse mass of the first [1/kg]; likewise the others.
+        i: The element's first vertex.
+        j: Its second.
+        k: Its third.
+        m: Its fourth.
+        a: The first one's position [m]; likewise the others'.
+        b: The second's.
+        c: The third's.
+        d: The fourth's.
+        wa: Inverse mass of the first [1/kg]; likewise the others'.
         wb: Of the second.
         wc: Of the third.
         wd: Of the fourth.
-        m11: Column 0 of the element's numbers (see `COLUMNS`), and so on.
-        m22: Column 1.
-        m33: Column 2.
-        m12: Column 3.
-        m13: Column 4.
-        m23: Column 5.
-        inverse: 1 / (6 v).
+        shape: The rest shape, an `Element` or sixteen.
         mu: Shear modulus times dt^2 and the filled fraction.
         bulk: First Lame parameter plus shear modulus, times the same.
         limit: The farthest that such an element moves a corner [m].
@@ -253,20 +199,9 @@ def solve_tetrahedron(
     An element whose numbers are all zero moves nothing.
 
     Returns:
-        Where the corners are then: x, y and z of the first, and so on [m].
+        The corners' positions then [m].
     """
-    ex = bx - ax
-    ey = by - ay
-    ez = bz - az
-    fx = cx - ax
-    fy = cy - ay
-    fz = cz - az
-    gx = dx - ax
-    gy = dy - ay
-    gz = dz - az
-    rax, ray, raz, rbx, rby, rbz, rcx, rcy, rcz, rdx, rdy, rdz, sigma, j, bad = element_reply(
-        ex, ey, ez, fx, fy, fz, gx, gy, gz, wa, wb, wc, wd, m11, m22, m33, m12, m13, m23, inverse, mu, bulk
-    )
+    ra, rb, rc, rd, sigma, volume, bad = element_reply(b - a, c - a, d - a, wa, wb, wc, wd, shape, mu, bulk)
     one = full_like(sigma, 1.0)
     ha = sigma * wa
     hb = sigma * wb
@@ -274,16 +209,10 @@ def solve_tetrahedron(
     hd = sigma * wd
     if anywhere(bad):
         zero = full_like(one, 0.0)
-        note_inverted(t.notes, choose(zero - j, one, zero))
+        note_inverted(t.notes, choose(zero - volume, one, zero))
         far = maximum(
-            maximum(
-                ha * ha * dot(rax, ray, raz, rax, ray, raz),
-                hb * hb * dot(rbx, rby, rbz, rbx, rby, rbz),
-            ),
-            maximum(
-                hc * hc * dot(rcx, rcy, rcz, rcx, rcy, rcz),
-                hd * hd * dot(rdx, rdy, rdz, rdx, rdy, rdz),
-            ),
+            maximum(ha * ha * fused_dot(ra, ra), hb * hb * fused_dot(rb, rb)),
+            maximum(hc * hc * fused_dot(rc, rc), hd * hd * fused_dot(rd, rd)),
         )
         farthest = full_like(one, limit)
         keep = choose(bad, farthest / maximum(sqrt(far), farthest), one)
@@ -292,34 +221,17 @@ def solve_tetrahedron(
         hc = hc * keep
         hd = hd * keep
         # where the forces work on the corners' motion so far, they give it no speed
-        uax, uay, uaz = motion_of(t, a, ax, ay, az)
-        ubx, uby, ubz = motion_of(t, b, bx, by, bz)
-        ucx, ucy, ucz = motion_of(t, c, cx, cy, cz)
-        udx, udy, udz = motion_of(t, d, dx, dy, dz)
-        work = (
-            dot(rax, ray, raz, uax, uay, uaz)
-            - dot(rbx, rby, rbz, ubx, uby, ubz)
-            - dot(rcx, rcy, rcz, ucx, ucy, ucz)
-            - dot(rdx, rdy, rdz, udx, udy, udz)
-        )
+        work = fused_dot(ra, motion_of(t, i, a)) - fused_dot(rb, motion_of(t, j, b))
+        work = work - fused_dot(rc, motion_of(t, k, c)) - fused_dot(rd, motion_of(t, m, d))
         shifted = choose(bad, choose(work, one, zero), zero)
-        shift_position(t, a, rax, ray, raz, ha * shifted)
-        shift_position(t, b, rbx, rby, rbz, zero - hb * shifted)
-        shift_position(t, c, rcx, rcy, rcz, zero - hc * shifted)
-        shift_position(t, d, rdx, rdy, rdz, zero - hd * shifted)
-    ax = fused(ha, rax, ax)
-    ay = fused(ha, ray, ay)
-    az = fused(ha, raz, az)
-    bx = fused_subtract(hb, rbx, bx)
-    by = fused_subtract(hb, rby, by)
-    bz = fused_subtract(hb, rbz, bz)
-    cx = fused_subtract(hc, rcx, cx)
-    cy = fused_subtract(hc, rcy, cy)
-    cz = fused_subtract(hc, rcz, cz)
-    dx = fused_subtract(hd, rdx, dx)
-    dy = fused_subtract(hd, rdy, dy)
-    dz = fused_subtract(hd, rdz, dz)
-    return ax, ay, az, bx, by, bz, cx, cy, cz, dx, dy, dz
+        shift_position(t, i, ra, ha * shifted)
+        shift_position(t, j, rb, zero - hb * shifted)
+        shift_position(t, k, rc, zero - hc * shifted)
+        shift_position(t, m, rd, zero - hd * shifted)
+    a = fused_vec(ha, ra, a)
+    b = fused_subtract_vec(hb, rb, b)
+    c = fused_subtract_vec(hc, rc, c)
+    return a, b, c, fused_subtract_vec(hd, rd, d)
 
 
 @wp.func
@@ -329,30 +241,12 @@ def loose_bulk(t: Any, mu: Any, bulk: Any):
 
 
 @wp.func
-def weakened(mu: Any, stretched: Any, ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any, cx: Any, cy: Any, cz: Any):
+def weakened(mu: Any, stretched: Any, a: Any, b: Any, c: Any):
     """The shear's forces a, b and c times |F|^2 where that is below 1; ``stretched`` is |F|^2 mu."""
     if not anywhere(mu - stretched):
-        return ax, ay, az, bx, by, bz, cx, cy, cz
+        return a, b, c
     small = minimum(stretched / mu, 1.0)
-    ax = ax * small
-    ay = ay * small
-    az = az * small
-    bx = bx * small
-    by = by * small
-    bz = bz * small
-    cx = cx * small
-    cy = cy * small
-    cz = cz * small
-    return ax, ay, az, bx, by, bz, cx, cy, cz
-
-
-@wp.func
-def combine(a: Any, b: Any, c: Any, ex: Any, ey: Any, ez: Any, fx: Any, fy: Any, fz: Any, gx: Any, gy: Any, gz: Any):
-    """The three edges' sum with the weights a, b and c."""
-    x = fused(c, gx, fused(b, fx, a * ex))
-    y = fused(c, gy, fused(b, fy, a * ey))
-    z = fused(c, gz, fused(b, fz, a * ez))
-    return x, y, z
+    return a * small, b * small, c * small
 
 
 @wp.func

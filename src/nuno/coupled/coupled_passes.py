@@ -10,7 +10,7 @@ from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees, project_trees
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, island_of, note_wrong
 from nuno.coupled.tie_constraints import Holds, Ties, project_hold, project_tie, sum_hold, sum_tie
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 from nuno.numbers.warps import anyone
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import Contacts

@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.pass_progress import Passing, goes_on, island_of, note_wrong
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, POINTS, Contacts
 from nuno.rigid.rigid_body import RigidState, rotation_between

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 
 ENOUGH = wp.constant(1.0e-8)
 """[m] Passes end once nothing is farther than this from where it should be."""

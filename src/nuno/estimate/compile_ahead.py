@@ -13,7 +13,7 @@ import warp as wp
 
 from nuno.camera import extent, raster
 from nuno.estimate import pattern, similarity
-from nuno.plans.cloth_substep import run_lanes
+from nuno.plans.cloth_worlds import run_lanes
 from nuno.state import pack
 
 THREADS = 2

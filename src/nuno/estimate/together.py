@@ -34,7 +34,8 @@ from nuno.estimate.hypotheses import Discretisation
 if TYPE_CHECKING:
     import warp as wp
 
-    from nuno.solvers.particle_solver import Kept, ParticleSolver
+    from nuno.solvers.particle_solver import ParticleSolver
+    from nuno.solvers.particle_state import Kept
 
 LOOKS = 5
 """Moments that a device goes through without being waited for."""

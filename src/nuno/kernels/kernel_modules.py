@@ -18,7 +18,7 @@ BLOCK_SIZE = 256
 CPU_ONLY = frozenset(
     f"nuno.plans.{name}"
     for name in (
-        "run_worlds", "run_lanes", "run_double_worlds", "run_double_lanes", "simd_plan", "run_double_simd",
+        "run_worlds", "run_lanes", "run_double_worlds", "run_double_lanes", "run_simd", "run_double_simd",
         "run_soft_worlds", "run_soft_lanes", "run_soft_simd",
         "run_soft_double_worlds", "run_soft_double_lanes", "run_soft_double_simd",
     )

@@ -9,7 +9,7 @@ the device without the others, for the device is shared by turns as a whole or b
 
 import warp as wp
 
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import Crew, barrier
 
 PATIENCE = 200_000_000
 """[ns] How long the blocks wait for all to answer."""
@@ -36,9 +36,12 @@ class BlockGroup:
     # within the block
     rank_in_block: int
     block_size: int
+    # figures that the blocks share, and where the world's begin among them
+    shared: wp.array(dtype=float)
+    first_shared: int
     # among all, the warps of all blocks by turns: what has work for few is then spread over all multiprocessors
     rank: int
-    group_size: int
+    size: int
 
 
 @wp.func
@@ -52,7 +55,7 @@ def block_group_of(tid: int, barrier_counts: wp.array(dtype=int), call: int, wor
     block_group.blocks = blocks
     block_group.rank_in_block = tid % block_size
     block_group.block_size = block_size
-    block_group.group_size = blocks * block_size
+    block_group.size = blocks * block_size
     block_group.rank = block_group.rank_in_block
     if block_size % 32 == 0:
         block_group.rank = (
@@ -100,13 +103,40 @@ def grid_barrier(block_group: BlockGroup):
 
 @wp.func
 def wait_for(crew: int):
-    """Wait for all threads of the block, so many, or for all of a block group."""
+    """Wait for the whole crew: the threads of a block, so many, or all of a block group."""
     barrier(crew)
+
+
+@wp.func
+def wait_for(crew: Crew):
+    barrier(crew.size)
 
 
 @wp.func
 def wait_for(crew: BlockGroup):
     grid_barrier(crew)
+
+
+@wp.func
+def wait_for_block(crew: Crew):
+    """Wait for those of the crew that are in the same block."""
+    barrier(crew.size)
+
+
+@wp.func
+def wait_for_block(crew: BlockGroup):
+    barrier(crew.block_size)
+
+
+@wp.func
+def rank_in_block(crew: Crew):
+    """The rank among those of the crew that are in the same block, who share its figures."""
+    return crew.rank
+
+
+@wp.func
+def rank_in_block(crew: BlockGroup):
+    return crew.rank_in_block
 
 
 @wp.func_native("""

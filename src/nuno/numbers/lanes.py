@@ -396,25 +396,3 @@ def per_world(like: lane, table: wp.array(dtype=float), group: int, stride: int,
         for k in range(16):
             r[k] = table[wp.min(group * 16 + k, worlds - 1) * stride + entry]
     return r
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-if (size > 1) __syncthreads();
-#endif
-""")
-def barrier(size: int):
-    """Wait for all threads of the block; nothing to wait for on the CPU."""
-    ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-return true;
-#else
-return size > 1;
-#endif
-""")
-def shares_work(size: int) -> bool:
-    """Return whether threads share the work; known to CUDA's compiler at once, which then leaves the rest out."""
-    ...

@@ -11,20 +11,22 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.self.search_queue import close_queue, search_for_others
-from nuno.numbers.lanes import barrier
-from nuno.plans.cloth_substep import advance
+from nuno.numbers.crew import barrier, crew_of
 from nuno.plans.shared_memory import (
     DOUBLE_PARTICLES,
     SHARED_PARTICLES,
     WHOLE_PARTICLES,
+    bring_figures,
+    bring_notes,
     column,
     counts,
     double_column,
     figures,
     whole,
 )
+from nuno.plans.substep import advance
 from nuno.plans.world_queue import end_slice, next_slice
-from nuno.state.cloth_state import COUNTS, NOTES, Settings, Shapes, Sizes, StateDouble, StateFloat, Topology, view
+from nuno.state.cloth_state import COUNTS, Settings, Shapes, Sizes, StateDouble, StateFloat, Topology, view
 
 BLOCKS_AT_ONCE = 2
 """Blocks of 256 threads that a multiprocessor's registers must have room for; left to itself, the compiler takes all
@@ -64,20 +66,16 @@ def advance_block(
             t.pair_count[k] = device_pairs[k]
         for k in range(2):
             t.active_count[k] = device_active[k]
-        for k in range(7):
-            t.scalars[k] = scalars[k]
-        for k in range(NOTES):
-            t.notes[k] = notes[k]
+    bring_figures(t, scalars, notes, rank)
     barrier(size)
-    advance(t, near, topo, run, shapes, substeps, rank, size)
+    advance(t, t, near, near, topo, topo, run, shapes, 0, substeps, crew_of(rank, size))
     barrier(size)
     if rank == 0:
         for k in range(COUNTS):
             device_pairs[k] = t.pair_count[k]
         for k in range(2):
             device_active[k] = t.active_count[k]
-        for k in range(NOTES):
-            notes[k] = t.notes[k]
+        bring_notes(notes, t.notes)
         if t.spare_blocks > 0:
             close_queue(t.work_counts)
 

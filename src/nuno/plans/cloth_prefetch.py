@@ -10,7 +10,7 @@ import warp as wp
 
 from nuno.constraints.bending import bend_alpha, bend_line, bend_twist
 from nuno.constraints.membrane import shear_alpha, shear_cell
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 from nuno.state.cloth_state import Settings, Topology
 
 
@@ -72,7 +72,7 @@ def read_cell(table: Topology, k: int, last: int):
 
 @wp.func
 def bend_lines_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All line bends, as `nuno.plans.cloth_substep.bend_lines` colour by colour."""
+    """All line bends, as `nuno.plans.cloth_elastic.bend_lines` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     colours = table.line_colour.shape[0] - 1
     if colours > 0:
@@ -100,7 +100,7 @@ def bend_lines_ahead(t: Any, table: Topology, run: Settings, rank: int, size: in
 
 @wp.func
 def bend_twists_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All cell twists, as `nuno.plans.cloth_substep.bend_twists` colour by colour."""
+    """All cell twists, as `nuno.plans.cloth_elastic.bend_twists` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     colours = table.twist_colour.shape[0] - 1
     if colours > 0:
@@ -128,7 +128,7 @@ def bend_twists_ahead(t: Any, table: Topology, run: Settings, rank: int, size: i
 
 @wp.func
 def shear_cells_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All cell shears, as `nuno.plans.cloth_substep.shear_cells` colour by colour."""
+    """All cell shears, as `nuno.plans.cloth_elastic.shear_cells` colour by colour."""
     rate = 1.0 / (run.dt * run.dt)
     colours = table.cell_colour.shape[0] - 1
     if colours > 0:

@@ -17,11 +17,12 @@ from nuno.constraints.membrane import (
     stretch_alpha,
     stretch_grid_line,
 )
+from nuno.numbers.crew import barrier, shares_work
 from nuno.numbers.element_access import at, corner
-from nuno.numbers.lanes import barrier, mul, shares_work, sub  # noqa: F401 (mul, sub: the operators)
+from nuno.numbers.lanes import mul, sub  # noqa: F401 (mul, sub: the operators)
 from nuno.numbers.tridiagonal import free_row
 from nuno.numbers.vec3 import move, position, vec3
-from nuno.plans.cloth_substep import stretch_grid_lines
+from nuno.plans.cloth_elastic import stretch_grid_lines
 from nuno.state.cloth_state import Settings, Topology
 
 EDGES = wp.constant(512)

@@ -4,6 +4,8 @@ from typing import Any
 
 import warp as wp
 
+from nuno.state.cloth_state import NOTES, SCALARS
+
 SHARED_FLOATS = 11500
 """Floats in the static buffer: 48 KB less the 2 KB that Warp takes for itself at 512 threads, the counts and the
 figures."""
@@ -121,3 +123,19 @@ def bring_masses(to: Any, of: Any, n: int, rank: int, size: int):
     """The same of inverse masses."""
     for i in range(rank, n, size):
         to.w[i] = of.w[i]
+
+
+@wp.func
+def bring_notes(into: Any, notes: Any):
+    """Copy a world's notes; one thread does it."""
+    for k in range(NOTES):
+        into[k] = notes[k]
+
+
+@wp.func
+def bring_figures(t: Any, scalars: Any, notes: Any, rank: int):
+    """Copy a world's scalars and notes to where ``t`` has them."""
+    if rank == 0:
+        for k in range(SCALARS):
+            t.scalars[k] = scalars[k]
+        bring_notes(t.notes, notes)

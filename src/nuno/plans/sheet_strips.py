@@ -15,8 +15,9 @@ import warp as wp
 from nuno.constraints.bending import bend_alpha, project_line, project_twist
 from nuno.constraints.compliances import UNIFORM_BENDS
 from nuno.constraints.membrane import project_cell, shear_alpha
+from nuno.numbers.crew import barrier
 from nuno.numbers.element_access import at
-from nuno.numbers.lanes import barrier, choose
+from nuno.numbers.lanes import choose
 from nuno.numbers.vec3 import position, put_position
 from nuno.numbers.warp_lanes import LANES_OF_WARP, Lane, above, below, lane_of, quotient
 from nuno.state.cloth_state import Settings, StateFloat, Topology
@@ -279,7 +280,7 @@ def shear_strips(t: Any, table: Topology, odd: int, same: float, rate: float, ow
 
 @wp.func
 def bend_in_strips(t: StateFloat, table: Topology, run: Settings, rank: int, size: int):
-    """All twists, bends and shears of a sheet that `fits_strips`, as `nuno.plans.cloth_substep.bend_sheet` has them."""
+    """All twists, bends and shears of a sheet that `fits_strips`, as `nuno.plans.cloth_elastic.bend_sheet` has them."""
     own = lane_of(rank, size)
     rate = 1.0 / (run.dt * run.dt)
     # early, for it comes from far away

@@ -10,21 +10,23 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier, crew_of
 from nuno.plans.block_plan import BLOCKS_AT_ONCE
 from nuno.plans.shared_memory import (
     DOUBLE_PARTICLES,
     ROOMY_PARTICLES,
     SHARED_PARTICLES,
+    bring_figures,
     bring_masses,
+    bring_notes,
     bring_places,
     bring_speeds,
     column,
     double_column,
     figures,
 )
-from nuno.plans.soft_substep import advance
-from nuno.state.cloth_state import NOTES, Settings, Shapes
+from nuno.plans.substep import advance
+from nuno.state.cloth_state import Settings, Shapes
 from nuno.state.soft_state import FarSides, Sides, SoftDouble, SoftFloat, SoftSizes, Tetrahedra, view
 
 FEW_THREADS, MANY_THREADS, MANY_AT_ONCE = 256, 128, 4
@@ -51,7 +53,8 @@ def go(
     size: int,
 ):  # fmt: skip
     """`advance`, with a note of how far it went."""
-    done = advance(t, near, topo, sides, run, shapes, first_of(t, sides, substeps), substeps, rank, size)
+    begin = first_of(t, sides, substeps)
+    done = advance(t, t, near, near, topo, sides, run, shapes, begin, substeps, crew_of(rank, size))
     barrier(size)
     if rank == 0:
         t.gone_to[0] = done
@@ -69,17 +72,12 @@ def advance_block(
     t.notes = figures(8)
     near.scalars = figures(0)
     near.notes = figures(8)
-    if rank == 0:
-        for k in range(7):
-            t.scalars[k] = scalars[k]
-        for k in range(NOTES):
-            t.notes[k] = notes[k]
+    bring_figures(t, scalars, notes, rank)
     barrier(size)
     go(t, near, topo, sides, run, shapes, substeps, rank, size)
     barrier(size)
     if rank == 0:
-        for k in range(NOTES):
-            notes[k] = t.notes[k]
+        bring_notes(notes, t.notes)
 
 
 @wp.func

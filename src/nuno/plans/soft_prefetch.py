@@ -48,55 +48,55 @@ def read_cluster(table: Tetrahedra, k: int):
 
 
 @wp.func
-def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, rank: int, size: int, those: Any):
-    """Go over the tetrahedra's elasticity once, as `soft_frame.elastic`, by ``those`` threads together."""
+def elastic_ahead(t: Any, table: Tetrahedra, run: Settings, crew: Any):
+    """Go over the tetrahedra's elasticity once: `nuno.plans.soft_elastic.solve_colours` by a crew of many threads."""
     square = run.dt * run.dt
     limit = wp.min(table.speed * run.dt, 0.5 * table.height)
     mu, bulk = stiffness(t, square)
     colours = table.colour.shape[0] - 1
     first = table.colour[0]
     last = table.colour[1]
-    inner, outer, shape = read_cluster(table, first + rank)
+    inner, outer, shape = read_cluster(table, first + crew.rank)
     for colour in range(colours):
         stop = table.colour[wp.min(colour + 2, colours)]
-        k = first + rank
+        k = first + crew.rank
         if k >= last:
-            inner, outer, shape = read_cluster(table, last + rank)
+            inner, outer, shape = read_cluster(table, last + crew.rank)
         while k < last:
             p = inner
             q = outer
             now = shape
-            inner, outer, shape = read_cluster(table, wp.where(k + size < last, k + size, last + rank))
+            inner, outer, shape = read_cluster(table, wp.where(k + crew.size < last, k + crew.size, last + crew.rank))
             solve_cluster(
                 t, table, k, now[0], now[1], p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], square, mu, bulk, limit
             )
-            k += size
+            k += crew.size
         first = last
         last = stop
-        wait_for(those)
+        wait_for(crew)
 
 
 @wp.func
-def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, rank: int, size: int, those: Any):
-    """One pass over the tetrahedra's viscosity, as `nuno.plans.soft_substep.viscous`, by ``those`` threads together."""
+def viscous_ahead(t: Any, table: Tetrahedra, run: Settings, crew: Any):
+    """One pass over the tetrahedra's viscosity: `nuno.plans.soft_elastic.damp_colours` by a crew of many threads."""
     time = t.scalars[DAMPING] * (2.0 * run.dt * float(run.damped))
     eta = t.mu[0] * time
     colours = table.colour.shape[0] - 1
     first = table.colour[0]
     last = table.colour[1]
-    inner, outer, shape = read_cluster(table, first + rank)
+    inner, outer, shape = read_cluster(table, first + crew.rank)
     for colour in range(colours):
         stop = table.colour[wp.min(colour + 2, colours)]
-        k = first + rank
+        k = first + crew.rank
         if k >= last:
-            inner, outer, shape = read_cluster(table, last + rank)
+            inner, outer, shape = read_cluster(table, last + crew.rank)
         while k < last:
             p = inner
             q = outer
             now = shape
-            inner, outer, shape = read_cluster(table, wp.where(k + size < last, k + size, last + rank))
+            inner, outer, shape = read_cluster(table, wp.where(k + crew.size < last, k + crew.size, last + crew.rank))
             damp_cluster(t, table, k, now[0], now[1], p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], time, eta)
-            k += size
+            k += crew.size
         first = last
         last = stop
-        wait_for(those)
+        wait_for(crew)

@@ -15,9 +15,11 @@ from nuno.constraints.compliances import Compliances
 from nuno.constraints.grips import hold_vertices
 from nuno.constraints.membrane import shear_alpha, shear_cell
 from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
+from nuno.contact.self.group_search import Lists
 from nuno.numbers.block_group import BlockGroup, grid_barrier
-from nuno.numbers.lanes import barrier, subarray
-from nuno.plans.cloth_substep import bend_patches, strain_triangles
+from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import subarray
+from nuno.plans.cloth_elastic import bend_patches, strain_triangles
 from nuno.plans.grid_lines_by_block import stretch_grid_lines_of_block
 from nuno.state.cloth_state import Settings, Topology
 from nuno.state.integrate import predict
@@ -108,6 +110,23 @@ def make_work(topology: ClothTopology, compliances: Compliances, stages: Stages,
     return work
 
 
+@wp.struct
+class BlockShare:
+    """A cloth's elements shared out among the blocks of a group, as one block has them, and its own particles."""
+
+    particles: int
+    work: Work
+    steps: wp.array(dtype=int)
+    lists: Lists
+    world: int
+    # particles whose contacts and velocities are the block's; how many grips there are, none where none is on these
+    first: int
+    last: int
+    held: int
+    # the same of the particles that the block predicts
+    held_first: int
+
+
 @wp.func
 def is_sorted(kind: int):
     """Return whether the table has this kind's elements."""
@@ -143,7 +162,7 @@ def read(work: Work, world: int, kind: int, k: int, last: int):
 
 @wp.func
 def solve(t: Any, kind: int, e: Element, rate: float):
-    """One bend or shear, as in `nuno.plans.cloth_substep`."""
+    """One bend or shear, as in `nuno.plans.cloth_elastic`."""
     if kind == TWISTS:
         bend_twist(t, e.a, e.b, e.c, e.d, bend_alpha(e.compliance, e.scale, rate))
     elif kind == LINES:
@@ -185,7 +204,7 @@ def steps_of(work: Work, block: int):
 def sweep_share(
     t: Any, topo: Topology, run: Settings, kind: int, sweep: int, first: int, last: int, rank: int, size: int
 ):
-    """A block's share of a step of `nuno.plans.cloth_substep.sweep_membrane`."""
+    """A block's share of a step of `nuno.plans.cloth_elastic.sweep_membrane`."""
     if kind == SWEPT_CELLS:
         shear_cells_again(t, topo, t.cell_sum, run, sweep, first, last, rank, size)
     elif kind == SWEPT_TRIANGLES:

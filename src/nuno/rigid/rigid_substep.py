@@ -152,4 +152,4 @@ def run_rigid_group(
     world, block_group = block_group_of(wp.tid(), barrier_counts, 0, worlds, blocks, block_size)
     if all_resident(barrier_counts, 0, worlds, worlds * blocks):
         begin_grid_barrier(block_group)
-        go_through(s, parts, c, rules, run, phase, world, block_group.rank, block_group.group_size, block_group)
+        go_through(s, parts, c, rules, run, phase, world, block_group.rank, block_group.size, block_group)

@@ -14,12 +14,13 @@ from nuno.contact.particle.feature_lists import ROUND
 from nuno.contact.particle.feature_queue import QUEUE, ROOM
 from nuno.numbers.lanes import LANES, lane, lane_int
 from nuno.plans.cpu_groups import run_groups
+from nuno.plans.group_figures import SHARED_FIGURES
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.plans.shared_memory import DOUBLE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.plans.soft_block_plan import FAR, FEATURES, FEW_THREADS, MANY_THREADS
-from nuno.plans.soft_group_kernels import SHARED_NOTES, THREADS, run_soft_double_grid, run_soft_grid
-from nuno.plans.soft_substep import (
+from nuno.plans.soft_group_kernels import THREADS, run_soft_double_grid, run_soft_grid
+from nuno.plans.soft_worlds import (
     run_soft_double_lanes,
     run_soft_double_simd,
     run_soft_double_worlds,
@@ -219,7 +220,7 @@ class SoftSolver(ParticleSolver):
             values = np.ascontiguousarray(values.reshape(len(table), LANES, -1).transpose(0, 2, 1))
             return wp.array(values.reshape(-1, LANES), dtype=dtype, device="cpu")
 
-        simd.rows, simd.differ = len(table), narrow.differ
+        simd.particles, simd.rows, simd.differ = narrow.particles, len(table), narrow.differ
         simd.speed, simd.height = narrow.speed, narrow.height
         simd.inner, simd.outer = (put(a.numpy()[table], lane_int) for a in (narrow.inner, narrow.outer))
         # an element that only others of the group have is one of zeros, which does nothing
@@ -288,8 +289,8 @@ class SoftSolver(ParticleSolver):
 
     def _grid_plan(self) -> GridPlan:
         block_groups, blocks = self._block_groups()
-        shared_notes = wp.zeros(SHARED_NOTES * self.world_count, dtype=float, device=self.device)
-        before, after = (self._topology, self._surface, self._size), (self._shapes, shared_notes)
+        shared = wp.zeros(SHARED_FIGURES * self.world_count, dtype=float, device=self.device)
+        before, after = (self._topology, self._surface, self._size), (self._shapes, shared)
         kernels = run_soft_grid, run_soft_double_grid
         return GridPlan(
             kernels, self._state, before, lambda _: after, self.device, self.world_count, block_groups, blocks, THREADS,

@@ -75,6 +75,7 @@ class Tetrahedra:
 class SimdClusters:
     """The same by groups of sixteen clusters, and room for what all particles of a world have in common."""
 
+    particles: int
     rows: int
     differ: int
     speed: float

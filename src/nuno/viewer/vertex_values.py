@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from nuno.bodies.dynamics import topology_of
+from nuno.bodies.shape_topology import topology_of
 from nuno.bodies.soft_measures import strains
 from nuno.errors import InvalidInputError
 

@@ -8,8 +8,8 @@ import weakref
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from nuno.world.advancing import Advancing
     from nuno.world.pace import Pace
-    from nuno.world.simulation import Simulation
 
 LATE = 0.25  # a thread that is later than this [s] gives the lost time up instead of rushing after it
 
@@ -66,7 +66,7 @@ class Background:
         real_time_factor: Simulated over real time; ``inf`` is as fast as possible.
     """
 
-    def __init__(self, world: Simulation, real_time_factor: float) -> None:
+    def __init__(self, world: Advancing, real_time_factor: float) -> None:
         self.error: BaseException | None = None
         self._stop = threading.Event()
         self._frame = threading.Condition()
@@ -95,7 +95,7 @@ class Background:
         with self._frame:
             self._frame.wait(timeout)
 
-    def _loop(self, reference: weakref.ref[Simulation], lock: FrameLock, pace: Pace, factor: float) -> None:
+    def _loop(self, reference: weakref.ref[Advancing], lock: FrameLock, pace: Pace, factor: float) -> None:
         due = time.perf_counter()
         while not self._stop.is_set():
             if not pace.may_go(timeout=0.05):

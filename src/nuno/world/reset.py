@@ -18,9 +18,10 @@ from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path
 from nuno.tables.kinematic_motion import arrive
 from nuno.validation import as_array, index_array
+from nuno.world.capture import same_shape
 from nuno.world.reset_grips import merged_grips, set_merged_grips
 from nuno.world.rigid_layout import RigidLayout
-from nuno.world.snapshot import BodyRecord, Snapshot, same_shape
+from nuno.world.snapshot import BodyRecord, Snapshot
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation

@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
+from nuno.bodies.dynamics import SOON
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.validation import finite_array, flag, function, number
+from nuno.world.advancing import Advancing
 from nuno.world.background import Background
 from nuno.world.progress import with_bar
-from nuno.world.simulation import CHUNK, CUDA_CHUNK, SOON, Simulation
+from nuno.world.simulation import CHUNK, CUDA_CHUNK
 from nuno.world.trace import run_traced
 
 
-class Running(Simulation):
+class Running(Advancing):
     """A simulation with the verbs of time.
 
     All may be called while it runs in the background.

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.whole_file import file_path
 from nuno.validation import count
+from nuno.world.capture import apply, capture
 from nuno.world.memory import check_memory
 from nuno.world.reset import checked_worlds, reset_worlds
 from nuno.world.running import Running
-from nuno.world.snapshot import Snapshot, apply, capture, check_world_index
+from nuno.world.snapshot import Snapshot, check_world_index
 
 if TYPE_CHECKING:
     from nuno.world.driver import Driver

@@ -21,7 +21,8 @@ from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
 from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
-from nuno.numbers.lanes import add, anywhere, barrier, full_like, lane_max, mul, shares_work, sqrt, sub  # noqa: F401
+from nuno.numbers.crew import barrier, shares_work
+from nuno.numbers.lanes import add, anywhere, full_like, lane_max, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import vec3
 from nuno.numbers.warps import WARP, anyone, lowest, union_of_warp
 from nuno.state.cloth_state import SPEED, Settings, Shapes

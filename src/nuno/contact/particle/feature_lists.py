@@ -14,7 +14,7 @@ import warp as wp
 from nuno.contact.particle.distances import BOX, CYLINDER, FAR, PLANE
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
-from nuno.numbers.lanes import absolute, add, anywhere, barrier, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import position, transposed_mul, vec3
 from nuno.state.cloth_state import CLOCK, THICKNESS, Settings, Shapes
 

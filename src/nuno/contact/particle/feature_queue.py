@@ -9,7 +9,7 @@ import warp as wp
 
 from nuno.contact.particle.distances import FAR
 from nuno.contact.particle.feature_lists import DUE
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 from nuno.numbers.warps import WARP, below_in, claim, size_of_set, sum_of_warp, vote
 
 TALLY = wp.constant(3)

@@ -8,7 +8,7 @@ from nuno.contact.self.leaf_pairs import TRAVELLED, WIDTH, closed_in, list_leaf_
 from nuno.contact.self.narrow_phase import bound_leaves, middles
 from nuno.contact.self.neighbour_lists import FORGET, begin_list, find_active, find_creases, swept
 from nuno.contact.self.search_queue import search_with_spare_blocks
-from nuno.numbers.lanes import barrier
+from nuno.numbers.crew import barrier
 from nuno.numbers.warps import anyone, leads_warp, warp_max
 from nuno.state.cloth_state import LISTINGS, THICKNESS, TRAVEL, Settings, StateFloat, Topology
 

@@ -11,7 +11,8 @@ import warp as wp
 
 from nuno.contact.self.block_flat_regions import in_flat
 from nuno.contact.self.narrow_phase import append, near_edges, near_triangle
-from nuno.numbers.lanes import barrier, subarray
+from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import subarray
 from nuno.numbers.warps import WARP, claim, sync_warp, warp_broadcast
 from nuno.state.cloth_state import MISSED_ELEMENTS, StateFloat, Topology
 

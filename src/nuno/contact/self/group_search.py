@@ -23,7 +23,8 @@ from nuno.contact.self.list_skin import (
 from nuno.contact.self.narrow_phase import append, bound_leaves, middles, near_edges, near_triangle, next_place
 from nuno.contact.self.neighbour_lists import FORGET, begin_list, find_creases, make_inner_list, swept
 from nuno.numbers.block_group import BlockGroup, grid_barrier
-from nuno.numbers.lanes import barrier, subarray
+from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import subarray
 from nuno.numbers.warps import WARP, in_warps, leads_warp, lowest, vote, warp_max
 from nuno.state.cloth_state import (
     INNER_REACH,
@@ -250,15 +251,15 @@ def list_anew(t: StateFloat, topo: Topology, run: Settings, lists: Lists, world:
     # the flags of flat regions where `nuno.contact.self.block_flat_regions` has them
     moved = t.moved
     t.moved = subarray(lists.flat, 2 * topo.particles * world, 2 * topo.particles)
-    keep_places(t, topo, run, block_group.rank, block_group.group_size)
+    keep_places(t, topo, run, block_group.rank, block_group.size)
     grid_barrier(block_group)
-    join_boxes(t, topo, 0, block_group.rank, block_group.group_size)
-    mark_flat(t, topo, list_reach(t, run), block_group.rank, block_group.group_size)
+    join_boxes(t, topo, 0, block_group.rank, block_group.size)
+    mark_flat(t, topo, list_reach(t, run), block_group.rank, block_group.size)
     grid_barrier(block_group)
-    note_pairs(t, topo, run, lists, world, block_group.rank, block_group.group_size)
-    find_creases(t, topo, list_reach(t, run) * list_reach(t, run), block_group.rank, block_group.group_size)
+    note_pairs(t, topo, run, lists, world, block_group.rank, block_group.size)
+    find_creases(t, topo, list_reach(t, run) * list_reach(t, run), block_group.rank, block_group.size)
     grid_barrier(block_group)
-    search_noted(t, topo, run, lists, world, block_group.rank, block_group.group_size)
+    search_noted(t, topo, run, lists, world, block_group.rank, block_group.size)
     t.moved = moved
 
 
@@ -273,11 +274,11 @@ def rebuild_by_group(t: StateFloat, topo: Topology, run: Settings, lists: Lists,
     if t.notes[TRAVEL] * 2.0 > left:
         if block_group.rank == 0:
             t.reference[3 * n] = 0.0
-        box_moves(t, topo, block_group.rank, block_group.group_size)
+        box_moves(t, topo, block_group.rank, block_group.size)
         grid_barrier(block_group)
-        join_boxes(t, topo, moves_start(topo.leaves), block_group.rank, block_group.group_size)
+        join_boxes(t, topo, moves_start(topo.leaves), block_group.rank, block_group.size)
         grid_barrier(block_group)
-        measure_closing(t, topo, run, block_group.rank, block_group.group_size)
+        measure_closing(t, topo, run, block_group.rank, block_group.size)
         grid_barrier(block_group)
         worst = wp.max(t.reference[3 * n], t.notes[TRAVEL] - FORGET)
         fresh = worst > left
@@ -298,7 +299,7 @@ def rebuild_by_group(t: StateFloat, topo: Topology, run: Settings, lists: Lists,
             t.active_count[0] = 0
             t.active_count[1] = 0
         grid_barrier(block_group)
-        make_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.group_size)
+        make_inner_list(t, t.scalars[THICKNESS] + 1.01 * ahead, block_group.rank, block_group.size)
         if block_group.rank_in_block == 0:
             t.notes[INNER_TRAVEL] = 0.0
             t.notes[INNER_REACH] = ahead

@@ -8,7 +8,8 @@ and stays true until any two points of the cloth may have come closer by the dif
 import warp as wp
 
 from nuno.contact.self.narrow_phase import GROUP, raise_to
-from nuno.numbers.lanes import barrier, subarray
+from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import subarray
 from nuno.numbers.warps import WARP, claim, lowest
 from nuno.state.cloth_state import MISSED_LEAVES, THICKNESS, StateFloat, Topology
 

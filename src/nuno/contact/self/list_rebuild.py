@@ -7,8 +7,9 @@ import warp as wp
 from nuno.contact.self.block_rebuild import rebuild_by_block
 from nuno.contact.self.cpu_search import list_world, make_inner_list_of_world, reach_world
 from nuno.contact.self.neighbour_lists import FORGET, INNER_AHEAD, swept
+from nuno.numbers.crew import shares_work
 from nuno.numbers.element_access import at, put
-from nuno.numbers.lanes import LANES, add, anywhere, full_like, maximum, minimum, mul, shares_work, sqrt, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
+from nuno.numbers.lanes import LANES, add, anywhere, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
 from nuno.state.cloth_state import (
     INNER_REACH,
     INNER_TRAVEL,

@@ -11,10 +11,10 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.self.narrow_phase import append, near_edges, near_triangle
+from nuno.numbers.crew import barrier
 from nuno.numbers.lanes import (  # noqa: F401 (add, mul, sub: Warp takes them for the operators)
     add,
     anywhere,
-    barrier,
     choose,
     full_like,
     lane_max_int,

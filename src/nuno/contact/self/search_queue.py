@@ -9,7 +9,8 @@ that a launch ends whether or not there is room for helpers. Who finds a pair do
 import warp as wp
 
 from nuno.contact.self.block_search import BATCH, queue_leaf_pairs, search_batch
-from nuno.numbers.lanes import barrier, subarray
+from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import subarray
 from nuno.numbers.warps import WARP, anyone, sync_warp, warp_broadcast
 from nuno.state.cloth_state import COUNTS, MISSED_ELEMENTS, THICKNESS, Settings, Sizes, StateFloat, Topology, view
 

@@ -1,8 +1,8 @@
-"""The plan for one world alone on the CPU: sixteen elements of a colour, or sixteen particles, at a time.
+"""One world alone on the CPU: sixteen elements of a colour, or sixteen particles, in the lanes of a vector.
 
 The tables repeat the cloth's elements by groups of sixteen. A group that would be short repeats its last element,
-which then is written several times with the same values. The phases are those of `nuno.plans.cloth_substep`, in the
-same order, so that a world gives the same bits here as in the lanes of a batch.
+which then is written several times with the same values. Colours and phases come in the order that they have in all
+plans, so that a world gives the same bits here as in the lanes of a batch.
 """
 
 from __future__ import annotations
@@ -14,52 +14,16 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.constraints.damping import damp_bends
-from nuno.constraints.grips import forget_loads, hold_vertices, pull_points, read_loads
-from nuno.constraints.membrane import stretch_grid_line
-from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
-from nuno.contact.particle.shape_contact import touch_shapes
-from nuno.contact.self.list_rebuild import rebuild_lists
-from nuno.contact.self.self_contact import touch_edge_edge, touch_vertex_triangle
 from nuno.numbers.doubles import double_lane, float64
-from nuno.numbers.lanes import LANES, full_like, lane, lane_int, lane_max
-from nuno.plans.cloth_substep import (
-    bend_lines,
-    bend_patches,
-    bend_twists,
-    near_features,
-    near_shapes,
-    shear_cells,
-    solve_features,
-    strain_triangles,
-)
-from nuno.state.cloth_state import (
-    CLOCK,
-    COMPLIANT_GRIPS,
-    MOTION,
-    NOTES,
-    SCALARS,
-    SELF_CONTACT,
-    SHAPES,
-    SPEED,
-    VELOCITIES,
-    Settings,
-    Shapes,
-    Sizes,
-    StateDouble,
-    StateDoubleLanes,
-    StateFloat,
-    StateLanes,
-    Topology,
-    view,
-)
-from nuno.state.integrate import predict, read_velocities, reset_speed, round_places, tick
+from nuno.numbers.lanes import LANES, full_like, lane, lane_int
+from nuno.state.cloth_state import NOTES, SCALARS
 
 
 @wp.struct
 class SimdElements:
     """The elements by groups of sixteen, under the names that `Topology` has for them; room for the grid lines."""
 
+    particles: int
     edge: wp.array(dtype=lane_int)
     edge_rest: wp.array(dtype=lane)
     edge_scale: wp.array(dtype=lane)
@@ -137,124 +101,6 @@ def by_sixteen(p: Any, t: Any, simd: Any, m: int):
     return p
 
 
-@wp.func
-def elastic_simd(t: Any, simd: SimdElements, run: Settings):
-    """One pass over the elastic constraints: `nuno.plans.cloth_substep.elastic` by sixteen."""
-    for c in range(simd.patch_colour.shape[0] - 1):
-        bend_patches(t, simd, run, simd.patch_colour[c], simd.patch_colour[c + 1], 0, 1)
-    for c in range(simd.twist_colour.shape[0] - 1):
-        bend_twists(t, simd, run, simd.twist_colour[c], simd.twist_colour[c + 1], 0, 1)
-    for c in range(simd.line_colour.shape[0] - 1):
-        bend_lines(t, simd, run, simd.line_colour[c], simd.line_colour[c + 1], 0, 1)
-    if run.sweeps > 0:
-        sweep_simd(t, simd, run)
-    else:
-        for c in range(simd.cell_colour.shape[0] - 1):
-            shear_cells(t, simd, run, simd.cell_colour[c], simd.cell_colour[c + 1], 0, 1)
-        for c in range(simd.triangle_colour.shape[0] - 1):
-            strain_triangles(t, simd, run, simd.triangle_colour[c], simd.triangle_colour[c + 1], 0, 1)
-        stretch_simd(t, simd, simd.edge_rest, run, 0, simd.grid_line_kind[simd.grid_line_kind.shape[0] - 1])
-
-
-@wp.func
-def stretch_simd(t: Any, simd: SimdElements, rest: wp.array(dtype=lane), run: Settings, first: int, last: int):
-    """The groups of sixteen grid lines first to last."""
-    rate = 1.0 / (run.dt * run.dt)
-    for k in range(first, last):
-        start = simd.grid_line[k]
-        end = simd.grid_line[k + 1]
-        stretch_grid_line(
-            t, simd, rest, simd.grid_line_gain, simd.grid_line_pull, simd.grid_line_inverse, start, end, rate
-        )
-
-
-@wp.func
-def sweep_simd(t: Any, simd: SimdElements, run: Settings):
-    """`nuno.plans.cloth_substep.sweep_membrane` by sixteen."""
-    for sweep in range(run.sweeps):
-        for c in range(simd.cell_colour.shape[0] - 1):
-            last = simd.cell_colour[c + 1]
-            shear_cells_again(t, simd, simd.cell_sum, run, sweep, simd.cell_colour[c], last, 0, 1)
-        for c in range(simd.triangle_colour.shape[0] - 1):
-            last = simd.triangle_colour[c + 1]
-            strain_triangles_again(t, simd, simd.triangle_sum, run, sweep, simd.triangle_colour[c], last, 0, 1)
-        for c in range(simd.grid_line_kind.shape[0] - 1):
-            first = simd.grid_line_kind[c]
-            last = simd.grid_line_kind[c + 1]
-            if sweep == 0:
-                stretch_simd(t, simd, simd.edge_rest, run, first, last)
-            else:
-                stretch_simd(t, simd, simd.grid_line_goal, run, first, last)
-            if sweep + 1 < run.sweeps:
-                note_lengths(t, simd, simd.grid_line_goal, simd.grid_line[first], simd.grid_line[last], 0, 1)
-
-
-@wp.func
-def advance_simd(
-    t: Any, p: Any, near: StateFloat, nearby: StateLanes, topo: Topology, simd: SimdElements, run: Settings,
-    shapes: Shapes,
-    substeps: int,
-):  # fmt: skip
-    """Go through substeps as `frame.advance`, by sixteen; ``p`` is ``t`` by sixteen, ``nearby`` is ``near``."""
-    n = topo.particles
-    m = (n + LANES - 1) / LANES
-    for k in range(substeps):
-        if run.parts & MOTION != 0:
-            if (run.first + k) % run.frame == 0:
-                near_shapes(near, n, run, shapes, 0, 1)
-                near_features(near, topo, run, shapes, 0, 1)
-                forget_loads(t, run, 0, 1)
-            tick(t, run, 0)
-            if run.touching != 0:
-                rebuild_lists(near, topo, run, 0, 1)
-            if run.damped != 0:
-                damp_bends(t, simd, run, 0, 1, 1)
-            predict(p, m, run, 0, 1)
-            hold_vertices(t, run, 0, 1)
-            elastic_simd(t, simd, run)
-        if run.parts & COMPLIANT_GRIPS != 0:
-            pull_points(t, run, 0, 1)
-        if run.touching != 0 and run.parts & SELF_CONTACT != 0:
-            for _again in range(run.passes):
-                touch_edge_edge(t, n, run, 0, 1)
-                touch_vertex_triangle(t, n, run, 0, 1)
-        if run.parts & SHAPES != 0:
-            solve_features(t, topo, run, shapes, 0, 1)
-            read_loads(t, run, 0, 1)
-            p.notes[CLOCK] = full_like(p.x[0], t.notes[CLOCK])  # moving shapes are where the clock says
-            touch_shapes(p, m, shapes, run.dt, 0, 1)
-        if run.parts & VELOCITIES != 0:
-            reset_speed(p, 0)
-            read_velocities(p, m, run, 0, 1)
-            round_places(nearby, p, m, 0, 1)
-            t.notes[SPEED] = lane_max(p.notes[SPEED])
-
-
-@wp.kernel(enable_backward=False)
-def run_simd(
-    s: StateFloat, topo: Topology, simd: SimdElements, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int
-):
-    """One world by one thread."""
-    n = topo.particles
-    t = view(s, wp.tid(), n, sizes)
-    p = by_sixteen(StateLanes(), t, simd, (n + LANES - 1) / LANES)
-    advance_simd(t, p, t, p, topo, simd, run, shapes, substeps)
-
-
-@wp.kernel(enable_backward=False, module="nuno.plans.run_double_simd")
-def run_double_simd(
-    s: StateDouble, near: StateFloat, topo: Topology, simd: SimdElements, sizes: Sizes, run: Settings, shapes: Shapes,
-    substeps: int,
-):  # fmt: skip
-    """One world by one thread, coordinates as doubles."""
-    n = topo.particles
-    m = (n + LANES - 1) / LANES
-    t = view(s, wp.tid(), n, sizes)
-    floats = view(near, wp.tid(), n, sizes)
-    p = by_sixteen(StateDoubleLanes(), t, simd, m)
-    advance_simd(t, p, floats, by_sixteen(StateLanes(), floats, simd, m), topo, simd, run, shapes, substeps)
-
-
 def pack_topology(topology: Any, arrays: Any) -> Any:
     """Return `SimdElements` for one world on the CPU.
 
@@ -263,6 +109,7 @@ def pack_topology(topology: Any, arrays: Any) -> Any:
         arrays: The solver's `Topology`, whose compliance indices are set.
     """
     simd = SimdElements()
+    simd.particles = arrays.particles
 
     def groups(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rows of sixteen elements, colour by colour, and where each colour starts among the rows."""

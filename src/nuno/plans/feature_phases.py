@@ -1,0 +1,133 @@
+"""Phases of a substep around sharp shapes: edges and triangles listed once a frame, and pushed out."""
+
+from typing import Any
+
+import warp as wp
+
+from nuno.contact.particle.feature_contact import push_active, push_features, travel_of_substep
+from nuno.contact.particle.feature_lists import EARLIEST, TRAVELLED, clear_features, list_features, mark_features
+from nuno.contact.particle.shape_contact import measure_box, reset_box, select_shapes, sort_shapes
+from nuno.numbers.block_group import BlockGroup, grid_barrier, wait_for
+from nuno.numbers.crew import Crew
+from nuno.plans.contact_phases import take_own_moves
+from nuno.plans.stage_kernels import BlockShare
+from nuno.state.cloth_state import SELF_CONTACT, Settings, Shapes, Topology
+from nuno.state.soft_state import FarSides
+
+
+@wp.func
+def select_nearby(near: Any, n: int, surface: Any, run: Settings, shapes: Shapes, crew: Any):
+    """Choose the shapes that matter for the next frame, and what sharp ones may touch between vertices."""
+    wait_for(crew)
+    reset_box(near, crew.rank)
+    clear_features(near, surface, crew.rank)
+    wait_for(crew)
+    measure_box(near, n, crew.rank, crew.size)
+    wait_for(crew)
+    select_shapes(near, shapes, float(run.frame) * run.dt, crew.rank, crew.size)
+    wait_for(crew)
+    sort_shapes(near, crew.rank)
+    wait_for(crew)
+    mark_features(near, surface, run, shapes, crew.rank, crew.size)
+    wait_for(crew)
+    list_features(near, surface, crew.rank, crew.size)
+    wait_for(crew)
+
+
+@wp.func
+def goes_on(t: Any, surface: FarSides):
+    """Return whether the kernel does the substep that comes next: one without sharp shapes, where none is near."""
+    return t.feature_shapes[0] == 0
+
+
+@wp.func
+def goes_on(t: Any, surface: Any):
+    return True
+
+
+@wp.struct
+class FeatureClock:
+    """The odometer of edges and triangles, kept by each member: most often there is nothing more to ask about them."""
+
+    shape_speed: float  # of the fastest shape [m/s]
+    travelled: float  # how far anything may have gone since the lists were made [m]
+    earliest: float  # how far it must have gone before anything is active again [m]
+
+
+@wp.func
+def read_clock(t: Any, shapes: Shapes):
+    """The odometer as the run before left it."""
+    clock = FeatureClock()
+    clock.shape_speed = shapes.shape_speed[0]
+    clock.travelled = t.feature_due[TRAVELLED]
+    clock.earliest = t.feature_due[EARLIEST]
+    return clock
+
+
+@wp.func
+def resolve_features(
+    t: Any, table: Topology, surface: Any, run: Settings, shapes: Shapes, clock: FeatureClock, crew: Crew
+):
+    """Edges and triangles against the sharp shapes nearby; returns the odometer."""
+    now = clock
+    now.travelled = clock.travelled + travel_of_substep(t, run, clock.shape_speed)
+    if now.travelled >= clock.earliest:
+        now.earliest = push_active(t, surface, run, shapes, now.travelled, crew.rank, crew.size)
+        wait_for(crew)
+    return now
+
+
+@wp.func
+def resolve_features(
+    t: Any, table: BlockShare, surface: Any, run: Settings, shapes: Shapes, clock: FeatureClock, crew: BlockGroup
+):
+    if t.feature_shapes[0] > 0:
+        if run.touching != 0 and run.parts & SELF_CONTACT != 0:
+            take_own_moves(t, table, crew)
+            grid_barrier(crew)
+        push_by_first_block(t, surface, run, shapes, crew)
+    return clock
+
+
+@wp.func
+def resolve_features(
+    t: Any, table: Any, surface: Any, run: Settings, shapes: Shapes, clock: FeatureClock, crew: BlockGroup
+):
+    if t.feature_shapes[0] > 0:
+        push_by_first_block(t, surface, run, shapes, crew)
+    return clock
+
+
+@wp.func
+def resolve_features(
+    t: Any, table: Any, surface: FarSides, run: Settings, shapes: Shapes, clock: FeatureClock, crew: Crew
+):
+    return clock
+
+
+@wp.func
+def resolve_features(t: Any, table: Any, surface: Any, run: Settings, shapes: Shapes, clock: FeatureClock, crew: Crew):
+    if t.feature_shapes[0] > 0:
+        push_features(t, surface, run, shapes, crew.rank, crew.size)
+    return clock
+
+
+@wp.func
+def push_by_first_block(t: Any, surface: Any, run: Settings, shapes: Shapes, crew: BlockGroup):
+    """Few elements in many colours: by one block, which waits for itself alone."""
+    if crew.block == 0:
+        push_features(t, surface, run, shapes, crew.rank_in_block, crew.block_size)
+    grid_barrier(crew)
+
+
+@wp.func
+def keep_clock(t: Any, table: Topology, clock: FeatureClock, crew: Crew):
+    """Keep the odometer for the next run, where it is not kept in every substep."""
+    if crew.rank == 0:
+        t.feature_due[TRAVELLED] = clock.travelled
+        t.feature_due[EARLIEST] = clock.earliest
+
+
+@wp.func
+def keep_clock(t: Any, table: Any, clock: FeatureClock, crew: Any):
+    return

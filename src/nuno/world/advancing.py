@@ -1,0 +1,140 @@
+"""The passing of time: a world's bodies advanced, looked at, and put back where a run failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from nuno.bodies.body import Body
+from nuno.bodies.dynamics import SOON, Dynamics, ParticleDynamics
+from nuno.errors import SimulationDiverged
+from nuno.tables.kinematic_motion import arrive
+from nuno.world.impacts import are_fast
+from nuno.world.run_start import RunStart
+from nuno.world.simulation import Simulation
+
+
+class Advancing(Simulation):
+    """A simulation that advances: it goes through a run once more where a list was too short."""
+
+    def _advance(
+        self, duration: float, end: float | None = None, look: Callable[[float], None] | None = None,
+        instants: np.ndarray | None = None, again: Callable[[], None] | None = None,
+    ) -> None:  # fmt: skip
+        """Advance everything, or leave the world as it was and raise.
+
+        ``look`` is called with the time [s] at each of ``instants`` (k,), or else at the end of each frame. Where the
+        run is gone through once more, as a list of contacts was too short, ``again`` is called first and ``look``
+        anew for every instant; without ``again`` lists are looked at before each call, which is for good.
+        """
+        start = self._time
+        finish = start + duration if end is None else end
+        for driver in self.drivers:
+            driver.begin_frame(start, finish)
+        moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
+        self._rests = False
+        if any(dynamics.is_rigid for dynamics in moving.values()):
+            # what a run goes back to has the static bodies that it met, and lists pairs as it did
+            self._bring_rigid()
+        before = RunStart(self, moving)
+        self._bring_colliders()
+        try:
+            self._reported = start
+            while not self._go_through(moving, finish, look, instants, again is None):
+                before.go_back()
+                if again is not None:
+                    self._reported = start
+                    again()
+        except BaseException:
+            before.go_back()
+            for driver in self.drivers:
+                driver.cancel_frame()
+            raise
+        for body, dynamics in moving.items():
+            dynamics.pushes = [p for p in dynamics.pushes if p.end is None or p.end > finish + SOON]
+            if body._children:
+                self._colliders_changed()  # what follows the body has moved along
+        if not self._rests:
+            arrive(self._kinematic_bodies(), finish)
+        self._time = finish
+        for driver in self.drivers:
+            driver.end_frame()
+        for watcher in tuple(self._watchers):
+            watcher.seen()
+
+    def _go_through(
+        self, moving: dict[Body, Dynamics], finish: float, look: Callable[[float], None] | None,
+        instants: np.ndarray | None, careful: bool,
+    ) -> bool:  # fmt: skip
+        """Advance all bodies to ``finish`` [s]; return whether no list was too short: else all are longer now."""
+        start = now = self._time
+        ends = sorted({p.end for d in moving.values() for p in d.pushes if p.end is not None})
+        # of instants that rounding alone keeps apart one
+        ends = [t for k, t in enumerate(ends) if k == 0 or t > ends[k - 1] + SOON]
+        stops = [*(t for t in ends if start + SOON < t < finish - SOON), finish]
+        for body, dynamics in moving.items():
+            if isinstance(dynamics, ParticleDynamics):
+                dynamics.set_self_contact(self._rules.touches_itself(body))
+        for stop in stops:
+            if moving:
+                self._schedule_kinematic(now, stop - now)
+            if look is None:
+                self._stepping.run(now, stop)
+            elif not self._run_looking(now, stop, look, instants, moving if careful else None):
+                return False
+            now = stop
+        broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
+        if self._must_repeat(moving):
+            return False
+        self._stepping.careful = not self._quiet and are_fast(moving)
+        for body, finite in broken:
+            if not finite.all():
+                raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
+        return True
+
+    def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
+        """Return whether the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
+        longer = self._make_room()
+        if not self._quiet and not self._stepping.careful and are_fast(moving):
+            self._stepping.careful = True
+            return True
+        return longer
+
+    def _make_room(self) -> bool:
+        """Make lists longer that were too short since this was asked last; return whether any is."""
+        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := b._dynamics, ParticleDynamics)])
+
+    def _run_looking(
+        self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,
+        careful: dict[Body, Dynamics] | None,
+    ) -> bool:  # fmt: skip
+        """Advance from ``time`` to ``stop`` [s] from one of ``instants`` to the next, telling the time at each.
+
+        Returns:
+            Whether nothing must be repeated, as far as this was looked at: of ``careful``, all that moves, before each
+            instant.
+        """
+        if instants is None:
+            frame = 1.0 / self.frame_rate
+            ends = time + frame * np.arange(1, int((stop - time) / frame + 1e-6) + 1)
+            if not len(ends) or stop - ends[-1] > SOON:
+                ends = np.append(ends, stop)
+        else:
+            ends = instants[(instants > time + SOON) & (instants < stop + SOON)]
+        now = time
+        for end in ends.tolist():
+            self._stepping.run(now, end)
+            if end > self._reported + SOON:
+                if careful is not None and self._must_repeat(careful):
+                    return False
+                self._telling = True
+                try:
+                    look(end)
+                finally:
+                    self._telling = False
+                self._reported = end
+            now = end
+        if stop - now > SOON:
+            self._stepping.run(now, stop)
+        return True

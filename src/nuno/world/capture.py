@@ -1,0 +1,226 @@
+"""Worlds into snapshots and back: what a world is, copied out of it, and a world made what a snapshot is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.bodies.body import Body
+from nuno.bodies.dynamics import Dynamics
+from nuno.bodies.make_dynamics import make_dynamics
+from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint, JointSpec
+from nuno.shapes.coordinates import compose, invert
+from nuno.shapes.shape import Shape
+from nuno.tables.kinematic_motion import GroupPath
+from nuno.world.rigid_layout import bring_static, layout_of, scene_for, settle
+from nuno.world.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+
+if TYPE_CHECKING:
+    from nuno.world.simulation import Simulation
+
+
+def capture(world: Simulation) -> Snapshot:
+    """Return everything that ``world`` is; arrays are copies or never written to."""
+    rules = world._rules
+    ignored = sorted((min(pair), max(pair)) for pair in rules.ignored)
+    pairs = [(min(pair), max(pair), mu) for pair, mu in rules.friction.items()]
+    return Snapshot(
+        time=world.time, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
+        world_count=world.world_count, family=world._family,
+        bodies=tuple(_body_record(body, world) for body in world._bodies.values()),
+        grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
+        pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
+        ignored=tuple(ignored), rigid=layout_of(world), summed=tuple(sorted(rules.summed)),
+        drivers=tuple((driver, driver.save()) for driver in world.drivers), clock_shift=world._clock_shift,
+    )  # fmt: skip
+
+
+def apply(snapshot: Snapshot, world: Simulation) -> None:
+    """Make ``world`` what the snapshot is. Body and Grip objects that it still knows keep their identity.
+
+    Solvers are made before anything changes, so that a failure leaves the world as it was.
+    """
+    bodies = {record.key: _known_body(record, snapshot, world) for record in snapshot.bodies}
+    before = (world.gravity, world.frame_rate, world.substeps, world.world_count)
+    same_settings = before[:3] == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
+    world.gravity, world.frame_rate, world.substeps = snapshot.gravity, snapshot.frame_rate, snapshot.substeps
+    world.world_count = snapshot.world_count
+    scene = world._rigid
+    try:
+        world._rigid = scene_for(snapshot, bodies, world)
+        made = {
+            record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings)
+            for record in snapshot.bodies if record.dynamics is not None
+        }  # fmt: skip
+    except BaseException:
+        world.gravity, world.frame_rate, world.substeps, world.world_count = before
+        world._rigid = scene
+        raise
+    _take_apart(world, list(made.values()))
+    world._time, world._clock_shift = snapshot.time, snapshot.clock_shift
+    world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
+    for record in snapshot.bodies:
+        _fill(bodies[record.key], record)
+        world._register(bodies[record.key])
+    for record in snapshot.bodies:
+        body = bodies[record.key]
+        if record.parent is not None:
+            body._parent = bodies[record.parent]
+            body._parent._children.append(body)
+        if record.dynamics is not None:
+            body._dynamics = made[record.key]
+            body._dynamics.pushes = list(record.dynamics.pushes)
+    bring_static(snapshot.rigid, bodies, world)
+    for record in snapshot.bodies:
+        if record.dynamics is not None:
+            made[record.key].load_state(record.dynamics.state)
+    for grip in snapshot.grips:
+        _restore_grip(grip, bodies, world)
+    world._rules.friction = {frozenset((a, b)): mu for a, b, mu in snapshot.pair_friction}
+    world._rules.ignored = {frozenset(pair) for pair in snapshot.ignored}
+    world._rules.summed = set(snapshot.summed)
+    if snapshot.from_file:
+        _rename_keys(world, bodies)
+    world._colliders_changed()
+    settle(snapshot.rigid, world)
+    for driver, state in snapshot.drivers:
+        if driver in world.drivers:
+            driver.load(state)
+
+
+def _body_record(body: Body, world: Simulation) -> BodyRecord:
+    dynamics = None
+    if body._dynamics is not None:
+        own = body._dynamics
+        dynamics = DynamicsRecord(own.material, own.friction, own.state(), tuple(own.pushes))
+    parent = body._parent if isinstance(body._parent, Body) and body._parent._world is world else None
+    pose = (body._position, body._quaternion) if parent or body._dynamics else body.pose()
+    deformed, base = body._deformed if body._deformed is not None else (None, (None, None))
+    return BodyRecord(
+        key=body.key, name=body.name, shape=body.shape, color=body.color, friction=body.friction,
+        thickness=body.thickness, group=body.group, collides_with=body.collides_with, position=pose[0],
+        quaternion=pose[1], parent=None if parent is None else parent.key, deformed=deformed,
+        deformed_position=base[0], deformed_quaternion=base[1], dynamics=dynamics,
+        path=body._path.as_it_is() if isinstance(body._path, GroupPath) else body._path,
+        relative=None if body._parent is None or parent else body.relative_pose,
+    )  # fmt: skip
+
+
+def _grip_record(grip: Grip) -> GripRecord:
+    target = None if grip.target is None else grip.target.key
+    return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed)
+
+
+def _known_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
+    known = world._known_bodies.get(record.key)
+    if known is not None and known._world in (None, world):
+        return known
+    if snapshot.from_file:
+        # A file of another process: the body that the program has made anew under the same name.
+        twin = next((b for b in world._bodies.values() if b.name == record.name), None)
+        if (
+            twin is not None
+            and twin.key not in {r.key for r in snapshot.bodies}
+            and same_shape(twin.shape, record.shape)
+        ):
+            return twin
+    body = Body(record.shape)
+    body.key = record.key
+    return body
+
+
+def same_shape(a: Shape, b: Shape) -> bool:
+    """Return whether two shapes are equal, number for number."""
+    if type(a) is not type(b):
+        return False
+    if a == b:
+        return True
+    return all(
+        np.array_equal(x, y) if isinstance(x, np.ndarray) else x == y
+        for x, y in zip(a.__dict__.values(), b.__dict__.values(), strict=True)
+    )
+
+
+def _dynamics_for(
+    record: BodyRecord, own: DynamicsRecord, body: Body, world: Simulation, same_settings: bool
+) -> Dynamics:
+    current: Any = body._dynamics
+    if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
+        if not current.is_rigid or current.scene is world._rigid:
+            return current
+    as_recorded = Body(record.shape)
+    as_recorded.key = body.key
+    _fill(as_recorded, record)
+    return make_dynamics(as_recorded, own.material, own.state, own.friction, world)
+
+
+def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:
+    for body in list(world._bodies.values()):
+        if body._dynamics is not None:
+            for grip in body._dynamics.grips:
+                grip._world = None
+            body._dynamics.grips = []
+            body._dynamics.grips_changed = True
+        if isinstance(body._parent, Body):
+            parent = body._parent
+            parent._children = [child for child in parent._children if child is not body]
+            body._parent = None
+        if body._dynamics is not None and body._dynamics not in kept:
+            body._dynamics.release()
+        body._dynamics = body._path = body._world = None
+    world._bodies.clear()
+
+
+def _fill(body: Body, record: BodyRecord) -> None:
+    # A frame that is no body is not part of a snapshot: a body that follows one goes on following it.
+    pose = (record.position, record.quaternion)
+    outside = body._parent is not None and record.parent is None and record.dynamics is None
+    # nor does it begin to follow a body that was its parent meanwhile, and left the world
+    outside = outside and (record.relative is not None or not isinstance(body._parent, Body))
+    if body._parent is not None and not outside:
+        body._parent._children = [child for child in body._parent._children if child is not body]
+        body._parent = None
+    if body._parent is not None:
+        frame = body._parent.pose()
+        kept = record.relative
+        # rounding would move it where the frame has not
+        same = kept is not None and all(map(np.array_equal, compose(frame, kept), pose))
+        pose = kept if kept is not None and same else compose(invert(frame), pose)
+    body._position, body._quaternion = pose
+    body._name, body._shape, body.color = record.name, record.shape, record.color
+    body._friction, body._thickness = record.friction, record.thickness
+    body._group, body._collides_with = record.group, record.collides_with
+    body._path = record.path
+    body._deformed = record.deformation
+
+
+def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation) -> None:
+    grip = world._known_grips.get(record.key)
+    target = None if record.target is None else bodies[record.target]
+    spec = _with_own_keys(record.spec, bodies)
+    if grip is None:
+        made = Joint if isinstance(spec, JointSpec) else Grip
+        grip = made(bodies[record.body], spec, target, record.offsets)
+        grip.key = record.key
+    grip.body, grip.target, grip.spec = bodies[record.body], target, spec
+    grip.offsets, grip.followed = record.offsets, record.followed
+    world._hold(grip)
+
+
+def _with_own_keys(spec: Any, bodies: dict[str, Body]) -> Any:
+    """Let a grip's spec name bodies by their own keys, which differ where a file named them by others."""
+    ignored = getattr(spec, "ignored", ())
+    return replace(spec, ignored=tuple(bodies[key].key for key in ignored if key in bodies)) if ignored else spec
+
+
+def _rename_keys(world: Simulation, bodies: dict[str, Body]) -> None:
+    """Let the rules speak of the bodies' own keys, where a file named a body of this process by another."""
+    new = {key: body.key for key, body in bodies.items()}
+    rules = world._rules
+    # rules also speak of bodies that were removed, and may come back
+    rules.friction = {frozenset(new.get(key, key) for key in pair): mu for pair, mu in rules.friction.items()}
+    rules.ignored = {frozenset(new.get(key, key) for key in pair) for pair in rules.ignored}
+    rules.summed = {new.get(key, key) for key in rules.summed}
