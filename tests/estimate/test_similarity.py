@@ -102,7 +102,7 @@ def test_nothing_to_compare_with_is_refused():
             similarity(masks, real, ignore=ignore)
     chances = np.full((8, 8), 0.1)
     for masks, real, ignore in ((chances, blob, None), (blob, chances, None), (blob, blob, chances)):
-        with pytest.raises(InvalidInputError, match=r"pass p > 0\.5"):
+        with pytest.raises(InvalidInputError, match=r"threshold=0\.5"):
             similarity(masks, real, ignore=ignore)
     assert similarity(blob.astype(np.uint8) * 255, blob) == 1.0
 
@@ -195,4 +195,4 @@ def test_masks_of_real_numbers_are_refused_or_cut_at_a_threshold(on_device):
     with pytest.raises(InvalidInputError, match="ignore"):
         similarity(chances > 0.5, real, ignore=chances[0])
     with pytest.raises(InvalidInputError, match="finite"):
-        similarity(np.full((4, 5), np.nan), np.zeros((4, 5), bool), threshold=0.5)
+        similarity(np.full((4, 5), np.nan), np.ones((4, 5), bool), threshold=0.5)

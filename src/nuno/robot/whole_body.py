@@ -12,12 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import daqp
 import numpy as np
 
+from nuno.errors import MissingPackageError
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
+
+try:
+    import daqp
+except ImportError as error:
+    raise MissingPackageError("daqp", "robot", "a robot's balance") from error
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid

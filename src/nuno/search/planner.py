@@ -95,7 +95,7 @@ def plan(
     if n < 2 or best_of > n:
         raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
     heat = number("temperature", temperature, above=0.0)
-    random, least = np.random.default_rng(seed), SMALLEST * sigma
+    random, floor = np.random.default_rng(seed), SMALLEST * sigma
     futures = world.imagine(n, device)
     saved = futures.save()
     found, lowest, failed, history = mean, np.inf, 0, []
@@ -120,7 +120,7 @@ def plan(
             found, lowest = knots[order[0]], float(costs[order[0]])
         if method == "cem":
             chosen = knots[order[: min(best_of, int(finite.sum()))]]
-            mean, sigma = chosen.mean(axis=0), np.maximum(chosen.std(axis=0), least)
+            mean, sigma = chosen.mean(axis=0), np.maximum(chosen.std(axis=0), floor)
         else:
             span = max(float(np.ptp(costs[finite])), 1e-300)
             weights = np.where(finite, np.exp(-(np.where(finite, costs, 0.0) - costs[order[0]]) / span / heat), 0.0)
