@@ -44,7 +44,7 @@ class StaticPlace:
     where: tuple[bytes, bytes] | None
 
     def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
-        """Return whether this is what a body is, or was when it was saved, but for where it is."""
+        """Return True if this is what a body is, or was when it was saved, but for where it is."""
         return self.what == _what(body) and _same_shape(self.deformed, deformed)
 
 
@@ -75,7 +75,7 @@ class RigidScene:
         return world.world_count, world.device, world.gravity, world.frame_rate, world.substeps
 
     def is_current(self, world: Simulation) -> bool:
-        """Return whether the solver has been told of all that has changed."""
+        """Return True if the solver has been told of all that has changed."""
         return self._version == world._collider_version
 
     def bring(self, world: Simulation) -> None:
@@ -331,7 +331,7 @@ class RigidDynamics(Dynamics):
         self.load_state(whole)
 
     def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
-        """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
+        """Return True if it moves a body in this shape, deformed or not, of this thickness [m]."""
         return self.thickness == thickness and _same_shape(self.deformed, deformed)
 
     def finite(self) -> np.ndarray:
@@ -347,11 +347,8 @@ def _as_wide(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.nd
     """Return contacts (worlds, parts, row, ...) of two states with rows of one length."""
     fill = -1 if name in ("partner_slot", "partner_part") else 0
     row = max(a.shape[2], b.shape[2])
-    wide = [
-        np.pad(v, [(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)], constant_values=fill)
-        for v in (a, b)
-    ]
-    return wide[0], wide[1]
+    pads = [[(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)] for v in (a, b)]
+    return np.pad(a, pads[0], constant_values=fill), np.pad(b, pads[1], constant_values=fill)
 
 
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
@@ -387,7 +384,7 @@ def _what(body: Body | BodyRecord) -> tuple[Any, ...]:
 
 
 def _same_shape(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pose] | None) -> bool:
-    """Return whether two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
+    """Return True if two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
     if a is None or b is None:
         return a is b
     return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))

@@ -68,5 +68,5 @@ class HandPath:
         return np.stack([np.interp(when, self.times, self.positions[:, axis]) for axis in range(3)], axis=-1)
 
     def holds_at(self, time: float) -> bool:
-        """Return whether it holds at ``time`` [s]."""
+        """Return True if it holds at ``time`` [s]."""
         return any(begin <= time < end for begin, end in self.holds)

@@ -19,7 +19,7 @@ def hands_figure(result: FoldResult) -> Figure:
 
     table = np.asarray(result.rectangle.corners)[:, 2].mean()
     figure = Figure(figsize=(9.0, 3.9), layout="constrained", facecolor="white")
-    above, beside = figure.subplots(1, 2)
+    above, heights = figure.subplots(1, 2)
     outline = np.vstack([result.rectangle.corners, result.rectangle.corners[:1]])
     above.plot(*outline[:, :2].T, color="0.6", linewidth=1.0, label="cloth before")
     folded = PolyCollection(result.final[:, :2][result.faces], facecolor="0.88", edgecolor="0.88", label="cloth folded")
@@ -28,15 +28,15 @@ def hands_figure(result: FoldResult) -> Figure:
         path, color = result.hands_at[:, hand], f"C{hand}"
         line = "-" if hand == 0 else "--"  # hands that move alike have one height
         above.plot(*path[:, :2].T, color=color, linewidth=1.0, label=f"hand {hand}")
-        beside.plot(result.times, 1000.0 * (path[:, 2] - table), line, color=color, linewidth=1.0)
+        heights.plot(result.times, 1000.0 * (path[:, 2] - table), line, color=color, linewidth=1.0)
         for hold in result.fold.holds:
             if hold.hand == hand and hold.held_cloth:
                 held = (result.times >= hold.begin) & (result.times <= hold.end)
                 above.plot(*path[held, :2].T, color=color, linewidth=2.5)
-                beside.plot(result.times[held], 1000.0 * (path[held, 2] - table), line, color=color, linewidth=2.5)
+                heights.plot(result.times[held], 1000.0 * (path[held, 2] - table), line, color=color, linewidth=2.5)
         above.plot(*path[0, :2], "o", color=color, markersize=6)
         above.plot(*path[-1, :2], "x", color=color, markersize=7)
     above.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title="from above, from the dot to the cross")
-    beside.set(xlabel="time [s]", ylabel="height above the cloth [mm]", title="thick while the hand holds the cloth")
+    heights.set(xlabel="time [s]", ylabel="height above the cloth [mm]", title="thick while the hand holds the cloth")
     above.legend(fontsize=8, loc="center left")
     return figure

@@ -9,7 +9,7 @@ from nuno.errors import UnknownNameError
 
 
 class LimbControllers:
-    """What ``default_controller`` has, limb by limb; a limb that the robot lacks raises ``UnknownNameError``."""
+    """Parts of ``default_controller``, limb by limb; a limb that the robot lacks raises ``UnknownNameError``."""
 
     @abstractmethod
     def default_controller(self) -> list[dict[str, Any]]:

@@ -93,7 +93,7 @@ class RunningWalk(TimedMotion):
 
     @property
     def planner(self) -> WalkPlanner:
-        """What it was planned by."""
+        """The planner that planned it."""
         return self._planner
 
     @property

@@ -40,7 +40,7 @@ class TimedMotion(ABC):
     @property
     @abstractmethod
     def planner(self) -> WalkPlanner:
-        """What it was planned by."""
+        """The planner that planned it."""
 
     @property
     @abstractmethod
@@ -134,7 +134,7 @@ class Walk(TimedMotion):
 
     @property
     def planner(self) -> WalkPlanner:
-        """What it was planned by."""
+        """The planner that planned it."""
         planner: WalkPlanner = self.plan.planner
         return planner
 
