@@ -97,7 +97,7 @@ class Material:
         )
 
     def same_as(self, other: Any) -> bool:
-        """Return whether another material is of the same kind and has exactly the same values."""
+        """Return True if another material is of the same kind and has exactly the same values."""
 
         def same(a: Any, b: Any) -> bool:
             if isinstance(a, tuple) and isinstance(b, tuple):

@@ -106,7 +106,7 @@ def test_the_grid_plan_lists_the_pairs_of_the_fused_one(worlds, monkeypatch):
 
     The test of a vertex and a triangle lets pairs through that are not near, more or fewer by how they are looked for.
     """
-    monkeypatch.setattr("nuno.solvers.cloth_solver.WIDE_MARGIN", 0.35)  # the fused plan's
+    monkeypatch.setattr("nuno.solvers.cloth_solver.LIST_MARGIN", 0.35)  # the fused plan's
     made = [solver("sheet", plan, worlds, self_contact=True) for plan in ("fused", "grid")]
     for each in made:
         each.run(0.0, 1.0 / 60.0 / 12.0)

@@ -155,7 +155,7 @@ def test_every_plan_tells_that_its_lists_were_short(plan, scarce):
 @pytest.mark.long
 def test_contacts_that_find_no_memory_are_told_of(monkeypatch, caplog, scarce):
     """Where lists may not grow the run goes on, with one warning for the body and a flag."""
-    monkeypatch.setattr(pair_capacity, "MOST_LISTS", 1.0e4)
+    monkeypatch.setattr(pair_capacity, "MAX_LIST_BYTES", 1.0e4)
     world = folded("cpu", worlds=3)
     cloth = world.find("cloth")
     assert not np.any(cloth.missed_contacts)

@@ -114,12 +114,12 @@ class Body(Quantities, Coordinates):
 
     @property
     def is_dynamic(self) -> bool:
-        """Return whether dynamics are attached."""
+        """Return True if dynamics are attached."""
         return self._dynamics is not None
 
     @property
     def is_deformed(self) -> bool:
-        """Return whether the body is static in another shape than ``shape``."""
+        """Return True if the body is static in another shape than ``shape``."""
         return self._deformed is not None
 
     @property
@@ -130,12 +130,12 @@ class Body(Quantities, Coordinates):
 
     @property
     def is_solid(self) -> bool:
-        """Return whether it has an inside: all shapes but cloths and meshes that are open or inside out."""
+        """Return True if it has an inside: all shapes but cloths and meshes that are open or inside out."""
         return self._shape.is_solid
 
     @property
     def missed_contacts(self) -> Any:
-        """Return whether contacts of a cloth with itself were missed: a bool, in a batch (worlds,).
+        """Return True if contacts of a cloth with itself were missed; in a batch (worlds,).
 
         Memory ran out, or it passed through itself in spite of all substeps; a warning told which.
         """

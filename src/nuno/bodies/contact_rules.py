@@ -31,14 +31,14 @@ class ContactRules:
         self.held = {frozenset((grip.body.key, key)) for grip in grips for key in grip.ignored}
 
     def touch(self, a: Body, b: Body) -> bool:
-        """Return whether two bodies touch each other at all."""
+        """Return True if two bodies touch each other at all."""
         pair = frozenset((a.key, b.key))
         if pair in self.ignored or pair in self.held:
             return False
         return bool(a.group & b.collides_with) and bool(b.group & a.collides_with)
 
     def touches_itself(self, body: Body) -> bool:
-        """Return whether the parts of a body touch each other: unless it is ignored as a pair with itself."""
+        """Return True if the parts of a body touch each other: unless it is ignored as a pair with itself."""
         return frozenset((body.key,)) not in self.ignored
 
     def colliders_of(self, dynamic: Body, static: list[Body]) -> tuple[list[Body], dict[str, Any]]:

@@ -144,7 +144,7 @@ class Dynamics:
         return tuple(push for push in self.pushes if push.end is None or push.end > time + SOON)
 
     def fits(self, material: Material, world_count: int, friction: Any) -> bool:
-        """Return whether this can take a state of the given material, worlds and friction."""
+        """Return True if this can take a state of the given material, worlds and friction."""
         same_friction = np.array_equal(friction, self.friction)
         return same_friction and self.world_count == world_count and self.material.same_as(material)
 
@@ -276,12 +276,12 @@ class ParticleDynamics(Dynamics):
 
     def shape_impulses(self) -> dict[str, np.ndarray]:
         """Return what static bodies gave this one in the last frame, (worlds, 3) [N s], by key, where it is summed."""
-        told: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.told()
-        return told
+        given: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.given()
+        return given
 
     def _forget_impulses(self) -> None:
         if self.solver.sums is not None:
-            self.solver.sums.tell({})
+            self.solver.sums.set_given({})
 
     def keep(self) -> Any:
         """Return what `put_back` takes: as `state`, but where the solver has it."""
@@ -326,7 +326,7 @@ class ParticleDynamics(Dynamics):
 
 
 def touches_itself(world: Simulation, body: Body) -> bool:
-    """Return whether contacts of a soft body with itself are looked for, which takes it through a frame by parts."""
+    """Return True if contacts of a soft body with itself are looked for, which takes it through a frame by parts."""
     return isinstance(body.material, Soft) and body.material.self_contact and world._rules.touches_itself(body)
 
 

@@ -58,7 +58,7 @@ class RigidScene:
         return world.world_count, world.device, world.gravity, world.frame_rate, world.substeps
 
     def is_current(self, world: Simulation) -> bool:
-        """Return whether the solver has been told of all that has changed."""
+        """Return True if the solver has been told of all that has changed."""
         return self._version == world._collider_version
 
     def bring(self, world: Simulation) -> None:
@@ -330,11 +330,8 @@ def _as_wide(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.nd
     """Return contacts (worlds, parts, row, ...) of two states with rows of one length."""
     fill = -1 if name in ("partner_slot", "partner_part") else 0
     row = max(a.shape[2], b.shape[2])
-    wide = [
-        np.pad(v, [(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)], constant_values=fill)
-        for v in (a, b)
-    ]
-    return wide[0], wide[1]
+    pads = [[(0, 0), (0, 0), (0, row - v.shape[2]), *[(0, 0)] * (v.ndim - 3)] for v in (a, b)]
+    return np.pad(a, pads[0], constant_values=fill), np.pad(b, pads[1], constant_values=fill)
 
 
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:

@@ -85,9 +85,9 @@ def bend_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any):
 @wp.func
 def total(weights: Any, row: int, x0: Any, x1: Any, x2: Any, x3: Any, x4: Any, x5: Any):
     """The sum of six places, weighed with the numbers from ``row`` on, which add up to zero."""
-    near = offset(x0, x0) * weights[row] + offset(x1, x0) * weights[row + 1] + offset(x2, x0) * weights[row + 2]
-    near = near + offset(x3, x0) * weights[row + 3] + offset(x4, x0) * weights[row + 4]
-    return near + offset(x5, x0) * weights[row + 5]
+    mean = offset(x0, x0) * weights[row] + offset(x1, x0) * weights[row + 1] + offset(x2, x0) * weights[row + 2]
+    mean = mean + offset(x3, x0) * weights[row + 3] + offset(x4, x0) * weights[row + 4]
+    return mean + offset(x5, x0) * weights[row + 5]
 
 
 @wp.func

@@ -100,7 +100,7 @@ def vertex_masses(topology: ClothTopology, density: np.ndarray) -> np.ndarray:
 
 
 def _differ(columns: list[np.ndarray]) -> bool:
-    """Return whether elements have their own values."""
+    """Return True if elements have their own values."""
     return any(column.shape[1] > 1 for column in columns)
 
 

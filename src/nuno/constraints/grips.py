@@ -71,8 +71,8 @@ def hold_vertices(t: Any, run: Settings, rank: int, size: int):
 def off_path(x: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any, path: Any):
     """Return how far the mean of three coordinates with the weights k is from the path."""
     base = gather(x, a)
-    near = ka * relative_to(base, base) + kb * relative_to(gather(x, b), base)
-    return near + kc * relative_to(gather(x, c), base) - relative_to(path, base)
+    mean = ka * relative_to(base, base) + kb * relative_to(gather(x, b), base)
+    return mean + kc * relative_to(gather(x, c), base) - relative_to(path, base)
 
 
 @wp.func

@@ -14,7 +14,7 @@ from nuno.numbers.element_access import at, corner, put
 from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
 
-MOST_RELAXED = wp.constant(1.45)
+MAX_RELAXATION = wp.constant(1.45)
 """Bound of the over-relaxation: at 2 it would oscillate, and near it short waves take long to die down."""
 
 
@@ -27,7 +27,7 @@ def relaxation(weight: Any, alpha: Any, rise: float, onset: float):
     if rise == 0.0:
         return full_like(weight, 1.0)
     q = (weight - alpha) / alpha * 0.5
-    return minimum(maximum((sqrt(q) - onset) * rise + 1.0, 1.0), MOST_RELAXED)
+    return minimum(maximum((sqrt(q) - onset) * rise + 1.0, 1.0), MAX_RELAXATION)
 
 
 # The rows of a grid line. Its edges C_k = |x_k - x_k+1| - rest_k are linear in their lambdas, with a matrix of three
@@ -61,14 +61,14 @@ def edge_coupling(w: Any, before: Any, direction: Any):
 
 
 @wp.func
-def between_pulls(w: Any, after: Any, before: Any):
+def between_forces(w: Any, after: Any, before: Any):
     """The move of the vertex between two edges, by lambda times direction of either."""
     return w * (after - before)
 
 
 @wp.func
 def stretch_grid_line(
-    t: Any, table: Any, rest: Any, gains: Any, pulls: Any, inverses: Any, first: int, last: int, rate: float
+    t: Any, table: Any, rest: Any, gains: Any, forces: Any, inverses: Any, first: int, last: int, rate: float
 ):
     """All edges of a grid line at once: C_k = |x_k - x_k+1| - rest_k.
 
@@ -80,8 +80,8 @@ def stretch_grid_line(
         t: The world's state.
         table: The edges, each grid line's one after the other.
         rest: Their lengths at rest [m]; in a later sweep those that the one before left them with (`note_lengths`).
-        gains: Room for a number an edge; so are ``pulls`` and ``inverses``.
-        pulls: See ``gains``.
+        gains: Room for a number an edge; so are ``forces`` and ``inverses``.
+        forces: See ``gains``.
         inverses: See ``gains``.
         first: The grid line's first edge.
         last: One past its last.
@@ -106,7 +106,7 @@ def stretch_grid_line(
         alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[k]), table.edge_scale[k], rate)
         pivot = 1.0 / (edge_diagonal(wa, wb, alpha) - coupling * gain)
         pull = (rest[k] - length + coupling * pull) * pivot
-        put(pulls, k, pull)
+        put(forces, k, pull)
         put(inverses, k, inverse)
         a = b
         wa = wb
@@ -118,10 +118,10 @@ def stretch_grid_line(
         i = corner(table.edge, k, 0, 2)
         j = corner(table.edge, k, 1, 2)
         if back > 0:
-            pull = at(pulls, k) + at(gains, k) * pull
+            pull = at(forces, k) + at(gains, k) * pull
         b = position(t, i)
         own = (b - a) * (pull * at(inverses, k))
-        put_position(t, j, a + between_pulls(at(t.w, j), force, own))
+        put_position(t, j, a + between_forces(at(t.w, j), force, own))
         a = b
         force = own
     move(t, head, force * at(t.w, head))
@@ -172,8 +172,8 @@ def shear_cell(t: Any, a: Any, b: Any, c: Any, d: Any, scale: Any, alpha: Any, p
 def weighed(t: Any, a: Any, b: Any, c: Any, ka: Any, kb: Any, kc: Any):
     """The sum of k_i x_i, the k adding up to zero."""
     base = position(t, a)
-    near = offset(base, base) * ka + offset(position(t, b), base) * kb
-    return near + offset(position(t, c), base) * kc
+    mean = offset(base, base) * ka + offset(position(t, b), base) * kb
+    return mean + offset(position(t, c), base) * kc
 
 
 @wp.func

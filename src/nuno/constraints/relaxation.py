@@ -14,15 +14,15 @@ import math
 
 import numpy as np
 
-from nuno.constraints.membrane import MOST_RELAXED
+from nuno.constraints.membrane import MAX_RELAXATION
 from nuno.topology.cloth_topology import ClothTopology, Elements
 
 RELAXATIONS = ((0.0, 0.0), (0.0, 0.0), (0.467, 0.473), (0.403, 0.609), (0.379, 0.725), (0.378, 0.858), (0.367, 0.966))
 """By the number of sweeps, rise and onset of the over-relaxation 1 + rise (sqrt(q) - onset), at least 1 and at most
-`nuno.constraints.membrane.MOST_RELAXED`. Fitted so that a uniform stress meets 0.98 to 1.00 of the nominal stiffness by
-`stiffness_share`: near a rim it is some percent more where that is free, and less where it is held. Each element takes
-its own q."""
-MOST_SOFTENED = (0.05, 0.05, 1.15, 2.2, 3.0, 4.0)
+`nuno.constraints.membrane.MAX_RELAXATION`. Fitted so that a uniform stress meets 0.98 to 1.00 of the nominal stiffness
+by `stiffness_share`: near a rim it is some percent more where that is free, and less where it is held. Each element
+takes its own q."""
+MAX_SOFTENED = (0.05, 0.05, 1.15, 2.2, 3.0, 4.0)
 """The largest q for which so many sweeps are enough, none meaning one plain pass."""
 PLAIN = 0.1
 """The q that leaves a plain pass within a tenth of nominal."""
@@ -77,7 +77,7 @@ def _mean(elements: Elements, stiffness: np.ndarray, rate: np.ndarray) -> float:
 def relaxation(q: float, sweeps: int) -> float:
     """The over-relaxation of an element by its q, as `nuno.constraints.membrane.relaxation` has it."""
     rise, onset = RELAXATIONS[sweeps]
-    return min(max(1.0, 1.0 + rise * (math.sqrt(q) - onset)), float(MOST_RELAXED))
+    return min(max(1.0, 1.0 + rise * (math.sqrt(q) - onset)), float(MAX_RELAXATION))
 
 
 def stiffness_share(q: float, sweeps: int) -> float:
@@ -107,7 +107,7 @@ def sweeps_for(q: float, mesh: bool) -> int:
         mesh: Whether the cloth is a mesh: the three constraints of a triangle hinder each other besides, and from
             three sweeps on it takes one more.
     """
-    for sweeps, most in enumerate(MOST_SOFTENED):
+    for sweeps, most in enumerate(MAX_SOFTENED):
         if q <= most:
             return min(sweeps + (mesh and sweeps > 2), len(RELAXATIONS) - 1)
     return len(RELAXATIONS) - 1

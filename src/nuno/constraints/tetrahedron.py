@@ -91,7 +91,7 @@ def element(m11: lane, m22: lane, m33: lane, m12: lane, m13: lane, m23: lane, in
 
 
 @wp.func
-def times_row(s: Any, row: Any):
+def scaled_row(s: Any, row: Any):
     """A row of a matrix times a number, which may be lanes where the row is of floats."""
     return vec3(s * row.x, s * row.y, s * row.z)
 
@@ -124,9 +124,9 @@ def element_reply(e: Any, f: Any, g: Any, wa: Any, wb: Any, wc: Any, wd: Any, sh
     mu = minimum(mu, max_stiffness)
     bulk = minimum(bulk, max_stiffness)
     pressure = (bulk * (j - one) - mu) * (1.0 / 6.0)
-    kb = combination(times_row(mu, m.x), e, f, g)
-    kc = combination(times_row(mu, m.y), e, f, g)
-    kd = combination(times_row(mu, m.z), e, f, g)
+    kb = combination(scaled_row(mu, m.x), e, f, g)
+    kc = combination(scaled_row(mu, m.y), e, f, g)
+    kd = combination(scaled_row(mu, m.z), e, f, g)
     # |F|^2 mu v = e k: k is the gradient of half of it
     squares = fused_add_dot(e, kb, fused_add_dot(f, kc, fused_dot(g, kd)))
     # |F|^2 mu

@@ -44,30 +44,30 @@ def damp_tetrahedron(
     Returns:
         The vertices' velocities then [m/s].
     """
-    e = b - a
-    f = c - a
-    g = d - a
-    h = vb - va
-    i = vc - va
-    j = vd - va
+    ab = b - a
+    ac = c - a
+    ad = d - a
+    vab = vb - va
+    vac = vc - va
+    vad = vd - va
     # half the rate of the edges' scalar products, which is what E' is in the rest shape's edges
-    ef = fused_add_dot(e, i, fused_dot(f, h)) * 0.5
-    eg = fused_add_dot(e, j, fused_dot(g, h)) * 0.5
-    fg = fused_add_dot(f, j, fused_dot(g, i)) * 0.5
-    ge = vec3(fused_dot(e, h), ef, eg)
-    gf = vec3(ef, fused_dot(f, i), fg)
-    gg = vec3(eg, fg, fused_dot(g, j))
+    g12 = fused_add_dot(ab, vac, fused_dot(ac, vab)) * 0.5
+    g13 = fused_add_dot(ab, vad, fused_dot(ad, vab)) * 0.5
+    g23 = fused_add_dot(ac, vad, fused_dot(ad, vac)) * 0.5
+    g1 = vec3(fused_dot(ab, vab), g12, g13)
+    g2 = vec3(g12, fused_dot(ac, vac), g23)
+    g3 = vec3(g13, g23, fused_dot(ad, vad))
     m = shape.m
-    q1 = vec3(fused_dot(ge, m.x), fused_dot(gf, m.x), fused_dot(gg, m.x))
-    q2 = vec3(fused_dot(ge, m.y), fused_dot(gf, m.y), fused_dot(gg, m.y))
-    q3 = vec3(fused_dot(ge, m.z), fused_dot(gf, m.z), fused_dot(gg, m.z))
-    one = full_like(e.x, 1.0)
+    q1 = vec3(fused_dot(g1, m.x), fused_dot(g2, m.x), fused_dot(g3, m.x))
+    q2 = vec3(fused_dot(g1, m.y), fused_dot(g2, m.y), fused_dot(g3, m.y))
+    q3 = vec3(fused_dot(g1, m.z), fused_dot(g2, m.z), fused_dot(g3, m.z))
+    one = full_like(ab.x, 1.0)
     # the trace of B^T S B, S the edges' scalar products, is |F|^2: a stretched element replies more
     stretched = (
-        fused_dot(e, e) * m.x.x
-        + fused_dot(f, f) * m.y.y
-        + fused_dot(g, g) * m.z.z
-        + (fused_dot(e, f) * m.x.y + fused_dot(e, g) * m.x.z + fused_dot(f, g) * m.y.z) * 2.0
+        fused_dot(ab, ab) * m.x.x
+        + fused_dot(ac, ac) * m.y.y
+        + fused_dot(ad, ad) * m.z.z
+        + (fused_dot(ab, ac) * m.x.y + fused_dot(ab, ad) * m.x.z + fused_dot(ac, ad) * m.y.z) * 2.0
     )
     per_volume = shape.inverse * 6.0
     reply = fused(wc, m.y.y, fused(wb, m.x.x, wa * steepness(m))) + wd * m.z.z
@@ -76,9 +76,9 @@ def damp_tetrahedron(
     n12 = s * fused_dot(q1, m.y)
     n13 = s * fused_dot(q1, m.z)
     n23 = s * fused_dot(q2, m.z)
-    rb = combination(vec3(s * fused_dot(q1, m.x), n12, n13), e, f, g)
-    rc = combination(vec3(n12, s * fused_dot(q2, m.y), n23), e, f, g)
-    rd = combination(vec3(n13, n23, s * fused_dot(q3, m.z)), e, f, g)
+    rb = combination(vec3(s * fused_dot(q1, m.x), n12, n13), ab, ac, ad)
+    rc = combination(vec3(n12, s * fused_dot(q2, m.y), n23), ab, ac, ad)
+    rd = combination(vec3(n13, n23, s * fused_dot(q3, m.z)), ab, ac, ad)
     va = fused_vec(wa, rb + rc + rd, va)
     vb = fused_subtract_vec(wb, rb, vb)
     vc = fused_subtract_vec(wc, rc, vc)

@@ -110,7 +110,7 @@ def bound_corners(particles: Particles, first: int, corners: wp.vec4i, dragged: 
 
 @wp.func
 def is_bounded(particles: Particles, first: int, corners: wp.vec4i):
-    """Return whether a shape bounds any of a row's particles."""
+    """Return True if a shape bounds any of a row's particles."""
     found = bool(False)
     for k in range(4):
         if corners[k] >= 0:

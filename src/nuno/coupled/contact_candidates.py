@@ -144,7 +144,7 @@ def sort_rows(rows: Rows, world: int, start: int):
 
 @wp.func
 def later(a: wp.vec4i, b: wp.vec4i):
-    """Return whether one row's corners come after another's."""
+    """Return True if one row's corners come after another's."""
     for k in range(4):
         if a[k] != b[k]:
             return a[k] > b[k]
@@ -153,7 +153,7 @@ def later(a: wp.vec4i, b: wp.vec4i):
 
 @wp.func
 def may_touch(elements: Elements, world: int, a: int, b: int):
-    """Return whether two bodies touch at all, and go together in this world."""
+    """Return True if two bodies touch at all, and go together in this world."""
     together = elements.island[world * elements.bodies + a] == elements.island[world * elements.bodies + b]
     return together and elements.touch[a * elements.bodies + b] != 0
 
@@ -166,7 +166,7 @@ def body_radius(elements: Elements, world: int, body: int):
 
 @wp.func
 def near_triangle(particles: Particles, first: int, x: wp.vec3, f: wp.vec3i, far: float):
-    """Return whether a point may be nearer than ``far`` to a triangle: to its plane, and to the ball around it."""
+    """Return True if a point may be nearer than ``far`` to a triangle: to its plane, and to the ball around it."""
     a = place(particles, first + f[0])
     b = place(particles, first + f[1])
     c = place(particles, first + f[2])
@@ -179,7 +179,7 @@ def near_triangle(particles: Particles, first: int, x: wp.vec3, f: wp.vec3i, far
 
 @wp.func
 def is_near(elements: Elements, i: int, j: int):
-    """Return whether particle j is one of those near particle i within their body."""
+    """Return True if particle j is one of those near particle i within their body."""
     low = int(elements.near_start[i])
     high = int(elements.near_start[i + 1])
     end = int(high)

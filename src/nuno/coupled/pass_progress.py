@@ -35,7 +35,7 @@ def island_of(passing: Passing, world: int, body: int):
 
 @wp.func
 def goes_on(passing: Passing, k: int):
-    """Return whether an island's passes are not at their end."""
+    """Return True if an island's passes are not at their end."""
     on = bool(True)
     if k >= 0:
         on = passing.done[k] == 0

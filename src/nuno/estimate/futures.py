@@ -97,7 +97,7 @@ def table_world(
 
 
 def is_turned(rectangle: ClothRectangle) -> bool:
-    """Return whether CJ lies clockwise of CI seen from above, so that j runs against the sheet's own y."""
+    """Return True if CJ lies clockwise of CI seen from above, so that j runs against the sheet's own y."""
     along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
     return bool(along[0] * across[1] - along[1] * across[0] < 0)
 

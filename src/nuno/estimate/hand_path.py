@@ -77,5 +77,5 @@ class HandPath:
 
     @checked
     def holds_at(self, time: float) -> bool:
-        """Return whether it holds at ``time`` [s]."""
+        """Return True if it holds at ``time`` [s]."""
         return any(begin <= time < end for begin, end in self.holds)

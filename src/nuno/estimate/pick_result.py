@@ -161,7 +161,7 @@ class PickResult:
         return self.world
 
     def _in_table(self, points: np.ndarray) -> bool:
-        """Return whether any of (n, 3) points is inside a table that has an edge."""
+        """Return True if any of (n, 3) points is inside a table that has an edge."""
         table = self.world.find("table")
         if isinstance(table.shape, Plane):
             return False  # a turn about the vertical keeps heights

@@ -111,7 +111,7 @@ class Ranked:
         return np.sort(order[:limit])
 
     def settled(self, sure: float) -> bool:
-        """Return whether one candidate is as likely as ``sure``, below 1, so that no more guesses are needed."""
+        """Return True if one candidate is as likely as ``sure``, below 1, so that no more guesses are needed."""
         likely = probabilities(self.name, self.scores)
         return sure < 1.0 and likely is not None and bool(likely.max() >= sure)
 

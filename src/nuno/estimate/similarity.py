@@ -111,7 +111,7 @@ def contour(mask: np.ndarray, ignore: np.ndarray | None = None) -> np.ndarray:
 def _is_background(
     keys: wp.array3d[wp.int32], state: wp.array2d[wp.uint8], world: int, x: int, y: int, x0: int, y0: int
 ):
-    """Return whether a pixel (image coordinates) is in the image, not in the simulated mask, and not ignored."""
+    """Return True if a pixel (image coordinates) is in the image, not in the simulated mask, and not ignored."""
     if x < 0 or y < 0 or x >= state.shape[1] or y >= state.shape[0]:
         return False
     if (state[y, x] & wp.uint8(2)) != wp.uint8(0):

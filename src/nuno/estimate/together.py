@@ -132,7 +132,7 @@ class Together:
 
 
 def has_room(device: str) -> bool:
-    """Return whether more worlds take hardly longer; a CPU's cores are busy with any."""
+    """Return True if more worlds take hardly longer; a CPU's cores are busy with any."""
     return device != "cpu"
 
 

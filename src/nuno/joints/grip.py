@@ -94,7 +94,7 @@ class Grip:
 
     @property
     def active(self) -> bool:
-        """Return whether the points are held."""
+        """Return True if the points are held."""
         return self._world is not None
 
     @property
@@ -120,7 +120,7 @@ class Grip:
 
     @property
     def is_tie(self) -> bool:
-        """Return whether it joins moving bodies, holds a rigid body or has a limit: it is then solved with contacts."""
+        """Return True if it joins moving bodies, holds a rigid body or has a limit: it is then solved with contacts."""
         return not isinstance(self.spec, GripSpec) or self.spec.max_force is not None
 
     @property

@@ -33,7 +33,7 @@ def load_mesh(source: MeshSource) -> tuple[np.ndarray, np.ndarray]:
 
 
 def has_faces(source: Any) -> bool:
-    """Return whether a source of a mesh is more than vertices: a path, a trimesh.Trimesh, or (vertices, faces)."""
+    """Return True if a source of a mesh is more than vertices: a path, a trimesh.Trimesh, or (vertices, faces)."""
     if isinstance(source, str | PathLike) or hasattr(source, "faces"):
         return True
     # three numbers make a vertex

@@ -121,7 +121,7 @@ def _batches(count: np.ndarray, size: int = 1_000_000) -> list[np.ndarray]:
 
 
 def _left_of(a: np.ndarray, b: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether (x, y) is left of the edge from a to b, seen from above, and twice the area that they span.
+    """Return True if (x, y) is left of the edge from a to b, seen from above, and twice the area that they span.
 
     Both faces of an edge take the same product with its ends in the same order, so that no line slips between them; a
     line through an edge counts as shifted by an infinitely small (dx, dy), dx much greater than dy.

@@ -174,6 +174,6 @@ def check_residency(
 
 @wp.func
 def all_resident(barrier_counts: wp.array(dtype=int), call: int, worlds: int, blocks: int):
-    """Return whether all ``blocks`` blocks of the launch are resident, and those of the launches before it were."""
+    """Return True if all ``blocks`` blocks of the launch are resident, and those of the launches before it were."""
     stride = COUNT * (ARRIVALS + worlds)
     return check_residency(barrier_counts, call * stride, COUNT, stride, call, blocks, PATIENCE)

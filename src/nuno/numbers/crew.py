@@ -42,5 +42,5 @@ return size > 1;
 #endif
 """)
 def shares_work(size: int) -> bool:
-    """Return whether threads share the work; known to CUDA's compiler at once, which then leaves the rest out."""
+    """Return True if threads share the work; known to CUDA's compiler at once, which then leaves the rest out."""
     ...

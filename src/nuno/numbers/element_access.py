@@ -126,7 +126,7 @@ def factor_like(like: lane, value: lane):
 
 @wp.func
 def is_set(value: float):
-    """Return whether a factor is not zero, or not zero in every lane."""
+    """Return True if a factor is not zero, or not zero in every lane."""
     return value != 0.0
 
 

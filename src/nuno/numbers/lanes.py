@@ -259,7 +259,7 @@ def absolute(a: lane) -> lane: ...
 
 @wp.func
 def anywhere(a: float):
-    """Return whether a lane is positive."""
+    """Return True if a lane is positive."""
     return a > 0.0
 
 

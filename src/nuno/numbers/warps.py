@@ -29,7 +29,7 @@ return true;
 #endif
 """)
 def leads_warp(rank: int, size: int) -> bool:
-    """Return whether the thread speaks for those that `warp_max` has looked at."""
+    """Return True if the thread speaks for those that `warp_max` has looked at."""
     ...
 
 
@@ -41,7 +41,7 @@ return false;
 #endif
 """)
 def in_warps(size: int) -> bool:
-    """Return whether the threads of a world are whole warps."""
+    """Return True if the threads of a world are whole warps."""
     ...
 
 
@@ -153,7 +153,7 @@ return yes;
 #endif
 """)
 def anyone(yes: bool) -> bool:
-    """Return whether a thread of the block says yes; all wait for each other."""
+    """Return True if a thread of the block says yes; all wait for each other."""
     ...
 
 

@@ -46,7 +46,7 @@ then share one, so that other worlds run while one waits. Both do the same, and 
 
 @wp.func
 def advance_block(
-    t: Any, near: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, rank: int, size: int
+    t: Any, floats: Any, topo: Topology, run: Settings, shapes: Shapes, substeps: int, rank: int, size: int
 ):
     """`advance` with the counts of the pair lists and the figures in shared memory for as long as the launch takes."""
     device_pairs = t.pair_count
@@ -57,10 +57,10 @@ def advance_block(
     t.active_count = counts(COUNTS)
     t.scalars = figures(0)
     t.notes = figures(8)
-    near.pair_count = counts(0)
-    near.active_count = counts(COUNTS)
-    near.scalars = figures(0)
-    near.notes = figures(8)
+    floats.pair_count = counts(0)
+    floats.active_count = counts(COUNTS)
+    floats.scalars = figures(0)
+    floats.notes = figures(8)
     if rank == 0:
         for k in range(COUNTS):
             t.pair_count[k] = device_pairs[k]
@@ -68,7 +68,7 @@ def advance_block(
             t.active_count[k] = device_active[k]
     bring_figures(t, scalars, notes, rank)
     barrier(size)
-    advance(t, t, near, near, topo, topo, run, shapes, 0, substeps, crew_of(rank, size))
+    advance(t, t, floats, floats, topo, topo, run, shapes, 0, substeps, crew_of(rank, size))
     barrier(size)
     if rank == 0:
         for k in range(COUNTS):
@@ -242,7 +242,7 @@ def run_blocks_many(
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.plans.run_double_blocks")
 def run_double_blocks(
-    s: StateDouble, floats: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int,
+    s: StateDouble, rounded: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int,
     size: int,
 ):  # fmt: skip
     """Every world by a block of ``size`` threads, coordinates as doubles."""
@@ -250,15 +250,15 @@ def run_double_blocks(
     if tid / size < s.worlds:
         block = tid / size
         t = view(s, block, topo.particles, sizes)
-        near = view(floats, block, topo.particles, sizes)
-        advance_block(t, near, topo, run, shapes, substeps, tid % size, size)
+        floats = view(rounded, block, topo.particles, sizes)
+        advance_block(t, floats, topo, run, shapes, substeps, tid % size, size)
     else:
-        search_for_others(floats, topo, sizes, run, tid / size - s.worlds, tid % size, size)
+        search_for_others(rounded, topo, sizes, run, tid / size - s.worlds, tid % size, size)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.plans.run_double_blocks_partly")
 def run_double_blocks_partly(
-    s: StateDouble, floats: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int,
+    s: StateDouble, rounded: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, substeps: int,
     size: int,
 ):  # fmt: skip
     """The same with x, y and z in shared memory for as long as the launch takes."""
@@ -269,7 +269,7 @@ def run_double_blocks_partly(
         n = topo.particles
         t = view(s, block, n, sizes)
         outside = view(s, block, n, sizes)
-        near = view(floats, block, n, sizes)
+        floats = view(rounded, block, n, sizes)
         t.x = double_column(0)
         t.y = double_column(DOUBLE_PARTICLES)
         t.z = double_column(2 * DOUBLE_PARTICLES)
@@ -277,10 +277,10 @@ def run_double_blocks_partly(
             t.x[i] = outside.x[i]
             t.y[i] = outside.y[i]
             t.z[i] = outside.z[i]
-        advance_block(t, near, topo, run, shapes, substeps, rank, size)
+        advance_block(t, floats, topo, run, shapes, substeps, rank, size)
         for i in range(rank, n, size):
             outside.x[i] = t.x[i]
             outside.y[i] = t.y[i]
             outside.z[i] = t.z[i]
     else:
-        search_for_others(floats, topo, sizes, run, tid / size - s.worlds, tid % size, size)
+        search_for_others(rounded, topo, sizes, run, tid / size - s.worlds, tid % size, size)

@@ -219,7 +219,7 @@ def bend_sheet_ahead(t: Any, table: Topology, run: Settings, crew: Crew):
 
 @wp.func
 def bend(t: Any, table: Any, run: Settings, crew: Crew):
-    """A sheet's bends and shears, as the crew does them soonest."""
+    """A sheet's bends and shears, in the crew's quickest way."""
     bend_sheet(t, table, run, crew)
 
 

@@ -39,7 +39,7 @@ def run_lanes(s: StateLanes, topo: Topology, sizes: Sizes, run: Settings, shapes
 @wp.kernel(enable_backward=False, module="nuno.plans.run_double_worlds")
 def run_double_worlds(
     s: StateDouble,
-    near: StateFloat,
+    rounded: StateFloat,
     topo: Topology,
     sizes: Sizes,
     run: Settings,
@@ -50,19 +50,19 @@ def run_double_worlds(
     """Every world by itself, by one thread on the CPU, coordinates as doubles."""
     group = first + wp.tid()
     t = view(s, group, topo.particles, sizes)
-    floats = view(near, group, topo.particles, sizes)
+    floats = view(rounded, group, topo.particles, sizes)
     advance(t, t, floats, floats, topo, topo, run, shapes, 0, substeps, crew_of(0, 1))
 
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_double_lanes")
 def run_double_lanes(
-    s: StateDoubleLanes, near: StateLanes, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, first: int,
+    s: StateDoubleLanes, rounded: StateLanes, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, first: int,
     substeps: int,
 ):  # fmt: skip
     """Sixteen worlds at once, by one thread on the CPU, coordinates as doubles."""
     group = first + wp.tid()
     t = view(s, group, topo.particles, sizes)
-    floats = view(near, group, topo.particles, sizes)
+    floats = view(rounded, group, topo.particles, sizes)
     advance(t, t, floats, floats, topo, topo, run, shapes, 0, substeps, crew_of(0, 1))
 
 
@@ -79,14 +79,14 @@ def run_simd(
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_double_simd")
 def run_double_simd(
-    s: StateDouble, near: StateFloat, topo: Topology, simd: SimdElements, sizes: Sizes, run: Settings, shapes: Shapes,
-    substeps: int,
+    s: StateDouble, rounded: StateFloat, topo: Topology, simd: SimdElements, sizes: Sizes, run: Settings,
+    shapes: Shapes, substeps: int,
 ):  # fmt: skip
     """One world by one thread, coordinates as doubles."""
     n = topo.particles
     m = (n + LANES - 1) / LANES
     t = view(s, wp.tid(), n, sizes)
-    floats = view(near, wp.tid(), n, sizes)
+    floats = view(rounded, wp.tid(), n, sizes)
     p = by_sixteen(StateDoubleLanes(), t, simd, m)
-    nearby = by_sixteen(StateLanes(), floats, simd, m)
-    advance(t, p, floats, nearby, simd, topo, run, shapes, 0, substeps, crew_of(0, 1))
+    lanes = by_sixteen(StateLanes(), floats, simd, m)
+    advance(t, p, floats, lanes, simd, topo, run, shapes, 0, substeps, crew_of(0, 1))

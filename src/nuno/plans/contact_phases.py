@@ -23,7 +23,7 @@ from nuno.state.soft_state import SimdClusters, Tetrahedra
 
 @wp.func
 def take_own_moves(t: Any, table: BlockShare, crew: BlockGroup):
-    """What contacts move a block's own particles by."""
+    """Take the sums of what contacts move a block's own particles by."""
     first, last, step = share_of(table, crew)
     for i in range(first, last, step):
         take_moves(t, table.particles, i, table.particles)
@@ -63,7 +63,7 @@ def resolve_self_contact(t: Any, table: Any, run: Settings, crew: Crew):
 
 @wp.func
 def begin_rest(t: Any, table: BlockShare, run: Settings, crew: BlockGroup):
-    """What comes before shapes are met: sums of contacts that are still to be taken."""
+    """Take the sums of contacts that are still to be taken, before shapes are met."""
     if run.touching != 0 and run.parts & SELF_CONTACT != 0:
         take_own_moves(t, table, crew)
 
@@ -75,7 +75,7 @@ def begin_rest(t: Any, table: Any, run: Settings, crew: Any):
 
 @wp.func
 def read_grips(t: Any, table: BlockShare, run: Settings, crew: BlockGroup):
-    """What stiff grips bear, and their vertices' own masses again; of a block's own particles where they are shared."""
+    """Loads of stiff grips, and their vertices' own masses again; of a block's own particles where they are shared."""
     if table.held > 0:
         wait_for_block(crew)
         for g in range(crew.rank_in_block, table.held, crew.block_size):

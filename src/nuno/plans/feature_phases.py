@@ -16,27 +16,27 @@ from nuno.state.soft_state import FarSides
 
 
 @wp.func
-def select_nearby(near: Any, n: int, surface: Any, run: Settings, shapes: Shapes, crew: Any):
+def select_nearby(floats: Any, n: int, surface: Any, run: Settings, shapes: Shapes, crew: Any):
     """Choose the shapes that matter for the next frame, and what sharp ones may touch between vertices."""
     wait_for(crew)
-    reset_box(near, crew.rank)
-    clear_features(near, surface, crew.rank)
+    reset_box(floats, crew.rank)
+    clear_features(floats, surface, crew.rank)
     wait_for(crew)
-    measure_box(near, n, crew.rank, crew.size)
+    measure_box(floats, n, crew.rank, crew.size)
     wait_for(crew)
-    select_shapes(near, shapes, float(run.frame) * run.dt, crew.rank, crew.size)
+    select_shapes(floats, shapes, float(run.frame) * run.dt, crew.rank, crew.size)
     wait_for(crew)
-    sort_shapes(near, crew.rank)
+    sort_shapes(floats, crew.rank)
     wait_for(crew)
-    mark_features(near, surface, run, shapes, crew.rank, crew.size)
+    mark_features(floats, surface, run, shapes, crew.rank, crew.size)
     wait_for(crew)
-    list_features(near, surface, crew.rank, crew.size)
+    list_features(floats, surface, crew.rank, crew.size)
     wait_for(crew)
 
 
 @wp.func
 def goes_on(t: Any, surface: FarSides):
-    """Return whether the kernel does the substep that comes next: one without sharp shapes, where none is near."""
+    """Return True if the kernel does the substep that comes next: one without sharp shapes, where none is near."""
     return t.feature_shapes[0] == 0
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.membrane import (
-    between_pulls,
+    between_forces,
     edge_coupling,
     edge_diagonal,
     edge_direction,
@@ -103,7 +103,7 @@ def stretch_edges(
                 onto = onto * 0.0
         else:
             onto = onto * 0.0
-        move(t, b, between_pulls(wb, onto, pull))
+        move(t, b, between_forces(wb, onto, pull))
         if not linked:
             move(t, a, wa * pull)
 

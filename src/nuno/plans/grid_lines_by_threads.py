@@ -10,7 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.membrane import between_pulls, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
+from nuno.constraints.membrane import between_forces, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
 from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import add, choose, mul, sub  # noqa: F401 (the operators)
 from nuno.numbers.tridiagonal import free_row
@@ -171,6 +171,6 @@ def stretch_grid_lines_by_threads(
             if q * ROWS + r < here:
                 j = head + (q * ROWS + r + 1) * step
                 place = vec3(again(t.x, j), again(t.y, j), again(t.z, j))
-                put_position(t, j, place + between_pulls(wb, onto, pull))
+                put_position(t, j, place + between_forces(wb, onto, pull))
             pull = onto
         begin += own.warps * each

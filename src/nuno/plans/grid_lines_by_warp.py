@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.membrane import between_pulls, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
+from nuno.constraints.membrane import between_forces, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
 from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import mul, sub  # noqa: F401 (the operators)
 from nuno.numbers.tridiagonal import free_row
@@ -158,7 +158,7 @@ def _solver(rows: int, apart: bool) -> Any:
                 b = corner(table.edge, begin + k, 1, 2)
                 pull = vec3(x[j], y[j], z[j])
                 # rows behind the last pull nothing
-                move(t, b, between_pulls(at(t.w, b), vec3(nx[j], ny[j], nz[j]), pull))
+                move(t, b, between_forces(at(t.w, b), vec3(nx[j], ny[j], nz[j]), pull))
                 if k == 0:
                     a = corner(table.edge, begin, 0, 2)
                     move(t, a, at(t.w, a) * pull)

@@ -15,7 +15,7 @@ from nuno.numbers.block_group import BlockGroup, all_resident, begin_grid_barrie
 from nuno.numbers.crew import barrier
 from nuno.numbers.warps import in_warps
 from nuno.plans.group_figures import begin_sharing
-from nuno.plans.shared_memory import MOST_STEPS, bring_figures, bring_notes, figures, program
+from nuno.plans.shared_memory import MAX_STEPS, bring_figures, bring_notes, figures, program
 from nuno.plans.stage_kernels import BlockShare, Work, grips_on, steps_of
 from nuno.plans.substep import advance
 from nuno.state.cloth_state import Settings, Shapes, Sizes, StateDouble, StateFloat, Topology, view
@@ -28,22 +28,22 @@ for _name in ("run_grid", "run_double_grid"):
 
 
 @wp.func
-def near_of(t: StateFloat, floats: StateFloat, world: int, n: int, sizes: Sizes):
+def floats_of(t: StateFloat, rounded: StateFloat, world: int, n: int, sizes: Sizes):
     """A world's state with coordinates as floats: itself where they are, else of ``floats``, with the same figures."""
     return t
 
 
 @wp.func
-def near_of(t: StateDouble, floats: StateFloat, world: int, n: int, sizes: Sizes):
-    near = view(floats, world, n, sizes)
-    near.scalars = t.scalars
-    near.notes = t.notes
-    return near
+def floats_of(t: StateDouble, rounded: StateFloat, world: int, n: int, sizes: Sizes):
+    floats = view(rounded, world, n, sizes)
+    floats.scalars = t.scalars
+    floats.notes = t.notes
+    return floats
 
 
 @wp.func
 def run_block_groups(
-    s: Any, floats: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, work: Work, lists: Lists,
+    s: Any, rounded: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, work: Work, lists: Lists,
     shared: wp.array(dtype=float), first: int, substeps: int, block_groups: int, block_group: BlockGroup,
 ):  # fmt: skip
     """Run a block group through its worlds, from ``first`` on."""
@@ -55,7 +55,7 @@ def run_block_groups(
     shares.first = topo.particles * block_group.block / block_group.blocks
     shares.last = topo.particles * (block_group.block + 1) / block_group.blocks
     shares.steps = steps_of(work, block_group.block)
-    if in_warps(size) and work.steps <= MOST_STEPS:
+    if in_warps(size) and work.steps <= MAX_STEPS:
         shares.steps = program(0)
         stored = steps_of(work, block_group.block)
         for k in range(block_group.rank_in_block, 4 * work.steps, size):
@@ -69,13 +69,13 @@ def run_block_groups(
             t.notes = figures(8)
             bring_figures(t, scalars, notes, block_group.rank_in_block)
         barrier(size)
-        near = near_of(t, floats, world, topo.particles, sizes)
+        floats = floats_of(t, rounded, world, topo.particles, sizes)
         shares.world = world
         # the first step is that of the particles
         shares.held_first = grips_on(t, run, shares.steps[2], shares.steps[3])
         shares.held = grips_on(t, run, shares.first, shares.last)
         crew = begin_sharing(block_group, shared, world)
-        advance(t, t, near, near, shares, topo, run, shapes, 0, substeps, crew)
+        advance(t, t, floats, floats, shares, topo, run, shapes, 0, substeps, crew)
         if block_group.rank == 0:
             bring_notes(notes, t.notes)
         barrier(size)
@@ -99,7 +99,7 @@ def run_grid(
 
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.plans.run_double_grid")
 def run_double_grid(
-    s: StateDouble, floats: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, work: Work,
+    s: StateDouble, rounded: StateFloat, topo: Topology, sizes: Sizes, run: Settings, shapes: Shapes, work: Work,
     lists: Lists, shared: wp.array(dtype=float), barrier_counts: wp.array(dtype=int), call: int, substeps: int,
     block_groups: int,
     blocks: int, block_size: int,
@@ -109,5 +109,5 @@ def run_double_grid(
     if blocks == 1 or all_resident(barrier_counts, call, block_groups, block_groups * blocks):
         begin_grid_barrier(block_group)
         run_block_groups(
-            s, floats, topo, sizes, run, shapes, work, lists, shared, first, substeps, block_groups, block_group
+            s, rounded, topo, sizes, run, shapes, work, lists, shared, first, substeps, block_groups, block_group
         )

@@ -71,7 +71,7 @@ class GridPlan:
                 self._launch(run, substeps - run.first, doubles, counts, 0)
 
     def left_out(self) -> bool:
-        """Return whether parts of substeps since this was asked last were not done, as blocks found no room.
+        """Return True if parts of substeps since this was asked last were not done, as blocks found no room.
 
         All that came after them is then to be gone through again.
         """

@@ -47,24 +47,24 @@ def share_of(table: Any, crew: Any):
 
 
 @wp.func
-def rebuild(near: Any, table: Any, surface: Topology, run: Settings, crew: Crew):
+def rebuild(floats: Any, table: Any, surface: Topology, run: Settings, crew: Crew):
     """The neighbour lists of self-contact, made anew where something may have come too close for them."""
-    rebuild_lists(near, surface, run, crew.rank, crew.size)
+    rebuild_lists(floats, surface, run, crew.rank, crew.size)
 
 
 @wp.func
-def rebuild(near: Any, table: BlockShare, surface: Topology, run: Settings, crew: BlockGroup):
-    rebuild_by_group(near, surface, run, table.lists, table.world, crew)
+def rebuild(floats: Any, table: BlockShare, surface: Topology, run: Settings, crew: BlockGroup):
+    rebuild_by_group(floats, surface, run, table.lists, table.world, crew)
 
 
 @wp.func
-def begin_motion(t: Any, near: Any, table: Tetrahedra, surface: Any, run: Settings, k: int, crew: Any):
-    """What comes before substep k's prediction: neighbour lists of a cloth, and damping."""
+def begin_motion(t: Any, floats: Any, table: Tetrahedra, surface: Any, run: Settings, k: int, crew: Any):
+    """Begin substep k: neighbour lists of a cloth, and damping, before anything is predicted."""
     begin_soft_motion(t, table, run, k, crew)
 
 
 @wp.func
-def begin_motion(t: Any, near: Any, table: SimdClusters, surface: Any, run: Settings, k: int, crew: Any):
+def begin_motion(t: Any, floats: Any, table: SimdClusters, surface: Any, run: Settings, k: int, crew: Any):
     begin_soft_motion(t, table, run, k, crew)
 
 
@@ -78,21 +78,21 @@ def begin_soft_motion(t: Any, table: Any, run: Settings, k: int, crew: Any):
 
 
 @wp.func
-def begin_motion(t: Any, near: Any, table: BlockShare, surface: Topology, run: Settings, k: int, crew: Any):
-    begin_cloth_motion(t, near, table, surface, surface, run, crew)
+def begin_motion(t: Any, floats: Any, table: BlockShare, surface: Topology, run: Settings, k: int, crew: Any):
+    begin_cloth_motion(t, floats, table, surface, surface, run, crew)
 
 
 @wp.func
-def begin_motion(t: Any, near: Any, table: Any, surface: Topology, run: Settings, k: int, crew: Any):
-    begin_cloth_motion(t, near, table, table, surface, run, crew)
+def begin_motion(t: Any, floats: Any, table: Any, surface: Topology, run: Settings, k: int, crew: Any):
+    begin_cloth_motion(t, floats, table, table, surface, run, crew)
 
 
 @wp.func
-def begin_cloth_motion(t: Any, near: Any, table: Any, bends: Any, surface: Topology, run: Settings, crew: Any):
+def begin_cloth_motion(t: Any, floats: Any, table: Any, bends: Any, surface: Topology, run: Settings, crew: Any):
     """`begin_motion` of a cloth, whose bends are in a table of their own where it is shared out."""
     wait_for_block(crew)
     if run.touching != 0:
-        rebuild(near, table, surface, run, crew)
+        rebuild(floats, table, surface, run, crew)
     if run.damped != 0:
         damp_bends(t, bends, run, crew)
 

@@ -11,7 +11,7 @@ SHARED_FLOATS = 11500
 figures."""
 SHARED_PARTICLES = wp.constant(SHARED_FLOATS // 4)
 """Particles whose coordinates and inverse masses fit."""
-MOST_STEPS = wp.constant(128)
+MAX_STEPS = wp.constant(128)
 """Steps that there is room for in `program`."""
 ROOMY_PARTICLES, WHOLE_PARTICLES = wp.constant(SHARED_FLOATS // 7), wp.constant(SHARED_FLOATS // 11)
 """Particles of which three more numbers fit, and those for whose contacts there is room besides."""

@@ -245,7 +245,7 @@ def bend_strips(t: Any, table: Topology, rows: int, upright: int, give: float, v
 
 @wp.func
 def fits_strips(table: Topology):
-    """Return whether a cloth is a sheet whose strips a warp has threads for."""
+    """Return True if a cloth is a sheet whose strips a warp has threads for."""
     columns = table.columns
     return columns > 0 and columns <= STRIP_COLUMNS and table.particles <= LINE_VERTICES * columns
 

@@ -95,7 +95,7 @@ def by_sixteen(p: Any, t: Any, simd: Any, m: int):
     p.fz = as_lanes(t.fz, m)
     p.scalars = simd.scalars
     p.notes = simd.notes
-    p.near = t.near
+    p.shape_list = t.shape_list
     for k in range(SCALARS):
         p.scalars[k] = full_like(p.x[0], t.scalars[k])
     return p

@@ -44,25 +44,25 @@ def first_of(t: Any, sides: FarSides, substeps: int):
 @wp.func
 def first_of(t: Any, sides: Sides, substeps: int):
     # a single substep, or a part of one, is theirs alone: one launch instead of two
-    return wp.where(substeps > 1, t.gone_to[0], 0)
+    return wp.where(substeps > 1, t.reached[0], 0)
 
 
 @wp.func
 def go(
-    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, rank: int,
+    t: Any, floats: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, rank: int,
     size: int,
 ):  # fmt: skip
     """`advance`, with a note of how far it went."""
     begin = first_of(t, sides, substeps)
-    done = advance(t, t, near, near, topo, sides, run, shapes, begin, substeps, crew_of(rank, size))
+    done = advance(t, t, floats, floats, topo, sides, run, shapes, begin, substeps, crew_of(rank, size))
     barrier(size)
     if rank == 0:
-        t.gone_to[0] = done
+        t.reached[0] = done
 
 
 @wp.func
 def advance_block(
-    t: Any, near: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, rank: int,
+    t: Any, floats: Any, topo: Tetrahedra, sides: Any, run: Settings, shapes: Shapes, substeps: int, rank: int,
     size: int,
 ):  # fmt: skip
     """`go` with the world's scalars and notes in shared memory for as long as the launch takes."""
@@ -70,11 +70,11 @@ def advance_block(
     notes = t.notes
     t.scalars = figures(0)
     t.notes = figures(8)
-    near.scalars = figures(0)
-    near.notes = figures(8)
+    floats.scalars = figures(0)
+    floats.notes = figures(8)
     bring_figures(t, scalars, notes, rank)
     barrier(size)
-    go(t, near, topo, sides, run, shapes, substeps, rank, size)
+    go(t, floats, topo, sides, run, shapes, substeps, rank, size)
     barrier(size)
     if rank == 0:
         bring_notes(notes, t.notes)
@@ -133,7 +133,7 @@ def run_shared(
 
 @wp.func
 def run_double_partly(
-    s: SoftDouble, floats: SoftFloat, topo: Tetrahedra, sides: Any, sizes: SoftSizes, run: Settings, shapes: Shapes,
+    s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, sides: Any, sizes: SoftSizes, run: Settings, shapes: Shapes,
     substeps: int, tid: int, size: int,
 ):  # fmt: skip
     """A world by a block, coordinates as doubles, x, y and z in shared memory for as long as the launch takes."""
@@ -147,7 +147,7 @@ def run_double_partly(
     t.y = double_column(DOUBLE_PARTICLES)
     t.z = double_column(2 * DOUBLE_PARTICLES)
     bring_places(t, outside, n, rank, size)
-    advance_block(t, view(floats, tid / size, n, sizes), topo, sides, run, shapes, substeps, rank, size)
+    advance_block(t, view(rounded, tid / size, n, sizes), topo, sides, run, shapes, substeps, rank, size)
     bring_places(outside, t, n, rank, size)
 
 
@@ -204,7 +204,7 @@ def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:
 
     @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("double_blocks"))
     def run_soft_double_blocks(
-        s: SoftDouble, floats: SoftFloat, topo: Tetrahedra, sides: kind, sizes: SoftSizes, run: Settings,
+        s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, sides: kind, sizes: SoftSizes, run: Settings,
         shapes: Shapes,
         substeps: int, size: int,
     ):  # fmt: skip
@@ -212,17 +212,17 @@ def block_kernels(kind: Any, suffix: str) -> dict[str, Any]:
         tid = wp.tid()
         n = topo.particles
         t = view(s, tid / size, n, sizes)
-        near = view(floats, tid / size, n, sizes)
-        advance_block(t, near, topo, sides, run, shapes, substeps, tid % size, size)
+        floats = view(rounded, tid / size, n, sizes)
+        advance_block(t, floats, topo, sides, run, shapes, substeps, tid % size, size)
 
     @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module=module("double_blocks_partly"))
     def run_soft_double_blocks_partly(
-        s: SoftDouble, floats: SoftFloat, topo: Tetrahedra, sides: kind, sizes: SoftSizes, run: Settings,
+        s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, sides: kind, sizes: SoftSizes, run: Settings,
         shapes: Shapes,
         substeps: int, size: int,
     ):  # fmt: skip
         """The same with x, y and z in shared memory for as long as the launch takes."""
-        run_double_partly(s, floats, topo, sides, sizes, run, shapes, substeps, wp.tid(), size)
+        run_double_partly(s, rounded, topo, sides, sizes, run, shapes, substeps, wp.tid(), size)
 
     kernels = (
         run_soft_blocks, run_soft_blocks_partly, run_soft_few_partly, run_soft_blocks_shared, run_soft_few_shared,

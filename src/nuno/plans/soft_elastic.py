@@ -81,13 +81,13 @@ def solve_colours(t: Any, table: Any, run: Settings, crew: Any):
 
 @wp.func
 def damp_soft(t: Any, table: Any, run: Settings, crew: Any):
-    """One pass over the tetrahedra's viscosity, as the crew does it soonest."""
+    """One pass over the tetrahedra's viscosity, in the crew's quickest way."""
     damp_colours(t, table, run, crew)
 
 
 @wp.func
 def solve_soft(t: Any, table: Any, run: Settings, crew: Any):
-    """One pass over the tetrahedra's elasticity, as the crew does it soonest."""
+    """One pass over the tetrahedra's elasticity, in the crew's quickest way."""
     solve_colours(t, table, run, crew)
 
 

@@ -25,22 +25,22 @@ for _name in ("run_soft_grid", "run_soft_double_grid"):
 
 
 @wp.func
-def near_of(t: SoftFloat, floats: SoftFloat, world: int, n: int, sizes: SoftSizes):
+def floats_of(t: SoftFloat, rounded: SoftFloat, world: int, n: int, sizes: SoftSizes):
     """A world's state with coordinates as floats: itself where they are, else of ``floats``, with the same figures."""
     return t
 
 
 @wp.func
-def near_of(t: SoftDouble, floats: SoftFloat, world: int, n: int, sizes: SoftSizes):
-    near = view(floats, world, n, sizes)
-    near.scalars = t.scalars
-    near.notes = t.notes
-    return near
+def floats_of(t: SoftDouble, rounded: SoftFloat, world: int, n: int, sizes: SoftSizes):
+    floats = view(rounded, world, n, sizes)
+    floats.scalars = t.scalars
+    floats.notes = t.notes
+    return floats
 
 
 @wp.func
 def run_block_groups(
-    s: Any, floats: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
+    s: Any, rounded: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
     shared: wp.array(dtype=float), first: int, substeps: int, block_groups: int, block_group: BlockGroup,
 ):  # fmt: skip
     """Run a block group through its worlds, from ``first`` on."""
@@ -54,9 +54,9 @@ def run_block_groups(
             t.notes = figures(8)
             bring_figures(t, scalars, notes, block_group.rank_in_block)
         barrier(size)
-        near = near_of(t, floats, world, topo.particles, sizes)
+        floats = floats_of(t, rounded, world, topo.particles, sizes)
         crew = begin_sharing(block_group, shared, world)
-        advance(t, t, near, near, topo, sides, run, shapes, 0, substeps, crew)
+        advance(t, t, floats, floats, topo, sides, run, shapes, 0, substeps, crew)
         if block_group.rank == 0:
             bring_notes(notes, t.notes)
         barrier(size)
@@ -78,7 +78,7 @@ def run_soft_grid(
 
 @wp.kernel(enable_backward=False, launch_bounds=(THREADS, 1), module="nuno.plans.run_soft_double_grid")
 def run_soft_double_grid(
-    s: SoftDouble, floats: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
+    s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
     shared: wp.array(dtype=float), barrier_counts: wp.array(dtype=int), call: int, substeps: int,
     block_groups: int, blocks: int,
     block_size: int,
@@ -87,4 +87,6 @@ def run_soft_double_grid(
     first, block_group = block_group_of(wp.tid(), barrier_counts, call, block_groups, blocks, block_size)
     if blocks == 1 or all_resident(barrier_counts, call, block_groups, block_groups * blocks):
         begin_grid_barrier(block_group)
-        run_block_groups(s, floats, topo, sides, sizes, run, shapes, shared, first, substeps, block_groups, block_group)
+        run_block_groups(
+            s, rounded, topo, sides, sizes, run, shapes, shared, first, substeps, block_groups, block_group
+        )

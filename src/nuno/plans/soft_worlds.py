@@ -69,39 +69,39 @@ def run_soft_simd(
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_soft_double_worlds")
 def run_soft_double_worlds(
-    s: SoftDouble, near: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
+    s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings, shapes: Shapes,
     first: int, substeps: int,
 ):  # fmt: skip
     """Every world by itself, by one thread on the CPU, coordinates as doubles."""
     n, group = topo.particles, first + wp.tid()
     t = view(s, group, n, sizes)
-    floats = view(near, group, n, sizes)
+    floats = view(rounded, group, n, sizes)
     advance(t, t, floats, floats, topo, sides, run, shapes, 0, substeps, crew_of(0, 1))
 
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_soft_double_lanes")
 def run_soft_double_lanes(
-    s: SoftDoubleLanes, near: SoftLanes, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings,
+    s: SoftDoubleLanes, rounded: SoftLanes, topo: Tetrahedra, sides: Sides, sizes: SoftSizes, run: Settings,
     shapes: Shapes,
     first: int, substeps: int,
 ):  # fmt: skip
     """Sixteen worlds at once, by one thread on the CPU, coordinates as doubles."""
     n, group = topo.particles, first + wp.tid()
     t = view(s, group, n, sizes)
-    floats = view(near, group, n, sizes)
+    floats = view(rounded, group, n, sizes)
     advance(t, t, floats, floats, topo, sides, run, shapes, 0, substeps, crew_of(0, 1))
 
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_soft_double_simd")
 def run_soft_double_simd(
-    s: SoftDouble, near: SoftFloat, topo: Tetrahedra, simd: SimdClusters, sides: Sides, sizes: SoftSizes, run: Settings,
-    shapes: Shapes, substeps: int,
+    s: SoftDouble, rounded: SoftFloat, topo: Tetrahedra, simd: SimdClusters, sides: Sides, sizes: SoftSizes,
+    run: Settings, shapes: Shapes, substeps: int,
 ):  # fmt: skip
     """One world by one thread, sixteen tetrahedra or particles at a time, coordinates as doubles."""
     n = topo.particles
     m = (n + LANES - 1) / LANES
     t = view(s, wp.tid(), n, sizes)
-    floats = view(near, wp.tid(), n, sizes)
+    floats = view(rounded, wp.tid(), n, sizes)
     p = soft_by_sixteen(SoftDoubleLanes(), t, simd, m)
-    nearby = by_sixteen(SoftLanes(), floats, simd, m)
-    advance(t, p, floats, nearby, simd, sides, run, shapes, 0, substeps, crew_of(0, 1))
+    lanes = by_sixteen(SoftLanes(), floats, simd, m)
+    advance(t, p, floats, lanes, simd, sides, run, shapes, 0, substeps, crew_of(0, 1))

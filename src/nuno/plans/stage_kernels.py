@@ -129,7 +129,7 @@ class BlockShare:
 
 @wp.func
 def is_sorted(kind: int):
-    """Return whether the table has this kind's elements."""
+    """Return True if the table has this kind's elements."""
     return kind == TWISTS or kind == LINES or kind == CELLS
 
 

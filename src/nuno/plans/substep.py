@@ -29,7 +29,7 @@ from nuno.state.integrate import read_velocities, reset_speed, round_places, tic
 
 @wp.func
 def advance(
-    t: Any, p: Any, near: Any, nearby: Any, table: Any, surface: Any, run: Settings, shapes: Shapes, begin: int,
+    t: Any, p: Any, floats: Any, float_p: Any, table: Any, surface: Any, run: Settings, shapes: Shapes, begin: int,
     substeps: int, crew: Any,
 ):  # fmt: skip
     """The phases of substeps ``begin`` to ``substeps``: all of them, or those of the parts that are asked for.
@@ -37,8 +37,8 @@ def advance(
     Args:
         t: The state of one world, or of sixteen in lanes.
         p: The same for loops over particles: by sixteen where the elements are, else ``t``.
-        near: The state with coordinates as floats, for lists of what is near: ``t`` where they are.
-        nearby: ``near`` as ``p`` is ``t``.
+        floats: The state with coordinates as floats, for lists of what is near: ``t`` where they are.
+        float_p: ``floats`` for loops over particles, as ``p`` is ``t``.
         table: The elements.
         surface: Its edges and triangles, for sharp shapes and self-contact: a cloth's `Topology`, or `Sides`.
         run: The run's settings.
@@ -56,7 +56,7 @@ def advance(
         k = int(done)
         begins_frame = run.parts & MOTION != 0 and (run.first + k) % run.frame == 0
         if begins_frame:
-            select_nearby(near, table.particles, surface, run, shapes, crew)
+            select_nearby(floats, table.particles, surface, run, shapes, crew)
             clock = read_clock(t, shapes)
         if not goes_on(t, surface):
             break
@@ -65,7 +65,7 @@ def advance(
                 forget_loads(t, run, crew.rank, crew.size)
             # before the lists, which ask how far anything went in the substep before
             tick(t, run, rank_in_block(crew))
-            begin_motion(t, near, table, surface, run, k, crew)
+            begin_motion(t, floats, table, surface, run, k, crew)
             move(t, p, table, surface, run, crew)
         if run.pulled != 0 and run.parts & COMPLIANT_GRIPS != 0:
             pull_points(t, run, crew.rank, crew.size)
@@ -86,7 +86,7 @@ def advance(
             wait_for_block(crew)
             drop_shifts(p, table, last, first, step)
             read_velocities(p, last, run, first, step)
-            round_places(nearby, p, last, first, step)
+            round_places(float_p, p, last, first, step)
             share_notes(t, p, table, k, crew)
         done = k + 1
     keep_clock(t, table, clock, crew)

@@ -122,7 +122,7 @@ def measure(s: RigidState, c: Contacts, rules: Rules, world: int, rank: int, siz
 
 @wp.func
 def must_list(c: Contacts, world: int, dt: float):
-    """Return whether something may have come near that the rows do not have."""
+    """Return True if something may have come near that the rows do not have."""
     first = world * NOTES
     needed = NEAR + 3.0 * c.notes[first + SPEED] * dt
     return 2.0 * c.notes[first + TRAVEL] + needed > c.notes[first + REACH]

@@ -29,7 +29,7 @@ def ridges_of(parts: Parts, q: int, world: int, face: int):
 
 @wp.func
 def on_ridge(c: Convex, n: wp.vec3, ridges: int):
-    """Return whether what the triangle holds out along n, a corner or an edge, sticks out of the mesh."""
+    """Return True if what the triangle holds out along n, a corner or an edge, sticks out of the mesh."""
     da = wp.dot(n, c.a)
     db = wp.dot(n, c.b)
     dc = wp.dot(n, c.c)

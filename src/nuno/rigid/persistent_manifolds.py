@@ -197,7 +197,7 @@ def take_points(
 
 @wp.func
 def is_slipping(force: wp.vec3, mu: float):
-    """Return whether friction is at its limit."""
+    """Return True if friction is at its limit."""
     limit = 0.999 * mu * force[0]
     return force[1] * force[1] + force[2] * force[2] >= limit * limit
 

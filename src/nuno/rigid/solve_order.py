@@ -17,7 +17,7 @@ from nuno.rigid.rigid_body import RigidState
 
 @wp.func
 def may_act(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, p: int):
-    """Return whether the entry is in use and one of its bodies can be moved."""
+    """Return True if the entry is in use and one of its bodies can be moved."""
     result = int(0)
     q = c.partner[e]
     if q >= 0 and parts.slot[p] >= 0:
@@ -45,7 +45,7 @@ def height_of(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, up: 
 
 @wp.func
 def comes_after(c: Contacts, a: int, b: int):
-    """Return whether entry a comes after entry b: by height, then part, partner and patch."""
+    """Return True if entry a comes after entry b: by height, then part, partner and patch."""
     result = c.height[a] > c.height[b]
     if c.height[a] == c.height[b]:
         first = a / c.row

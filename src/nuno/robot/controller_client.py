@@ -41,7 +41,7 @@ class ControllerClient:
         return self.goal
 
     def is_interpolating(self) -> bool:
-        """Return whether the last goal is under way."""
+        """Return True if the last goal is under way."""
         return self.goal is not None and not self.goal.is_done
 
     def wait_for_result(self, timeout: float = 0.0) -> bool:

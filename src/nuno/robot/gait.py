@@ -79,11 +79,11 @@ class Gait:
 
     @property
     def is_walking(self) -> bool:
-        """Return whether the robot is under way."""
+        """Return True if the robot is under way."""
         return self.walk is not None
 
     def moves(self, controller: str) -> bool:
-        """Return whether the walk has the joints of a controller."""
+        """Return True if the walk has the joints of a controller."""
         return self.walk is not None and controller in self._names
 
     def plan(self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:

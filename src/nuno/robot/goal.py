@@ -78,12 +78,12 @@ class Goal:
 
     @property
     def is_done(self) -> bool:
-        """Return whether it has come to an end, of whichever kind."""
+        """Return True if it has come to an end, of whichever kind."""
         return self.status in ENDS
 
     @property
     def succeeded(self) -> bool:
-        """Return whether what was asked for was done."""
+        """Return True if what was asked for was done."""
         return self.status == GoalStatus.SUCCEEDED
 
     def finish(self, status: GoalStatus, code: int | None = None, text: str = "") -> None:

@@ -80,10 +80,10 @@ class JointInterface(LimbControllers, KnownJoints):
 
     @abstractmethod
     def is_busy(self, controller: Controller) -> bool:
-        """Return whether a controller follows a goal, whoever sent it."""
+        """Return True if a controller follows a goal, whoever sent it."""
 
     def has_controller(self, controller: Controller) -> bool:
-        """Return whether the robot has a controller, once that is known or ``controller_timeout`` has passed."""
+        """Return True if the robot has a controller, once that is known or ``controller_timeout`` has passed."""
         return True
 
     # Controllers
@@ -251,7 +251,7 @@ class JointInterface(LimbControllers, KnownJoints):
 
     @checked
     def is_interpolating(self, controller_type: str | None = None) -> bool:
-        """Return whether a motion that was sent from here is under way.
+        """Return True if a motion that was sent from here is under way.
 
         Raises:
             UnknownNameError: there is no such controller.
@@ -259,7 +259,7 @@ class JointInterface(LimbControllers, KnownJoints):
         return any(client.is_interpolating() for client in self._known_clients(controller_type))
 
     def is_moving(self, controller_type: str | None = None) -> bool:
-        """Return whether a controller follows a goal, whoever sent it.
+        """Return True if a controller follows a goal, whoever sent it.
 
         Raises:
             UnknownNameError: there is no such controller.

@@ -9,7 +9,7 @@ from nuno.validation import number
 
 
 def is_model(value: Any) -> bool:
-    """Return whether something is a model as scikit-robot has them: with joints that have names and angles."""
+    """Return True if something is a model as scikit-robot has them: with joints that have names and angles."""
     joints = getattr(value, "joint_list", None)
     return isinstance(joints, list) and all(hasattr(own, "name") and hasattr(own, "joint_angle") for own in joints)
 

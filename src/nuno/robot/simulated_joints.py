@@ -66,7 +66,7 @@ class SimulatedJoints:
 
     @property
     def is_resting(self) -> bool:
-        """Return whether nothing is asked of the joints, and they are where they are wanted."""
+        """Return True if nothing is asked of the joints, and they are where they are wanted."""
         if any([own.is_busy for own in self.controllers.values()]):
             return False
         return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()

@@ -204,7 +204,7 @@ class SimulatedRobot(SimulatedBody):
             self.joints.cancel(self._known(controller))
 
     def is_busy(self, controller: Controller) -> bool:
-        """Return whether a controller follows a goal."""
+        """Return True if a controller follows a goal."""
         with self.world.lock:
             return self.joints.controllers[self._known(controller)].is_busy
 

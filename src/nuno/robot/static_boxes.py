@@ -67,7 +67,7 @@ class StaticBoxes:
         return near.nonzero()[0].tolist()
 
     def hold_any(self, k: int, points: np.ndarray, low: np.ndarray, high: np.ndarray, margin: float) -> bool:
-        """Return whether any of points is in the box of the k-th body or within a margin.
+        """Return True if any of points is in the box of the k-th body or within a margin.
 
         Args:
             k: The body's number.

@@ -85,7 +85,7 @@ class TrajectoryController:
 
     @property
     def is_busy(self) -> bool:
-        """Return whether a goal is under way."""
+        """Return True if a goal is under way."""
         return self.goal is not None and not self.goal.is_done
 
     def accept(

@@ -61,11 +61,11 @@ class WrenchSensor:
         self._velocity, self._acceleration = data.v[self.joint], data.a_gf[self.joint]
 
     def feels(self, link: str) -> bool:
-        """Return whether a link that its own joint carries lies beyond the sensor."""
+        """Return True if a link that its own joint carries lies beyond the sensor."""
         return self.feels_all or link in self._links
 
     def carries(self, joint: int) -> bool:
-        """Return whether a joint other than its own lies beyond the sensor."""
+        """Return True if a joint other than its own lies beyond the sensor."""
         return joint in self._carried
 
     def read(self, before: np.ndarray | float = 0.0) -> np.ndarray:

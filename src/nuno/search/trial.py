@@ -30,7 +30,7 @@ class Trial:
 
     @property
     def failed(self) -> bool:
-        """Return whether it raised, diverged, or lost its worker again and again."""
+        """Return True if it raised, diverged, or lost its worker again and again."""
         return self.error is not None
 
 

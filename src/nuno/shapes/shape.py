@@ -43,7 +43,7 @@ class Shape:
 
     @property
     def is_solid(self) -> bool:
-        """Return whether the shape has an inside."""
+        """Return True if the shape has an inside."""
         return not self.is_cloth
 
     def mesh(self) -> MeshArrays:
@@ -154,7 +154,7 @@ class TriangleMesh(Shape):
 
     @property
     def is_solid(self) -> bool:
-        """Return whether the faces close the surface and look outwards; a cloth is never solid."""
+        """Return True if the faces close the surface and look outwards; a cloth is never solid."""
         return not self.is_cloth and _looks_outwards(self)
 
     def mesh(self) -> MeshArrays:
@@ -297,7 +297,7 @@ def checked_mesh(vertices: Any, faces: Any) -> MeshArrays:
 
 
 def _is_closed(faces: np.ndarray) -> bool:
-    """Return whether every directed edge is met by exactly one the other way."""
+    """Return True if every directed edge is met by exactly one the other way."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     codes = np.sort(edges[:, 0] << 32 | edges[:, 1])
     return len(np.unique(codes)) == len(codes) and bool(np.array_equal(codes, np.sort(edges[:, 1] << 32 | edges[:, 0])))

@@ -79,7 +79,7 @@ class ClothLaunches(ParticleSolver):
     _lists: Any  # a block group's room for listing pairs
 
     @property
-    def _fine_rate(self) -> float:
+    def _double_rate(self) -> float:
         """Substeps a second [1/s] from which on coordinates are doubles: any, where the rule chose them."""
         return DOUBLE_RATE if self.resolution.given else 0.0
 
@@ -141,9 +141,9 @@ class ClothLaunches(ParticleSolver):
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 
     def _block_group_pays(self) -> bool:
-        """Return whether a block group is quicker for a world beyond a block's memory."""
+        """Return True if a block group is quicker for a world beyond a block's memory."""
         share = cores_of(self.device) // self.world_count
-        doubles = self.frame_rate * self.substeps >= self._fine_rate
+        doubles = self.frame_rate * self.substeps >= self._double_rate
         return doubles and DOUBLE_PARTICLES < self.particle_count <= GROUP_PARTICLES * share
 
     def _forget_launches(self) -> None:

@@ -45,9 +45,9 @@ from nuno.topology.cloth_topology import ClothTopology
 if TYPE_CHECKING:
     from nuno.materials import Cloth
 
-MOST_SPARE_BLOCKS = 7
+MAX_SPARE_BLOCKS = 7
 """Blocks that help one world list its pairs, at most."""
-WIDE_MARGIN = 0.45
+LIST_MARGIN = 0.45
 """Margin over the size of a cell of the lists of the plans "grid" and "vector": lists are few, and a world by itself
 waits for no other's candidates. With the largest thickness, half a cell, it is less than a cell, so that flat cloth
 still has no candidates."""
@@ -160,7 +160,7 @@ class ClothSolver(ClothLaunches):
         topo.particles, topo.leaves, topo.columns = n, topology.leaves.count, topology.leaves.columns
         put_sides(topo, topology, self.device, STRETCHED)
         self._size, self._state, self._topology, self._surface = size, state, topo, topo
-        self._doubles = DoublePositions(self, StateDoubleLanes if self.lanes > 1 else StateDouble, self._fine_rate)
+        self._doubles = DoublePositions(self, StateDoubleLanes if self.lanes > 1 else StateDouble, self._double_rate)
 
         found = compliances(topology, values)
         for kind in ("stretch", "shear", "bend"):
@@ -192,11 +192,11 @@ class ClothSolver(ClothLaunches):
         # boxes of blocks, and of groups of blocks, six numbers each
         size.bounds = 6 * (leaves.count + -(-leaves.count // GROUP))
         size.reference = 3 * n + 8 if self.self_contact else 1
-        size.near_leaves = 1
+        size.leaf_pairs = 1
         if self._cuda and self.self_contact and self.plan != "grid":
             # and boxes of what each block moved; pairs of blocks: all, or of many 128 each
             size.bounds += 6 * leaves.count
-            size.near_leaves = 1 + min(leaves.count * (leaves.count + 1) // 2, 128 * leaves.count)
+            size.leaf_pairs = 1 + min(leaves.count * (leaves.count + 1) // 2, 128 * leaves.count)
         if self.plan == "grid":
             # see `nuno.contact.self.list_skin`
             size.bounds = max(size.bounds, 2 * 6 * boxes(leaves.count))
@@ -278,7 +278,7 @@ class ClothSolver(ClothLaunches):
         """Room for candidate pairs, none of them listed.
 
         Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks, for one
-        world after the other, stands world by world: see `listed_pairs`.
+        world after the other, stands world by world: see `candidate_pairs`.
         """
         state, size, empty = self._state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
@@ -294,7 +294,7 @@ class ClothSolver(ClothLaunches):
             state.inner_triangle = self._list(4 * size.vertex_triangle)
             state.inner_edge = self._list(4 * size.edge_edge)
             state.inner_count = empty(2, self._integer)
-        state.near_leaves = empty(size.near_leaves, self._integer)
+        state.leaf_pairs = empty(size.leaf_pairs, self._integer)
         self._counts = state.pair_count
         self._allocate_work_queue()
 
@@ -312,7 +312,7 @@ class ClothSolver(ClothLaunches):
         state, worlds, cores = self._state, self.world_count, 0
         if self._cuda and self.plan != "grid" and self.self_contact:
             cores = cores_of(self.device)
-        state.spare_blocks = max(0, min(cores - worlds, MOST_SPARE_BLOCKS * worlds))
+        state.spare_blocks = max(0, min(cores - worlds, MAX_SPARE_BLOCKS * worlds))
         room = state.spare_blocks * 4 * self._size.edge_edge
         state.work_counts = wp.zeros(self.group_count * WORK_COUNTS, dtype=int, device=self.device)
         state.work_queue = wp.zeros(max(1, room), dtype=int, device=self.device)
@@ -327,7 +327,7 @@ class ClothSolver(ClothLaunches):
         """(worlds,) float, how often pairs were listed since the state was set."""
         return self._get(self._state.notes, NOTES)[:, LISTINGS]
 
-    def listed_pairs(self, world: int) -> list[np.ndarray]:
+    def candidate_pairs(self, world: int) -> list[np.ndarray]:
         """The vertices of a world's listed vertex-triangle and edge-edge candidates, (k, 4) int each."""
         state, size, rows = self._state, self._size, []
         kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
@@ -370,7 +370,7 @@ class ClothSolver(ClothLaunches):
         run = super().settings(time, dt, frame)
         run.passes = self.passes
         if self.plan in ("grid", "vector"):
-            run.margin = WIDE_MARGIN * self._cell_size
+            run.margin = LIST_MARGIN * self._cell_size
         run.sweeps = self.sweeps
         run.rise, run.onset = RELAXATIONS[self.sweeps]
         return run

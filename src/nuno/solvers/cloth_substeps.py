@@ -11,9 +11,9 @@ BENDING_STEP = 1.8
 """The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
 PATCH_STEP = 0.75
 """The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
-TAUT, MOST_TAUT = 0.1, 300.0
+TAUT, MAX_TAUT = 0.1, 300.0
 """The strain of a sheet, and the tension [N/m], of which the default number of substeps bears the smaller."""
-FEWEST, MOST_SUBSTEPS = 10, 240
+FEWEST, MAX_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
 
 
@@ -23,7 +23,7 @@ def default_substeps(
 ) -> int:  # fmt: skip
     """Substeps a frame, within bounds, for `wanted_substeps`, which has the arguments."""
     wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening, stretch)
-    return min(max(FEWEST, wanted), MOST_SUBSTEPS)
+    return min(max(FEWEST, wanted), MAX_SUBSTEPS)
 
 
 def wanted_substeps(
@@ -39,7 +39,7 @@ def wanted_substeps(
     the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
     within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. Shear, and a mesh's stretch, have several sweeps
     a substep: what `nuno.constraints.relaxation.SOFTEST_STEP` says would need too many has shorter substeps. A sheet
-    bears the tension of the strain `TAUT`, but at most `MOST_TAUT` (see `bearable_tension`).
+    bears the tension of the strain `TAUT`, but at most `MAX_TAUT` (see `bearable_tension`).
 
     Args:
         topology: The cloth's elements.
@@ -61,7 +61,7 @@ def wanted_substeps(
     if softening > 0.0:
         step = min(step, math.sqrt(SOFTEST_STEP / softening))
     if len(topology.edges) and stretch > 0.0:
-        taut = min(TAUT * stretch, MOST_TAUT)
+        taut = min(TAUT * stretch, MAX_TAUT)
         step = min(step, math.sqrt(bearable_tension(topology, 1.0, density) / taut))
     return max(1, math.ceil(frame / step - 1e-9))
 

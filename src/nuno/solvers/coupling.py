@@ -12,7 +12,7 @@ from nuno.coupled.bounded_particles import MOST, Particles
 from nuno.coupled.contact_candidates import Elements, bound_triangles, keep_rows, list_rows
 from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
-from nuno.coupled.coupled_passes import IMPULSE_UNIT, Layout, add_impulses, collect, end_contacts, scatter, solve
+from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees
 from nuno.coupled.pass_progress import Passing
@@ -22,9 +22,10 @@ from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import Contacts
 from nuno.rigid.rigid_body import RigidState
+from nuno.solvers.coupling_results import CouplingResults
 from nuno.solvers.particle_solver import ParticleSolver
 from nuno.solvers.shape_impulses import plain
-from nuno.state.cloth_state import NOTES, PARTICLE_ARRAYS, PLACES, SPEED
+from nuno.state.cloth_state import PARTICLE_ARRAYS, PLACES
 
 BLOCK_THREADS = 256
 """Threads of a CUDA block, which handles one world."""
@@ -41,11 +42,11 @@ QUICKER = 1.5
 
 
 def solves_at_once(device: str) -> bool:
-    """Return whether a world's contacts are solved all at once, as by many threads, not one after the other."""
+    """Return True if a world's contacts are solved all at once, as by many threads, not one after the other."""
     return device.startswith("cuda")
 
 
-class Coupling:
+class Coupling(CouplingResults):
     """The contacts and ties of some bodies.
 
     Args:
@@ -79,7 +80,7 @@ class Coupling:
         self._elements, self._ties, self.holds, self.joints = elements, ties, holds, joints
         self._trees = trees
         self._scale = self._rate = 0.0
-        self._listed = 0
+        self._row_count = 0
         first = rigid if rigid is not None else solvers[0]
         self.device, self.world_count = str(first.device), int(first.world_count)
         self._threads = BLOCK_THREADS if self.device.startswith("cuda") else 1
@@ -170,8 +171,8 @@ class Coupling:
     @staticmethod
     def _surroundings(solver: ParticleSolver) -> Surroundings:
         made, state = Surroundings(), solver._state
-        made.shapes, made.worlds, made.stride = solver._shapes, solver.world_count, solver._size.near
-        made.near, made.scalars = state.near, plain(state.scalars, float)
+        made.shapes, made.worlds, made.stride = solver._shapes, solver.world_count, solver._size.shape_list
+        made.near, made.scalars = state.shape_list, plain(state.scalars, float)
         return made
 
     def _set_islands(self, island: np.ndarray) -> None:
@@ -272,23 +273,23 @@ class Coupling:
             return apart
         self._collect()
         self._list(np.where(apart, self._contact_distances() + reaches, -1.0), from_start=True)
-        counts, most = self._rows.count.numpy(), self._listed
+        counts, most = self._rows.count.numpy(), self._row_count
         if most:
-            listed = self._rows.bodies.reshape((self.world_count, self._rows.room))[:, :most].numpy()
+            pairs = self._rows.bodies.reshape((self.world_count, self._rows.room))[:, :most].numpy()
             for world in np.flatnonzero(counts):
-                apart[listed[world, : counts[world], 0], world] = False
+                apart[pairs[world, : counts[world], 0], world] = False
         return apart
 
     def _contact_distances(self) -> np.ndarray:
         """(bodies, worlds) [m], how far apart the surfaces of each one's island are kept at most."""
-        return 2.0 * self._over_island(np.maximum, self._radii)
+        return 2.0 * self._of_island(np.maximum, self._radii)
 
     def _plan_listings(self, substeps: int, reaches: np.ndarray, apart: np.ndarray) -> None:
         """Decide how far the rows of each island look, and after how many substeps they are listed anew.
 
         Both are the island's own: it must go as it would alone, and rows depend on when and how far was looked.
         """
-        cells = self._over_island(np.minimum, np.broadcast_to(self._cells[:, None], reaches.shape))
+        cells = self._of_island(np.minimum, np.broadcast_to(self._cells[:, None], reaches.shape))
         margins = np.maximum(np.minimum(0.5 * cells, (1 + substeps / 3) * reaches), 1.5 * reaches)
         self._far = self._contact_distances() + margins
         self._every = np.maximum(1, ((margins - reaches) / reaches).astype(int))
@@ -311,22 +312,22 @@ class Coupling:
         # ties are solved where nothing touches, too: none of the rows and bounds of before is left
         rows.active_count.zero_()
         particles.bounded_count.zero_()
-        if self._listed:
-            self._go(measure_rows, (worlds, self._listed), particles, self._state, elements, rows, dt)
+        if self._row_count:
+            self._go(measure_rows, (worlds, self._row_count), particles, self._state, elements, rows, dt)
             for body, (layout, around) in enumerate(zip(self._layouts, self._around, strict=True)):
                 if around.shapes.count:
                     self._go(
                         bound_particles, (worlds, layout.particles), layout, particles, elements, around, body, k + 1,
                         dt, body=body,
                     )  # fmt: skip
-        if self._listed or self._ties.count or self.holds.count or self.joints.count:
+        if self._row_count or self._ties.count or self.holds.count or self.joints.count:
             self._go(
                 solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
                 self.holds, self.joints, self._trees, self._passing, dt, fraction,
                 PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
             )  # fmt: skip
-            if self._listed:
-                self._go(add_impulses, (worlds, self._listed), rows, self._bodies, self._impulses)
+            if self._row_count:
+                self._go(add_impulses, (worlds, self._row_count), rows, self._bodies, self._impulses)
             for solver, layout in zip(self._solvers, self._layouts, strict=True):
                 if solver.sums is not None:
                     solver.sums.add_bounds(layout, particles)
@@ -364,14 +365,14 @@ class Coupling:
                 list_rows, worlds * self._threads, self._particles, self._state, elements, self._rows, bvh,
                 self._threads,
             )  # fmt: skip
-            self._listed = int(self._rows.count.numpy().max())
-            if self._listed <= self._rows.room:
+            self._row_count = int(self._rows.count.numpy().max())
+            if self._row_count <= self._rows.room:
                 return
-            before, self._rows = self._rows, self._row_room(self._listed + self._listed // 2)
+            before, self._rows = self._rows, self._row_room(self._row_count + self._row_count // 2)
             if not from_start:
-                self._keep_listed(before)
+                self._keep_rows(before)
 
-    def _keep_listed(self, before: Rows) -> None:
+    def _keep_rows(self, before: Rows) -> None:
         """Take over the rows that stay from an array that was too short."""
         for name in ("kind", "corners", "slot", "part", "bodies", "point"):
             pressed = getattr(before, name).numpy().reshape(self.world_count, before.room, -1)
@@ -384,113 +385,3 @@ class Coupling:
     def _put(self, table: wp.array, values: np.ndarray) -> None:
         """Write numbers (bodies, worlds) to a table by world and body."""
         table.assign(values.T.astype(np.float32).ravel())
-
-    def _over_island(self, function: Any, values: np.ndarray) -> np.ndarray:
-        """Return (bodies, worlds), the largest or least of each one's island."""
-        column = np.arange(self.world_count)
-        found = np.full(self._island.shape, np.inf if function is np.minimum else 0.0)
-        function.at(found, (self._island, column), values)
-        return found[self._island, column]
-
-    def _speeds(self) -> np.ndarray:
-        """The largest speed in each one's island, (bodies, worlds) [m/s]."""
-        own = [np.sqrt(s._get(s._state.notes, NOTES)[:, SPEED].astype(float)) for s in self._solvers]
-        if self._rigid is not None:
-
-            def sizes(array: wp.array) -> np.ndarray:
-                return np.linalg.norm(array.numpy().reshape(self.world_count, -1, 3)[:, self._slots], axis=-1)
-
-            radius = self._rigid.rules.radius.numpy()[self._slots]
-            own += list((sizes(self._state.velocity) + sizes(self._state.spin) * radius).T.astype(float))
-        return self._over_island(np.maximum, np.array(own))
-
-    # -- what the last frame took
-
-    def contacts(self) -> list[tuple[int, tuple[int, int], np.ndarray, np.ndarray, np.ndarray]]:
-        """Return what pushed in the last substep: world, the two bodies, point [m], normal and force [N] on the first.
-
-        By world, bodies and elements: on CUDA rows are listed as threads come to them.
-        """
-        rows, particles, worlds = self._rows, self._particles, self.world_count
-        counts = rows.active_count.numpy() if self._listed else np.zeros(worlds, int)
-        names = ("push", "drag", "normal", "weights", "corners", "bodies", "active")
-        push, drag, normal, weights, corners, bodies, active = (getattr(rows, name).numpy() for name in names)
-        keys = (bodies, corners, *(getattr(rows, name).numpy() for name in ("kind", "part", "point")))
-        place = particles.p.numpy() + particles.u.numpy()
-        found = []
-        for world in range(worlds):
-            base = world * rows.room
-            pushing = active[base : base + counts[world]]
-            pushing = pushing[push[pushing] > 0.0]
-            order = np.lexsort(np.column_stack([key[pushing] for key in keys]).T[::-1])
-            for r in pushing[order]:
-                ours = (corners[r] >= 0) & (weights[r] > 0.0)
-                share = weights[r][ours] / weights[r][ours].sum()
-                point = share @ place[world * particles.count + corners[r][ours]]
-                force = (push[r] * normal[r] + drag[r]).astype(float) * self._rate
-                pair = (int(bodies[r][0]), int(bodies[r][1]))
-                point = point + self._origins[world, pair[0]]
-                found.append((world, pair, point, normal[r].astype(float), force))
-        return found
-
-    def shape_contacts(self, k: int) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
-        """Return what shapes did in the last substep to those particles of a solver that rows pressed on.
-
-        Returns:
-            Which particles these are, (worlds, n) bool, and of each contact the world, the particle, the shape's number
-            in the solver's table, the normal and the force [N].
-        """
-        particles, first, n = self._particles, self._firsts[k], self._solvers[k].particle_count
-        bounded, counts = particles.bounded.numpy(), particles.bounded_count.numpy()
-        of_shapes = ("shape", "shape_normal", "shape_push", "shape_drag")
-        shape, normal, push, drag = (getattr(particles, name).numpy() for name in of_shapes)
-        weight, pressed, found = particles.w.numpy(), np.zeros((self.world_count, n), dtype=bool), []
-        for world in range(self.world_count):
-            base = world * particles.count
-            for j in np.sort(bounded[base : base + counts[world]]):
-                i = int(j) - base - first
-                if not 0 <= i < n:
-                    continue
-                pressed[world, i] = True
-                for c in range(MOST * j, MOST * (j + 1)):
-                    if shape[c] >= 0 and push[c] > 0.0:
-                        force = (push[c] * normal[c] + drag[c]).astype(float) * (self._rate / weight[j])
-                        found.append((world, i, int(shape[c]), normal[c].astype(float), force))
-        return pressed, found
-
-    def impulses(self) -> np.ndarray:
-        """(worlds, bodies, bodies, 3) [N s], what contacts between two bodies gave the first in the last frame."""
-        given = self._impulses.numpy().reshape(self.world_count, self._bodies, self._bodies, 3)
-        given = given * (IMPULSE_UNIT * np.sqrt(self._rate))
-        return given - np.swapaxes(given, 1, 2)
-
-    def tie_forces(self) -> np.ndarray:
-        """(worlds, ties, 3) [N], the mean force over the last frame on the points of the ties' own bodies."""
-        return self._per_world(self._ties.total, self._ties.count)
-
-    def unmet(self) -> list[np.ndarray]:
-        """(worlds, ties), (worlds, holds) and (worlds, joints) int, substeps of the frame that each was not met in."""
-        worlds = self.world_count
-        return [
-            part.unmet.numpy()[: worlds * part.count].reshape(worlds, part.count)
-            if part.count
-            else np.zeros((worlds, 0), dtype=int)
-            for part in (self._ties, self.holds, self.joints)
-        ]
-
-    def joint_wrenches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Mean force [N] and torque [N m] on the joined bodies at their joints, and what acts along them, over a frame.
-
-        (worlds, joints, 3) twice, and (worlds, joints).
-        """
-        joints, worlds = self.joints, self.world_count
-        axial = joints.total_axial.numpy().reshape(worlds, joints.count).astype(float) * self._scale
-        return self._per_world(joints.total, joints.count), self._per_world(joints.total_twist, joints.count), axial
-
-    def hold_wrenches(self) -> tuple[np.ndarray, np.ndarray]:
-        """(worlds, holds, 3) each, the mean force [N] and torque [N m] on the held bodies' centres of mass."""
-        count = self.holds.count
-        return self._per_world(self.holds.total, count), self._per_world(self.holds.total_twist, count)
-
-    def _per_world(self, array: wp.array, count: int) -> np.ndarray:
-        return array.numpy().reshape(self.world_count, -1, 3)[:, :count].astype(float) * self._scale

@@ -26,7 +26,7 @@ def copy_particles(solver: ParticleSolver) -> Copied:
     if solver._doubles.count:
         copied |= {f"double_{name}": array.copy() for name, array in _doubles(solver).items()}
     if solver.sums is not None:
-        copied |= {f"given_{key}": impulse for key, impulse in solver.sums.told().items()}
+        copied |= {f"given_{key}": impulse for key, impulse in solver.sums.given().items()}
     return copied | {"last_dt": np.full(solver.world_count, solver._last_dt)}
 
 
@@ -51,7 +51,7 @@ def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]])
             for name in (name for name in copied if name.startswith("given_")):
                 whole = given.setdefault(name.removeprefix("given_"), np.zeros((solver.world_count, 3)))
                 whole[worlds] = copied[name][worlds]
-        solver.sums.tell(given)
+        solver.sums.set_given(given)
 
 
 def move_particles(solver: ParticleSolver, moved: dict[int, np.ndarray]) -> None:

@@ -30,29 +30,31 @@ PAIR_BYTES = 32
 pairs, but takes memory for what is written only.)"""
 LISTS = 4.0e9
 """[B] That the lists of all worlds may take together for this."""
-MOST_LISTS = 16.0e9
+MAX_LIST_BYTES = 16.0e9
 """[B] That they may grow to where they turn out to be too short."""
 SPARE = 1.5
 """Times what they would have needed that lists are made to hold."""
-MOST_NUMBERS = 2**31 - 1
+MAX_NUMBERS = 2**31 - 1
 """Elements of an array whose places are 32-bit numbers."""
 
 
 def size_lists(size: Any, particles: int, worlds: int) -> None:
-    """Set how long the lists are at first; ``near_leaves`` is known."""
-    least = worlds * particles * sum(PAIRS) * PAIR_BYTES
-    room = int(min(max(LISTS / least, 1.0), MORE) * particles)
+    """Set how long the lists are at first; ``leaf_pairs`` is set."""
+    smallest = worlds * particles * sum(PAIRS) * PAIR_BYTES
+    room = int(min(max(LISTS / smallest, 1.0), MORE) * particles)
     size.vertex_triangle, size.edge_edge = PAIRS[0] * room + 64, PAIRS[1] * room + 128
-    if size.near_leaves > 1:
+    if size.leaf_pairs > 1:
         # the room in which a list is made: a queue of pairs of blocks, and each warp's suspects
-        size.vertex_triangle = max(size.vertex_triangle, -(-size.near_leaves // 4))
+        size.vertex_triangle = max(size.vertex_triangle, -(-size.leaf_pairs // 4))
         size.edge_edge = max(size.edge_edge, SUSPECTS * FEW_THREADS // WARP // 2)
 
 
 def find_missed(size: Any, counts: np.ndarray) -> np.ndarray:
     """Return (worlds,) bool, in which of them some pairs were passed over; counts are (worlds, `COUNTS`) int."""
-    most = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2])
-    missed = (most > (size.vertex_triangle, size.edge_edge)).any(axis=1) | (counts[:, MISSED_ELEMENTS:] > 0).any(axis=1)
+    counted = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2])
+    missed = (counted > (size.vertex_triangle, size.edge_edge)).any(axis=1) | (counts[:, MISSED_ELEMENTS:] > 0).any(
+        axis=1
+    )
     return np.asarray(missed)
 
 
@@ -66,24 +68,24 @@ def lengthen_lists(size: Any, counts: np.ndarray, worlds: int, rows: int, device
         rows: Lists in one array at most: a world's or a vector's each, or a helping block's.
         device: "cpu" or "cuda:0" ...
     """
-    most = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2]).max(axis=0)
+    counted = np.maximum(counts[:, :2], counts[:, MAX_NEIGHBOURS : MAX_NEIGHBOURS + 2]).max(axis=0)
     suspects, blocks = counts[:, MISSED_ELEMENTS].max(), counts[:, MISSED_LEAVES].max()
     bytes_each = PAIR_BYTES * worlds
-    memory = MOST_LISTS
+    memory = MAX_LIST_BYTES
     if device.startswith("cuda"):
         # the old lists go only once the new ones are there
         memory = min(memory, 0.5 * float(wp.get_device(device).free_memory))
     for spare in (SPARE, 1.0):
-        near = 1 + int(spare * blocks) if blocks else size.near_leaves
+        leaf_pairs = 1 + int(spare * blocks) if blocks else size.leaf_pairs
         triangles, edges = (
             int(spare * found) if found > room else room
-            for found, room in zip(most, (size.vertex_triangle, size.edge_edge), strict=True)
+            for found, room in zip(counted, (size.vertex_triangle, size.edge_edge), strict=True)
         )
-        triangles = max(triangles, -(-near // 4) if near > 1 else 0)
+        triangles = max(triangles, -(-leaf_pairs // 4) if leaf_pairs > 1 else 0)
         # half of a warp's room is for each kind, and a suspect takes two numbers of the four that a pair has
         edges = max(edges, int(spare * suspects) * (FEW_THREADS // WARP))
         longest = 4 * max(triangles, edges) * rows
-        if bytes_each * (triangles + edges) <= memory and longest <= MOST_NUMBERS:
-            size.vertex_triangle, size.edge_edge, size.near_leaves = triangles, edges, near
+        if bytes_each * (triangles + edges) <= memory and longest <= MAX_NUMBERS:
+            size.vertex_triangle, size.edge_edge, size.leaf_pairs = triangles, edges, leaf_pairs
             return True
     return False

@@ -86,10 +86,10 @@ class ParticleSolver(ParticleState):
         else:
             shapes = colliders.shapes
         self._colliders, self._shapes = colliders, shapes
-        self._size.near = max(1, int(shapes.count)) + 1
-        self._size.feature_shapes = len(self._surface.feature_colour) + self._size.near
-        self._state.near, self._state.feature_shapes = (
-            self._empty(self._size.near, int),
+        self._size.shape_list = max(1, int(shapes.count)) + 1
+        self._size.feature_shapes = len(self._surface.feature_colour) + self._size.shape_list
+        self._state.shape_list, self._state.feature_shapes = (
+            self._empty(self._size.shape_list, int),
             self._empty(self._size.feature_shapes, int),
         )
         self._forget_launches()
@@ -135,7 +135,7 @@ class ParticleSolver(ParticleState):
         )
         wp.copy(s.w, self._put(rows.mass))
         self._grip_count, self._grip_keys = rows.count, keys
-        self._grip_pulls = int((rows.fixed == 0).any())
+        self._compliant_grips = int((rows.fixed == 0).any())
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
             return wp.array(values, dtype=dtype, device=self.device)
@@ -242,7 +242,7 @@ class ParticleSolver(ParticleState):
         run.margin = 0.35 * self._cell_size
         run.reach = 0.25 * self._cell_size
         run.frame, run.first, run.parts = frame, 0, ALL_PARTS
-        run.grips, run.keys, run.pulled = self._grip_count, self._grip_keys, self._grip_pulls
+        run.grips, run.keys, run.pulled = self._grip_count, self._grip_keys, self._compliant_grips
         run.grip_start = wp.array([time], dtype=wp.float64, device=self.device)
         run.grip_time, run.step = self._grip_time, wp.float64(dt)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed

@@ -34,7 +34,7 @@ def shape_forces(solver: ParticleSolver, time: float) -> list[tuple[int, np.ndar
     solver.step_parts(0, MOTION | COMPLIANT_GRIPS | SELF_CONTACT)
     starts = shape_lists(solver)
     lists = {name: getattr(s, name).numpy().reshape(solver.group_count, -1).copy() for name in starts}
-    shapes = listed_shapes(lists["near"], starts["near"])
+    shapes = shapes_of_list(lists["shape_list"], starts["shape_list"])
     before, held = [wp.clone(a) for a in solver._doubles.arrays], wp.clone(s.w)
     table: Any = wp.clone(solver._shapes.table)
     slick = table.numpy().reshape(-1, COLUMNS).copy()
@@ -69,10 +69,10 @@ def shape_forces(solver: ParticleSolver, time: float) -> list[tuple[int, np.ndar
 
 def shape_lists(solver: ParticleSolver) -> dict[str, int]:
     """Return the state's lists of shapes nearby, as many as their first number says: at which number they begin."""
-    return {"near": 1, "feature_shapes": len(solver._surface.feature_colour)}
+    return {"shape_list": 1, "feature_shapes": len(solver._surface.feature_colour)}
 
 
-def listed_shapes(rows: np.ndarray, start: int) -> list[int]:
+def shapes_of_list(rows: np.ndarray, start: int) -> list[int]:
     """Return the shapes that any row (groups, k) of such a list has."""
     return sorted({int(shape) for row in rows for shape in row[start : start + row[0]]})
 

@@ -19,7 +19,7 @@ import warp as wp
 
 from nuno.coupled.shape_moves import ADD_MOVES, NOTE_LENGTHS, add_bounds
 from nuno.plans.recorded_launches import RecordedLaunches
-from nuno.solvers.shape_forces import listed_shapes, one_of, shape_lists
+from nuno.solvers.shape_forces import one_of, shape_lists, shapes_of_list
 from nuno.state.cloth_state import SHAPES, VELOCITIES
 
 if TYPE_CHECKING:
@@ -44,15 +44,15 @@ class ShapeImpulses:
         self._count = solver.group_count * solver.lanes * solver.particle_count
         self._shapes: list[int] = []  # those nearby in the frame, in the order of their sums
         self._keys: tuple[str, ...] = ()
-        self._sharp: list[int] = []
+        self._feature_shapes: list[int] = []
         # the lists of shapes nearby, and with one of them alone
-        self._near: Any = None
-        self._near_alone: list[wp.array] = []
-        self._sharp_alone: list[wp.array] = []
+        self._shape_list: Any = None
+        self._lists_alone: list[wp.array] = []
+        self._features_alone: list[wp.array] = []
         self._total = self._array(0, wp.vec3)
         self._lengths = self._array(0, float)
         self._ranks = self._array(0, int)
-        self._told: dict[str, np.ndarray] | None = {}
+        self._given: dict[str, np.ndarray] | None = {}
         self._launches = RecordedLaunches(solver.device, BLOCK_THREADS)
         # x, y and z, and what they were, for floats and for doubles
         self._places: dict[Any, tuple[list[wp.array], list[wp.array]]] = {}
@@ -67,24 +67,27 @@ class ShapeImpulses:
         """Begin the sums of a frame, in whose first substep the shapes nearby have just been listed."""
         solver, s, colliders = self._solver, self._solver._state, self._solver._colliders
         starts = shape_lists(solver)
-        near, sharp = (getattr(s, name).numpy().reshape(solver.group_count, -1) for name in starts)
-        self._shapes, self._sharp = (
-            listed_shapes(rows, starts[name]) for rows, name in ((near, "near"), (sharp, "feature_shapes"))
+        shape_list, features = (getattr(s, name).numpy().reshape(solver.group_count, -1) for name in starts)
+        self._shapes, self._feature_shapes = (
+            shapes_of_list(rows, starts[name])
+            for rows, name in ((shape_list, "shape_list"), (features, "feature_shapes"))
         )
         if len(self._shapes) > 1:
-            self._near = wp.clone(s.near)
-            self._near_alone = [self._alone(shape, near, starts["near"]) for shape in self._shapes]
-            self._sharp_alone = [self._alone(shape, sharp, starts["feature_shapes"]) for shape in self._sharp]
+            self._shape_list = wp.clone(s.shape_list)
+            self._lists_alone = [self._alone(shape, shape_list, starts["shape_list"]) for shape in self._shapes]
+            self._features_alone = [
+                self._alone(shape, features, starts["feature_shapes"]) for shape in self._feature_shapes
+            ]
         self._keys = () if colliders is None else colliders.keys
-        self._told = None
+        self._given = None
         ranks = np.full(max(1, len(self._keys)), -1, dtype=np.int32)
         ranks[self._shapes] = np.arange(len(self._shapes))
         self._ranks = wp.array(ranks, dtype=int, device=solver.device)
         if len(self._total) < len(self._shapes) * self._count:
             self._total = self._array(len(self._shapes) * self._count, wp.vec3)
         self._total.zero_()
-        if len(self._sharp) > 1 and len(self._lengths) < len(self._sharp) * self._count:
-            self._lengths = self._array(len(self._sharp) * self._count, float)
+        if len(self._feature_shapes) > 1 and len(self._lengths) < len(self._feature_shapes) * self._count:
+            self._lengths = self._array(len(self._feature_shapes) * self._count, float)
 
     def _alone(self, shape: int, rows: np.ndarray, start: int) -> wp.array:
         return wp.array(one_of(shape, rows, start).ravel(), dtype=int, device=self._solver.device)
@@ -99,51 +102,51 @@ class ShapeImpulses:
                 self._add(0)
             return
         s, run = solver._state, solver._opened
-        if self._sharp:
-            self._try_sharp(index)
+        if self._feature_shapes:
+            self._try_features(index)
             self._note()
-            s.near.zero_()
+            s.shape_list.zero_()
             solver.step_parts(index, SHAPES)
-            for own, shape in enumerate(self._sharp):
-                self._add(self._shapes.index(shape), len(self._sharp), own)
-        wake, listed, sharp, grips = (
+            for own, shape in enumerate(self._feature_shapes):
+                self._add(self._shapes.index(shape), len(self._feature_shapes), own)
+        wake, feature_list, features, grips = (
             wp.clone(s.feature_due),
             wp.clone(s.feature_list),
             wp.clone(s.feature_shapes),
             run.grips,
         )
-        for rank, alone in enumerate(self._near_alone):
-            if self._sharp or rank:
+        for rank, alone in enumerate(self._lists_alone):
+            if self._feature_shapes or rank:
                 # edges and triangles have met all shapes, and vertices that are held are back
                 s.feature_shapes.zero_()
                 run.grips = 0
-            wp.copy(s.near, alone)
+            wp.copy(s.shape_list, alone)
             self._note()
             solver.step_parts(index, SHAPES)
             self._add(rank)
-            if not self._sharp and rank == 0:
-                wake, listed = wp.clone(s.feature_due), wp.clone(s.feature_list)
+            if not self._feature_shapes and rank == 0:
+                wake, feature_list = wp.clone(s.feature_due), wp.clone(s.feature_list)
         run.grips = grips
         for array, kept in (
-            (s.near, self._near),
-            (s.feature_shapes, sharp),
+            (s.shape_list, self._shape_list),
+            (s.feature_shapes, features),
             (s.feature_due, wake),
-            (s.feature_list, listed),
+            (s.feature_list, feature_list),
         ):
             wp.copy(array, kept)
         solver.step_parts(index, VELOCITIES)
 
-    def _try_sharp(self, index: int) -> None:
+    def _try_features(self, index: int) -> None:
         """Note how far each of several sharp shapes would move the particles by itself; nothing is changed."""
-        if len(self._sharp) < 2:
+        if len(self._feature_shapes) < 2:
             return
         solver = self._solver
         s, run = solver._state, solver._opened
         grips, places = run.grips, self._note()
         kept = [(array, wp.clone(array)) for array in (s.feature_shapes, s.feature_due, s.feature_list)]
-        s.near.zero_()
+        s.shape_list.zero_()
         run.grips = 0  # what is held stays as light as it is for the constraints
-        for own, alone in enumerate(self._sharp_alone):
+        for own, alone in enumerate(self._features_alone):
             wp.copy(s.feature_shapes, alone)
             s.feature_due.zero_()
             solver.step_parts(index, SHAPES)
@@ -184,19 +187,19 @@ class ShapeImpulses:
 
     # -- what it gave
 
-    def told(self) -> dict[str, np.ndarray]:
+    def given(self) -> dict[str, np.ndarray]:
         """Return what each shape gave the body in the last frame, (worlds, 3) [N s], by the key of its body."""
-        if self._told is None:
+        if self._given is None:
             solver, shapes = self._solver, len(self._shapes)
             sums = self._total.numpy()[: shapes * self._count].astype(float)
             sums = sums.reshape(shapes, solver.group_count, solver.particle_count, solver.lanes, 3).sum(axis=2)
             sums = sums.reshape(shapes, solver.group_count * solver.lanes, 3)[:, : solver.world_count]
-            self._told = {self._keys[shape]: given for shape, given in zip(self._shapes, sums, strict=True)}
-        return self._told
+            self._given = {self._keys[shape]: given for shape, given in zip(self._shapes, sums, strict=True)}
+        return self._given
 
-    def tell(self, told: dict[str, np.ndarray]) -> None:
+    def set_given(self, given: dict[str, np.ndarray]) -> None:
         """Take what `told` returns from now on, until the next frame."""
-        self._told = told
+        self._given = given
 
 
 def plain(array: wp.array, number: Any) -> wp.array:

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 COLLAPSED = 1e-3
 """Width of a body, in cells, below which it is a line or a point, from where no force of its own leads back."""
-MOST_REPLY, MOST_BETWEEN = 0.7, 4
+MAX_REPLY, MAX_BETWEEN = 0.7, 4
 """Viscosity works on every so many substeps (at most 4) that an element's reply to its own viscosity stays below 0.7 on
 average; smooth motions are then damped at 0.85 to 0.95 of the stated rate, and at 0.95 to 0.99 at half the reply."""
 STRETCHED = 2.0
@@ -139,7 +139,7 @@ class SoftSolver(ParticleSolver):
         run = super().settings(time, dt, frame)
         run.cell = self._side
         if self._damped:
-            often = max(1, min(MOST_BETWEEN, int(MOST_REPLY / (self._reply * dt))))
+            often = max(1, min(MAX_BETWEEN, int(MAX_REPLY / (self._reply * dt))))
             run.damped = max(k for k in range(1, often + 1) if frame % k == 0)
         return run
 
@@ -154,7 +154,7 @@ class SoftSolver(ParticleSolver):
         """The static shapes that the body meets; None for none."""
         super().set_colliders(colliders)
         # a little more than what kernels take for sharp, of which none may be left undone
-        self._sharp = colliders is not None and colliders.min_radius < 1.001 * ROUND * self._side
+        self._has_features = colliders is not None and colliders.min_radius < 1.001 * ROUND * self._side
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds = self.topology, self.world_count
@@ -183,7 +183,7 @@ class SoftSolver(ParticleSolver):
         for name in SHIFTS:
             setattr(state, name, self._empty(self._whole, self._number)[: self.group_count * self.particle_count])
         size.moved = min(4 * topology.vertex_count, QUEUE + ROOM)
-        state.gone_to, state.moved = self._empty(1, int), self._empty(size.moved, int)
+        state.reached, state.moved = self._empty(1, int), self._empty(size.moved, int)
 
     def _upload(self, shared: bool) -> Tetrahedra:
         """The clusters on the device, sorted by colour; ``shared`` where all elements have the same moduli."""
@@ -252,8 +252,8 @@ class SoftSolver(ParticleSolver):
         if self._cuda:
             name, threads = self._block_kernel(doubles is not None)
             after = [self._size, run, self._shapes, substeps, threads]
-            launches = [(FAR, self._far_surface)] if substeps > 1 or not self._sharp else []
-            launches += [(FEATURES, self._surface)] if self._sharp else []
+            launches = [(FAR, self._far_surface)] if substeps > 1 or not self._has_features else []
+            launches += [(FEATURES, self._surface)] if self._has_features else []
             for kernels, surface in launches:
                 wp.launch(
                     kernels[name], dim=self.group_count * threads, inputs=[*states, self._topology, surface, *after],
@@ -281,7 +281,7 @@ class SoftSolver(ParticleSolver):
         return block_groups_of(self.world_count, cores_of(self.device), self.particle_count / ALONE)
 
     def _block_group_pays(self) -> bool:
-        """Return whether worlds by block groups of multiprocessors are quicker than by one each."""
+        """Return True if worlds by block groups of multiprocessors are quicker than by one each."""
         block_groups, blocks = self._block_groups()
         alone = self.particle_count / ALONE
         by_block_groups = -(-self.world_count // block_groups) * (1.0 + alone / blocks)

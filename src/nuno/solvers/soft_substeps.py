@@ -8,7 +8,7 @@ from nuno.topology.soft_topology import SoftTopology, moduli, shape_gradients
 
 COURANT = 0.5
 """Distance that a pressure wave may go in a substep, in heights of the smallest element."""
-FEWEST, MOST_SUBSTEPS = 10, 240
+FEWEST, MAX_SUBSTEPS = 10, 240
 """Bounds of the default, the same as a cloth's."""
 EXCESS, BEND = 1.33, 3.4
 """Of what one pass a substep adds to a body's compliance, see `modulus_share`."""
@@ -50,7 +50,7 @@ def soft_substeps(topology: SoftTopology, frame: float, speed: float) -> int:
         frame: Length of a frame [s].
         speed: Of a pressure wave [m/s].
     """
-    return min(max(FEWEST, wanted_substeps(topology, frame, speed)), MOST_SUBSTEPS)
+    return min(max(FEWEST, wanted_substeps(topology, frame, speed)), MAX_SUBSTEPS)
 
 
 def wanted_substeps(topology: SoftTopology, frame: float, speed: float) -> int:

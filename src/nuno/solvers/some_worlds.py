@@ -43,10 +43,10 @@ def load_particles(solver: ParticleSolver, worlds: np.ndarray, state: Mapping[st
     if hasattr(solver, "guarded"):
         solver.guarded[worlds] = state.get("guarded", np.int32(0))
     if solver.sums is not None:
-        told = {key: impulse.copy() for key, impulse in solver.sums.told().items()}
-        for impulse in told.values():
+        given = {key: impulse.copy() for key, impulse in solver.sums.given().items()}
+        for impulse in given.values():
             impulse[worlds] = 0.0
-        solver.sums.tell(told)
+        solver.sums.set_given(given)
 
 
 def set_grips(solver: ParticleSolver, grips: Any, worlds: np.ndarray) -> None:

@@ -45,7 +45,7 @@ MOTION, COMPLIANT_GRIPS, SELF_CONTACT, SHAPES, VELOCITIES = 1, 2, 4, 8, 16
 ALL_PARTS = 31
 
 
-INTEGERS = ("moved", "near", "feature_shapes", "feature_mark", "feature_list", "work_counts", "work_queue")
+INTEGERS = ("moved", "shape_list", "feature_shapes", "feature_mark", "feature_list", "work_counts", "work_queue")
 """Whole numbers that lanes share."""
 
 
@@ -76,7 +76,7 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
         "active_triangle",
         "active_edge",
         "active_count",
-        "near_leaves",
+        "leaf_pairs",
     )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
@@ -186,10 +186,10 @@ class Sizes:
     reference: int
     middle: int
     moved: int
-    near: int
+    shape_list: int
     feature_shapes: int
     feature_list: int
-    near_leaves: int
+    leaf_pairs: int
 
 
 @wp.struct
@@ -302,11 +302,11 @@ def view(s: Any, group: int, n: int, sizes: Sizes):
     t.active_count = subarray(s.active_count, group * 2, 2)
     t.pair_count = subarray(s.pair_count, group * COUNTS, COUNTS)
     t.moved = subarray(s.moved, group * sizes.moved, sizes.moved)
-    t.near = subarray(s.near, group * sizes.near, sizes.near)
+    t.shape_list = subarray(s.shape_list, group * sizes.shape_list, sizes.shape_list)
     t.feature_shapes = subarray(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
     t.feature_mark = subarray(s.feature_mark, group * n, n)
     t.feature_list = subarray(s.feature_list, group * sizes.feature_list, sizes.feature_list)
     t.feature_due = subarray(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
     t.work_counts = subarray(s.work_counts, group * WORK_COUNTS, WORK_COUNTS)
-    t.near_leaves = subarray(s.near_leaves, group * sizes.near_leaves, sizes.near_leaves)
+    t.leaf_pairs = subarray(s.leaf_pairs, group * sizes.leaf_pairs, sizes.leaf_pairs)
     return t

@@ -75,21 +75,21 @@ def read_velocities(t: Any, n: int, run: Settings, rank: int, size: int):
 
 
 @wp.func
-def round_places(near: Any, t: Any, n: int, rank: int, size: int):
+def round_places(floats: Any, t: Any, n: int, rank: int, size: int):
     """Bring the floats ``near`` beside coordinates that are doubles."""
     for i in range(rank, n, size):
-        near.x[i] = to_float(t.x[i])
-        near.y[i] = to_float(t.y[i])
-        near.z[i] = to_float(t.z[i])
+        floats.x[i] = to_float(t.x[i])
+        floats.y[i] = to_float(t.y[i])
+        floats.z[i] = to_float(t.z[i])
 
 
 @wp.func
-def round_places(near: StateFloat, t: StateFloat, n: int, rank: int, size: int):
+def round_places(floats: StateFloat, t: StateFloat, n: int, rank: int, size: int):
     """Floats stand beside themselves."""
 
 
 @wp.func
-def round_places(near: StateLanes, t: StateLanes, n: int, rank: int, size: int):
+def round_places(floats: StateLanes, t: StateLanes, n: int, rank: int, size: int):
     """Floats stand beside themselves."""
 
 

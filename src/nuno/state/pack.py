@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from nuno.numbers.doubles import add, at, double_lane, to_float  # noqa: F401 (add: the operator)
-from nuno.numbers.lanes import lane
+from nuno.numbers.lanes import LANES, lane
 from nuno.state.cloth_state import CLOCK, NOTES, ORIGIN, SCALARS
 
 
@@ -15,53 +15,11 @@ def pack(
     x: wp.array(dtype=Any),
     y: wp.array(dtype=Any),
     z: wp.array(dtype=Any),
-    scalars: wp.array(dtype=Any),
-    n: int,
-    out: wp.array2d(dtype=wp.vec3),
-):
-    """One world after the other, (worlds, n) of vec3."""
-    world, i = wp.tid()
-    k = world * n + i
-    o = world * SCALARS + ORIGIN
-    out[world, i] = wp.vec3(x[k] + scalars[o], y[k] + scalars[o + 1], z[k] + scalars[o + 2])
-
-
-@wp.kernel(enable_backward=False)
-def pack_lanes(
-    x: wp.array(dtype=lane),
-    y: wp.array(dtype=lane),
-    z: wp.array(dtype=lane),
-    scalars: wp.array(dtype=lane),
-    n: int,
-    out: wp.array2d(dtype=wp.vec3),
-):
-    """The same out of lanes."""
-    group, i = wp.tid()
-    k = group * n + i
-    a = x[k]
-    b = y[k]
-    c = z[k]
-    o = group * SCALARS + ORIGIN
-    a = a + scalars[o]
-    b = b + scalars[o + 1]
-    c = c + scalars[o + 2]
-    for j in range(16):
-        world = group * 16 + j
-        if world < out.shape[0]:
-            out[world, i] = wp.vec3(a[j], b[j], c[j])
-
-
-# A module of its own: only bodies with coordinates as doubles need it.
-@wp.kernel(enable_backward=False, module="nuno.state.pack_doubles")
-def pack_doubles(
-    x: wp.array(dtype=wp.float64),
-    y: wp.array(dtype=wp.float64),
-    z: wp.array(dtype=wp.float64),
     scalars: wp.array(dtype=float),
     n: int,
     out: wp.array2d(dtype=wp.vec3),
 ):
-    """`pack` of doubles, rounded once."""
+    """One world after the other, (worlds, n) of vec3; doubles are rounded once."""
     world, i = wp.tid()
     k = world * n + i
     o = world * SCALARS + ORIGIN
@@ -70,11 +28,11 @@ def pack_doubles(
     )
 
 
-@wp.kernel(enable_backward=False, module="nuno.state.pack_doubles")
-def pack_doubles_lanes(
-    x: wp.array(dtype=double_lane),
-    y: wp.array(dtype=double_lane),
-    z: wp.array(dtype=double_lane),
+@wp.kernel(enable_backward=False)
+def pack_lanes(
+    x: wp.array(dtype=Any),
+    y: wp.array(dtype=Any),
+    z: wp.array(dtype=Any),
     scalars: wp.array(dtype=lane),
     n: int,
     out: wp.array2d(dtype=wp.vec3),
@@ -86,10 +44,16 @@ def pack_doubles_lanes(
     a = to_float(at(x, k) + scalars[o])
     b = to_float(at(y, k) + scalars[o + 1])
     c = to_float(at(z, k) + scalars[o + 2])
-    for j in range(16):
-        world = group * 16 + j
+    for j in range(LANES):
+        world = group * LANES + j
         if world < out.shape[0]:
             out[world, i] = wp.vec3(a[j], b[j], c[j])
+
+
+for _kernel, _own, _numbers in ((pack, float, (float, wp.float64)), (pack_lanes, lane, (lane, double_lane))):
+    for _number in _numbers:
+        _places = [wp.array(dtype=_number)] * 3
+        wp.overload(_kernel, [*_places, wp.array(dtype=_own), int, wp.array2d(dtype=wp.vec3)])
 
 
 @wp.kernel(enable_backward=False)
@@ -99,17 +63,6 @@ def zero_note(notes: wp.array(dtype=Any), stride: int, entry: int):
     notes[i] = notes[i] * 0.0
 
 
-wp.overload(
-    pack,
-    [
-        wp.array(dtype=float),
-        wp.array(dtype=float),
-        wp.array(dtype=float),
-        wp.array(dtype=float),
-        int,
-        wp.array2d(dtype=wp.vec3),
-    ],
-)
 wp.overload(zero_note, [wp.array(dtype=float), int, int])
 wp.overload(zero_note, [wp.array(dtype=lane), int, int])
 
@@ -164,9 +117,8 @@ def pack_positions(
     if out is None:
         out = wp.empty((worlds, n), dtype=wp.vec3, device=device)
     places = [state.x, state.y, state.z] if places is None else places
-    kernels = (pack_doubles, pack_doubles_lanes) if places[0].dtype in (wp.float64, double_lane) else (pack, pack_lanes)
     count = -(-worlds // lanes)
-    wp.launch(kernels[lanes > 1], dim=(count, n), inputs=[*places, state.scalars, n, out], device=device)
+    wp.launch((pack, pack_lanes)[lanes > 1], dim=(count, n), inputs=[*places, state.scalars, n, out], device=device)
     return out
 
 

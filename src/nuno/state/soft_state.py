@@ -26,7 +26,7 @@ def _make(name: str, number: type, integer: type, place: type) -> Any:
     fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
     fields |= {
         name: wp.array(dtype=int)
-        for name in ("near", "feature_shapes", "feature_mark", "feature_list", "gone_to", "moved")
+        for name in ("shape_list", "feature_shapes", "feature_mark", "feature_list", "reached", "moved")
     }
     fields["feature_due"] = wp.array(dtype=float)
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
@@ -122,7 +122,7 @@ class SoftSizes:
     forces: int
     keys: int
     grips: int
-    near: int
+    shape_list: int
     feature_shapes: int
     feature_list: int
     moved: int
@@ -161,9 +161,9 @@ def view(s: Any, group: int, n: int, sizes: SoftSizes):
     t.grip_inverse_mass = subarray(s.grip_inverse_mass, group * sizes.grips, sizes.grips)
     t.grip_load = subarray(s.grip_load, group * LOADS * sizes.grips, LOADS * sizes.grips)
     t.grip_corner = subarray(s.grip_corner, group * 3 * sizes.grips, 3 * sizes.grips)
-    t.near = subarray(s.near, group * sizes.near, sizes.near)
+    t.shape_list = subarray(s.shape_list, group * sizes.shape_list, sizes.shape_list)
     t.feature_shapes = subarray(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
-    t.gone_to = subarray(s.gone_to, group, 1)
+    t.reached = subarray(s.reached, group, 1)
     t.feature_mark = subarray(s.feature_mark, group * n, n)
     t.feature_list = subarray(s.feature_list, group * sizes.feature_list, sizes.feature_list)
     t.feature_due = subarray(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)

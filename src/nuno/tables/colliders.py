@@ -291,7 +291,7 @@ def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarr
 
 
 def _differs(body: Body, pair: Any) -> bool:
-    """Return whether anything about a body is given per world."""
+    """Return True if anything about a body is given per world."""
     posed = np.ndim(body.position) == 2 or np.ndim(body.quaternion) == 2
     rubs = np.ndim(body.friction) == 1 or np.ndim(pair if pair is not None else 0.0) == 1
     curved = body.is_deformed and np.ndim(body.surface()[0]) == 3 and len(body.surface()[0]) > 1

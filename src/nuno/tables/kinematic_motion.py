@@ -152,7 +152,7 @@ class Schedule:
 
 
 def is_kinematic(frame: Coordinates) -> bool:
-    """Return whether a frame follows a path, or a frame that does."""
+    """Return True if a frame follows a path, or a frame that does."""
     return _followed_by(frame) is not None
 
 

@@ -196,7 +196,7 @@ def _room(size: float, cells: int, friction: float, device: str, substeps: int |
 
 
 def _held(sunk: np.ndarray, slip: np.ndarray) -> np.ndarray:
-    """Return whether a cube came along, by at least half of the way, and stays where it is."""
+    """Return True if a cube came along, by at least half of the way, and stays where it is."""
     return (sunk < 0.5 * RISE) & (slip < SLIP)
 
 

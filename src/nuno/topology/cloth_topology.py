@@ -202,8 +202,8 @@ class ClothTopology:
         triangles = _elements(
             faces, 2.0 / double, 0, own, colour(faces, count), u=weights[:, :, 0], v=weights[:, :, 1], area=double / 2
         )
-        edges, beside = neighbours(faces)
-        corners, weight, bent, curved = curvature_weights(rest3, faces, beside, area)
+        edges, across = neighbours(faces)
+        corners, weight, bent, curved = curvature_weights(rest3, faces, across, area)
         patches = _elements(
             corners, 1.0, 2, own, colour(corners, count), weight=weight, rest=bent, curved=curved.astype(float)
         )  # fmt: skip

@@ -14,9 +14,9 @@ import numpy as np
 from nuno.mesh.tetrahedra import FACES
 from nuno.topology.colouring import by_colour, colour_first_fit
 
-MOST_OUTER = 4
+MAX_OUTER = 4
 """Tetrahedra about the inner one: as many as it has faces."""
-ELEMENTS = MOST_OUTER + 1
+ELEMENTS = MAX_OUTER + 1
 """Places for elements in a cluster: the inner one, and those outside."""
 BANKS = 32
 """Of a CUDA block's own memory: threads that read different numbers of one bank wait for each other."""
@@ -115,7 +115,7 @@ def _grouped(tets: np.ndarray, across: np.ndarray, order: np.ndarray) -> tuple[l
     corners, neighbours = tets.tolist(), across.tolist()
     inner, outer = [], []
     left = order.tolist()
-    for wanted in range(MOST_OUTER, -1, -1):
+    for wanted in range(MAX_OUTER, -1, -1):
         for k in left:
             if not free[k]:
                 continue

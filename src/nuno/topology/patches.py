@@ -23,7 +23,7 @@ import numpy as np
 
 from nuno.errors import MeshError
 
-LEAST_RATIO = 0.05
+MIN_RATIO = 0.05
 """The soft compliance counts as no less than this times the stiff one: six vertices on a conic tell nothing of a
 quadratic surface, and would be rigid. Regular meshes reach 0.3; 0.2 instead changes no strip by 0.1 %."""
 
@@ -110,10 +110,10 @@ def curvature_weights(
     stiff = np.linalg.inv(shared / (4.0 * face) * both + missing)
     soft = np.einsum("mkq,q,mlq->mkl", bends, [1.0, 1.0, 0.5], bends) / face * both + missing
     # along their common axes the mean is that of numbers: where the stiff compliance is 1, the soft one is the ratio
-    root = np.linalg.cholesky(stiff)
-    inverse = np.linalg.inv(root)
+    factor = np.linalg.cholesky(stiff)
+    inverse = np.linalg.inv(factor)
     ratio, axes = np.linalg.eigh(np.einsum("mki,mij,mlj->mkl", inverse, soft, inverse))
-    mean = np.maximum(ratio, LEAST_RATIO) ** 0.25
+    mean = np.maximum(ratio, MIN_RATIO) ** 0.25
     unit = np.einsum("mij,mik,mkl->mjl", axes, inverse, jumps) / mean[:, :, None]  # functions of unit stiffness
     light = unit / areas[vertices][:, None, :]
     _, turn = np.linalg.eigh(np.einsum("mki,mli->mkl", light, unit))

@@ -80,7 +80,7 @@ class BodyObjects:
             self.indices = [place.index for place in places for _ in visual_meshes]
 
     def fits(self, style: Style) -> bool:
-        """Return whether the body can still be shown by these scene objects."""
+        """Return True if the body can still be shown by these scene objects."""
         body = self.body
         return (
             style is self.style

@@ -10,7 +10,7 @@ class Channel(Protocol):
 
     @property
     def is_open(self) -> bool:
-        """Return whether the page still looks on."""
+        """Return True if the page still looks on."""
 
     def offer(self, message: bytes) -> None:
         """Send a message after those before."""

@@ -194,7 +194,7 @@ class Film:
 
     @property
     def is_recording(self) -> bool:
-        """Return whether it goes on."""
+        """Return True if it goes on."""
         return self._scene is not None
 
     def stop(self) -> None:

@@ -87,7 +87,7 @@ class Following:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the page is served."""
+        """Return True if the page is served."""
         return not self._stop.is_set() and self._server.is_open
 
     @property

@@ -18,14 +18,14 @@ logger = logging.getLogger(__name__)
 
 
 def in_notebook() -> bool:
-    """Return whether the program runs in the kernel of a notebook."""
+    """Return True if the program runs in the kernel of a notebook."""
     ipython = sys.modules.get("IPython")
     shell = None if ipython is None else ipython.get_ipython()
     return shell is not None and "IPKernelApp" in getattr(shell, "config", {})
 
 
 def has_widgets() -> bool:
-    """Return whether anywidget is installed, which the live page needs (``nuno-sim[notebook]``)."""
+    """Return True if anywidget is installed, which the live page needs (``nuno-sim[notebook]``)."""
     return find_spec("anywidget") is not None
 
 
@@ -47,7 +47,7 @@ class NotebookChannel:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the widget is still there."""
+        """Return True if the widget is still there."""
         return self.widget.comm is not None
 
     def offer(self, message: bytes) -> None:

@@ -66,7 +66,7 @@ class Server:
 
     @property
     def is_open(self) -> bool:
-        """Return whether it serves."""
+        """Return True if it serves."""
         return self._thread.is_alive()
 
     def send(self, message: bytes) -> None:

@@ -94,7 +94,7 @@ class Advancing(Simulation):
         return True
 
     def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
-        """Return whether the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
+        """Return True if the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
         longer = self._make_room()
         if not self._quiet and not self._stepping.careful and are_fast(moving):
             self._stepping.careful = True

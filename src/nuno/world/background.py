@@ -76,12 +76,12 @@ class Background:
 
     @property
     def alive(self) -> bool:
-        """Return whether frames are still made."""
+        """Return True if frames are still made."""
         return self._thread.is_alive() and not self._stop.is_set() and self.error is None
 
     @property
     def is_current_thread(self) -> bool:
-        """Return whether the caller is the background thread itself."""
+        """Return True if the caller is the background thread itself."""
         return threading.current_thread() is self._thread
 
     def stop(self) -> None:

@@ -133,7 +133,7 @@ def _known_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Bo
 
 
 def same_shape(a: Shape, b: Shape) -> bool:
-    """Return whether two shapes are equal, number for number."""
+    """Return True if two shapes are equal, number for number."""
     if type(a) is not type(b):
         return False
     if a == b:

@@ -59,7 +59,7 @@ class CoupledBodies(CoupledTables):
         )
 
     def is_current(self) -> bool:
-        """Return whether the solvers still are those that the tables speak of."""
+        """Return True if the solvers still are those that the tables speak of."""
         same = all(body._dynamics is own for body, own in zip(self.bodies, self._dynamics, strict=True))
         rigid = self._world._rigid
         return same and (not self.rigid or (rigid is not None and rigid.solver.state.capacity == self._capacity))

@@ -51,11 +51,11 @@ WAIT, TRIES = 5, 6
 STEP = 0.1
 """Of a cell, how far vertices move at once where a cloth is taken apart."""
 MOST = 480
-"""Substeps of a frame at most: twice `nuno.solvers.cloth_substeps.MOST_SUBSTEPS`."""
+"""Substeps of a frame at most: twice `nuno.solvers.cloth_substeps.MAX_SUBSTEPS`."""
 
 
 def are_fast(moving: dict[Body, Dynamics]) -> bool:
-    """Return whether a cloth may have passed through itself for its speed since that was last forgotten, or did."""
+    """Return True if a cloth may have passed through itself for its speed since that was last forgotten, or did."""
     cloths: list[Any] = [dynamics for dynamics in moving.values() if collides_with_itself(dynamics)]
     return any((_fast_worlds(cloth) | (cloth.solver.guarded > 0)).any() for cloth in cloths)
 
@@ -154,7 +154,7 @@ class Impacts:
 
 
 def collides_with_itself(dynamics: Any) -> bool:
-    """Return whether dynamics are of a cloth that collides with itself."""
+    """Return True if dynamics are of a cloth that collides with itself."""
     return isinstance(dynamics.material, Cloth) and bool(dynamics.solver.self_contact)
 
 
@@ -182,7 +182,7 @@ def _at_least(own: int, asked: float) -> int:
 
 
 def look_due(start: float, end: float, frame_rate: float) -> bool:
-    """Return whether slow cloth is to be looked at at ``end`` [s] of a span: about every `LOOK` frames of the clock."""
+    """Return True if slow cloth is to be looked at at ``end`` [s] of a span: about every `LOOK` frames of the clock."""
     at = [math.floor(time * frame_rate / LOOK + 1e-6) for time in (start, end)]
     return at[1] > at[0]
 

@@ -33,12 +33,12 @@ class Pace:
 
     @property
     def is_paused(self) -> bool:
-        """Return whether frames are held up."""
+        """Return True if frames are held up."""
         return self._paused
 
     @property
     def is_awaited(self) -> bool:
-        """Return whether somebody waits to make frames."""
+        """Return True if somebody waits to make frames."""
         return self._waiting > 0
 
     def pause(self) -> None:
@@ -88,7 +88,7 @@ class Pace:
         return end if end - now < (1.0 + 1e-6) * frame else now + frame
 
     def may_go(self, timeout: float) -> bool:
-        """Return whether a frame may be made now, after waiting for that up to ``timeout`` [s]; ``spend`` follows."""
+        """Return True if a frame may be made now, after waiting for that up to ``timeout`` [s]; ``spend`` follows."""
         if not self._paused:
             return True
         with self._changed:

@@ -126,7 +126,7 @@ def _place(solver: Any, key: str, role: str, slot: int) -> RigidPlace:
 
 
 def _is_laid_out(snapshot: Snapshot, layout: RigidLayout, bodies: Mapping[str, Body], world: Simulation) -> bool:
-    """Return whether the world's scene has every body, in the shape that was saved, where the saved one had it."""
+    """Return True if the world's scene has every body, in the shape that was saved, where the saved one had it."""
     scene = world._rigid
     if scene is None or scene.settings != scene.settings_of(world):
         return False

@@ -113,7 +113,7 @@ class Simulation:
 
     @property
     def is_running(self) -> bool:
-        """Return whether frames are made in the background."""
+        """Return True if frames are made in the background."""
         return self._background is not None and self._background.alive
 
     def __copy__(self) -> Simulation:
@@ -295,7 +295,7 @@ class Simulation:
                 colliders.follow(self._schedule)
 
     def _kinematic_rest(self, kinematic: list[Body], start: float) -> bool:
-        """Return whether all paths had ended when they were last told of, and nothing has changed since."""
+        """Return True if all paths had ended when they were last told of, and nothing has changed since."""
         before, self._resting = self._resting, None
         if not kinematic or self._rigid is not None:
             return False

@@ -98,7 +98,7 @@ class Stepping:
             body._dynamics.prepare(time, 1.0 / self._world.frame_rate)  # type: ignore[union-attr]
 
     def _may_meet(self, moving: list[Body], rigid: list[Body]) -> bool:
-        """Return whether two bodies of different solvers could touch, a soft one itself, or any are tied."""
+        """Return True if two bodies of different solvers could touch, a soft one itself, or any are tied."""
         if any(grip.is_tie for body in moving for grip in body._dynamics.grips):  # type: ignore[union-attr]
             return True
         if any(touches_itself(self._world, body) for body in moving):

@@ -249,7 +249,7 @@ def test_the_kernels_of_cuda_take_turns():
     for kernels, surface in ((FAR, solver._far_surface), (FEATURES, solver._surface)):
         inputs = [solver._state, solver._topology, surface, solver._size, run, solver._shapes, 24 * substeps, 1]
         wp.launch(kernels["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
-        gone.append(int(solver._state.gone_to.numpy()[0]))
+        gone.append(int(solver._state.reached.numpy()[0]))
     assert 0 < gone[0] < gone[1] == 24 * substeps
     assert gone[0] % substeps == 0
     np.testing.assert_array_equal(solver.positions(), other.positions())
@@ -288,6 +288,6 @@ def test_small_shapes_alone_are_sharp():
         (nuno.capsule(2.9 * cell, 1.0), True), (nuno.cylinder(1.0, 1.0), True), (nuno.box((1, 1, 1)), True),
     ):  # fmt: skip
         solver.set_colliders(Colliders.from_bodies([nuno.plane(), shape]))
-        assert solver._sharp == sharp
+        assert solver._has_features == sharp
     solver.set_colliders(None)
-    assert not solver._sharp
+    assert not solver._has_features

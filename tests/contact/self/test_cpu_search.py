@@ -56,7 +56,7 @@ def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) ->
     made.run(0.0, 1e-4)
     count = made.pair_counts[-1]
     assert count[0] <= size.vertex_triangle and count[1] <= size.edge_edge
-    rows = made.listed_pairs(len(positions) - 1)
+    rows = made.candidate_pairs(len(positions) - 1)
     return rows, float(made._scalars[-1, THICKNESS]) + margin
 
 

@@ -123,7 +123,7 @@ def test_lists_hold_all_near_pairs(worlds: int) -> None:
     found = 0
     for k in range(worlds):
         x = listed[k].astype(float)
-        triangles, pairs = solver.listed_pairs(k)
+        triangles, pairs = solver.candidate_pairs(k)
         have = {(r[0], *sorted(r[1:])) for r in triangles.tolist()}
         near = np.argwhere(vertex_triangle_distances(x, faces) < far)
         want = {(i, *sorted(faces[f].tolist())) for i, f in near.tolist() if i not in faces[f]}

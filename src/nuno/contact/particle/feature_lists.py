@@ -48,7 +48,7 @@ def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
 def stands_between(
     kind: int, p: Any, h: Any, sa: Any, sb: Any, sc: Any, broad: float
 ):  # fmt: skip
-    """Return whether what is within a box about p (half sides h, all in the shape's frame) may touch between vertices.
+    """Return True if what is within a box about p (half sides h, all in the shape's frame) may touch between vertices.
 
     Returns:
         Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
@@ -116,8 +116,8 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
     soon = t.scalars[THICKNESS] * 0.5 + (QUICK * run.dt + 0.6 * topo.longest)
     broad = ROUND * run.cell
     found = int(0)
-    for near in range(t.near[0]):
-        s = t.near[1 + near]
+    for near in range(t.shape_list[0]):
+        s = t.shape_list[1 + near]
         kind = shapes.kind[s]
         if kind < PLANE:
             centre, r = pose_of(like, t, shapes, s, clock)

@@ -197,7 +197,7 @@ def reset_box(t: Any, rank: int):
         for k in range(3):
             t.box[k] = big
             t.box[3 + k] = -big
-        t.near[0] = 0
+        t.shape_list[0] = 0
 
 
 @wp.func
@@ -291,25 +291,25 @@ def select_shapes(t: Any, shapes: Shapes, ahead: float, rank: int, size: int):
             far = along_box(t, shapes, row, 0, cx) + along_box(t, shapes, row, 1, cy) + along_box(t, shapes, row, 2, cz)
             reach = grow + per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 17)
         if anywhere(reach - far):
-            k = wp.atomic_add(t.near, 0, 1)
-            t.near[1 + k] = s
+            k = wp.atomic_add(t.shape_list, 0, 1)
+            t.shape_list[1 + k] = s
 
 
 @wp.func
 def sort_shapes(t: Any, rank: int):
     """Bring the list into the shapes' order, so that it does not depend on which thread came first."""
     if rank == 0:
-        for a in range(1, t.near[0]):
-            s = t.near[1 + a]
+        for a in range(1, t.shape_list[0]):
+            s = t.shape_list[1 + a]
             b = int(a)
-            while b > 0 and t.near[b] > s:
-                t.near[1 + b] = t.near[b]
+            while b > 0 and t.shape_list[b] > s:
+                t.shape_list[1 + b] = t.shape_list[b]
                 b = b - 1
-            t.near[1 + b] = s
+            t.shape_list[1 + b] = s
 
 
 @wp.func
 def touch_shapes(t: Any, n: int, shapes: Shapes, dt: float, rank: int, size: int):
     """All particles against the shapes nearby."""
-    for k in range(t.near[0]):
-        touch_shape(t, n, shapes, t.near[1 + k], dt, rank, size)
+    for k in range(t.shape_list[0]):
+        touch_shape(t, n, shapes, t.shape_list[1 + k], dt, rank, size)

@@ -59,8 +59,8 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
 @wp.func
 def touch_shapes_together(t: Any, n: int, shapes: Shapes, dt: float, rank: int, size: int):
     """All particles against the shapes nearby, as `nuno.contact.particle.shape_contact.touch_shapes`."""
-    for k in range(t.near[0]):
-        s = t.near[1 + k]
+    for k in range(t.shape_list[0]):
+        s = t.shape_list[1 + k]
         if shapes.kind[s] < SOLID_MESH and shapes.slot[s] < 0:
             touch_still(t, n, shapes, s, dt, rank, size)
         else:

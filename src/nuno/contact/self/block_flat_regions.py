@@ -29,7 +29,7 @@ def vertex(t: StateFloat, k: int):
 
 @wp.func
 def uncreased(t: StateFloat, at: int, columns: int, far: float):
-    """Return whether the diagonals of the square of 3 by 3 vertices from ``at`` on keep a distance."""
+    """Return True if the diagonals of the square of 3 by 3 vertices from ``at`` on keep a distance."""
     d = vertex(t, at + 2) - vertex(t, at + 2 * columns)
     gap = float(1.0e30)
     before = float(-2.0e30)
@@ -48,7 +48,7 @@ def uncreased(t: StateFloat, at: int, columns: int, far: float):
 
 @wp.func
 def apart(t: StateFloat, at: int, step: int, other: int, far: float):
-    """Return whether the lines of a square, ``step`` from one to the next, keep a distance."""
+    """Return True if the lines of a square, ``step`` from one to the next, keep a distance."""
     side = int(SIDE)
     d = wp.vec3(0.0, 0.0, 0.0)
     for j in range(side):
@@ -110,7 +110,7 @@ def forget_flat(t: StateFloat, topo: Topology, rank: int, size: int):
 
 @wp.func
 def in_flat(t: StateFloat, topo: Topology, a: int, b: int):
-    """Return whether two leaves lie in one flat region, so that no two of their elements are near."""
+    """Return True if two leaves lie in one flat region, so that no two of their elements are near."""
     columns = topo.columns
     flat = bool(False)
     if columns > 0:

@@ -166,7 +166,7 @@ def examine(t: StateFloat, topo: Topology, far2: float, room: wp.array(dtype=int
 @wp.func
 def queue_leaf_pairs(t: StateFloat, topo: Topology, far: float, rank: int, size: int):
     """Queue the listed pairs of leaves whose boxes meet and where the cloth is not flat; how many these are."""
-    pairs = t.near_leaves[0]
+    pairs = t.leaf_pairs[0]
     room = t.active_triangle.shape[0]
     barrier(size)
     if rank == 0:
@@ -177,7 +177,7 @@ def queue_leaf_pairs(t: StateFloat, topo: Topology, far: float, rank: int, size:
         pair = int(0)
         on = int(0)
         if k < pairs:
-            pair = t.near_leaves[1 + k]
+            pair = t.leaf_pairs[1 + k]
             a = subarray(t.bounds, 6 * (pair >> 16), 6)
             b = subarray(t.bounds, 6 * (pair & 0xFFFF), 6)
             gx = wp.min(a[3] - b[0], b[3] - a[0])

@@ -36,7 +36,7 @@ def box_faces(
 
 @wp.func
 def boxes_overlap(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int):
-    """Return whether two boxes overlap."""
+    """Return True if two boxes overlap."""
     a = lower[world, i]
     b = upper[world, i]
     c = lower[world, j]
@@ -46,7 +46,7 @@ def boxes_overlap(lower: wp.array2d(dtype=wp.vec3), upper: wp.array2d(dtype=wp.v
 
 @wp.func
 def pierces(point: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int, f: wp.vec3i):
-    """Return whether an edge passes through a face that has none of its ends."""
+    """Return True if an edge passes through a face that has none of its ends."""
     if i == f[0] or i == f[1] or i == f[2] or j == f[0] or j == f[1] or j == f[2]:
         return False
     p = point[world, i]
@@ -67,7 +67,7 @@ def pierces(point: wp.array2d(dtype=wp.vec3), world: int, i: int, j: int, f: wp.
 
 @wp.func
 def cross(point: wp.array2d(dtype=wp.vec3), world: int, f: wp.vec3i, g: wp.vec3i):
-    """Return whether an edge of one face passes through the other."""
+    """Return True if an edge of one face passes through the other."""
     for k in range(3):
         n = (k + 1) % 3
         if pierces(point, world, f[k], f[n], g) or pierces(point, world, g[k], g[n], f):

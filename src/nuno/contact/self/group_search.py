@@ -175,7 +175,7 @@ def search(t: StateFloat, topo: Topology, a: int, b: int, far: float, item: int,
 
 @wp.func
 def are_near(t: StateFloat, a: int, b: int, far: float):
-    """Return whether boxes a and b are nearer to each other than ``far``."""
+    """Return True if boxes a and b are nearer to each other than ``far``."""
     i = 6 * a
     j = 6 * b
     gap = wp.min(t.bounds[i + 3] - t.bounds[j], t.bounds[j + 3] - t.bounds[i])

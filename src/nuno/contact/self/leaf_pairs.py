@@ -86,8 +86,8 @@ def closed_in(t: StateFloat, topo: Topology, margin: float, rank: int, size: int
     place = travelled(topo)
     far = t.scalars[THICKNESS] + margin
     worst = float(0.0)
-    for k in range(rank, t.near_leaves[0], size):
-        pair = t.near_leaves[1 + k]
+    for k in range(rank, t.leaf_pairs[0], size):
+        pair = t.leaf_pairs[1 + k]
         a = subarray(t.bounds, 6 * (pair >> 16), 6)
         b = subarray(t.bounds, 6 * (pair & 0xFFFF), 6)
         gx = wp.max(a[0] - b[3], b[0] - a[3])
@@ -129,8 +129,8 @@ def pair_leaves(t: StateFloat, far: float, m: int, rank: int, size: int):
                         count += 1
             place = claim(t.active_count, 0, count)
             while bits != 0:
-                if place + 1 < t.near_leaves.shape[0]:
-                    t.near_leaves[1 + place] = (a << 16) | (begin + WARP * lowest(bits) + rank % WARP)
+                if place + 1 < t.leaf_pairs.shape[0]:
+                    t.leaf_pairs[1 + place] = (a << 16) | (begin + WARP * lowest(bits) + rank % WARP)
                 place += 1
                 bits = bits & (bits - 1)
 
@@ -140,7 +140,7 @@ def list_leaf_pairs(t: StateFloat, topo: Topology, margin: float, rank: int, siz
     """List the leaves that may come near: within the widest margin that there is room for."""
     width = float(WIDEST_SKIN * margin)
     count = int(-1)
-    room = t.near_leaves.shape[0] - 1
+    room = t.leaf_pairs.shape[0] - 1
     while count < 0:
         barrier(size)
         if rank == 0:
@@ -154,7 +154,7 @@ def list_leaf_pairs(t: StateFloat, topo: Topology, margin: float, rank: int, siz
             width = wp.max(0.5 * width, margin)
             count = -1
     if rank == 0:
-        t.near_leaves[0] = wp.min(count, room)
+        t.leaf_pairs[0] = wp.min(count, room)
         if count > room:
             t.pair_count[MISSED_LEAVES] = wp.max(t.pair_count[MISSED_LEAVES], count)
         t.reference[3 * topo.particles + TRAVELLED] = 0.0

@@ -93,7 +93,7 @@ class Bridge:
         return [own.getsockname() for own in self._server.sockets]
 
     def has_subscribers(self, topic: str) -> bool:
-        """Return whether anyone would get what is published."""
+        """Return True if anyone would get what is published."""
         return topic in self._subscribers
 
     def publish(self, topic: str, message: Message, latched: bool = False) -> None:

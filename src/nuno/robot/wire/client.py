@@ -170,7 +170,7 @@ class WireRobot(RobotInterface):
         return [controller | {"action_type": ros.FOLLOW} for controller in own]
 
     def has_controller(self, controller: Controller) -> bool:
-        """Return whether the robot has a controller, once that is known or ``controller_timeout`` has passed."""
+        """Return True if the robot has a controller, once that is known or ``controller_timeout`` has passed."""
         action = self.names.full(controller["controller_action"])
         begin = time.monotonic()
         while not self._newest.is_there("action_servers", action):
@@ -220,7 +220,7 @@ class WireRobot(RobotInterface):
             logger.warning("what another program asked of %s goes on: %s", name, error)
 
     def is_busy(self, controller: Controller) -> bool:
-        """Return whether a controller follows a goal, whoever sent it."""
+        """Return True if a controller follows a goal, whoever sent it."""
         self.connection.check()
         name = controller["controller_type"]
         return self._status.get(name, False) or self._goals.is_under_way(name)

@@ -126,7 +126,7 @@ class Commands:
 
     @property
     def has_ended(self) -> bool:
-        """Return whether a goal has ended that its client does not know of yet."""
+        """Return True if a goal has ended that its client does not know of yet."""
         return any(own.goal.is_done for own in self._running)
 
     def settle(self) -> None:

@@ -44,7 +44,7 @@ class SentGoal:
 
     @property
     def done(self) -> bool:
-        """Return whether there is a result, or none will come as the connection is lost."""
+        """Return True if there is a result, or none will come as the connection is lost."""
         return self._answer.done()
 
     def result(self, timeout: float | None = None) -> tuple[int, Any, bool]:

@@ -114,7 +114,7 @@ class Newest:
         return came[0]
 
     def is_there(self, what: str, name: str) -> bool:
-        """Return whether the robot has one of its "topics" or "action_servers"; true where it does not tell."""
+        """Return True if the robot has one of its "topics" or "action_servers"; true where it does not tell."""
         known = self.listed(what, name)
         return known is None or name in known
 

@@ -95,7 +95,7 @@ class RosApi:
         return {"names": ["/robot_description"]}
 
     def _has(self, fields: Fields) -> bool:
-        """Return whether a parameter is the URDF; in ROS 2 a node's name comes before it, and a colon."""
+        """Return True if a parameter is the URDF; in ROS 2 a node's name comes before it, and a colon."""
         return ros.field(fields, "name", str).rpartition(":")[2].rpartition("/")[2] == "robot_description"
 
 
@@ -104,5 +104,5 @@ def _full(name: str) -> str:
 
 
 def _same(own: str, asked: str) -> bool:
-    """Return whether two types are one: ROS 1 names have no "msg" in them."""
+    """Return True if two types are one: ROS 1 names have no "msg" in them."""
     return own.replace("/msg/", "/") == asked.replace("/msg/", "/")

@@ -119,7 +119,7 @@ class RobotServer:
 
     @property
     def alive(self) -> bool:
-        """Return whether it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
+        """Return True if it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
         return self._thread.is_alive()
 
     def close(self) -> None:

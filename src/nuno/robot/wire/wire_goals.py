@@ -27,7 +27,7 @@ class WireGoals:
         self._sent: dict[str, tuple[Goal, SentGoal]] = {}
 
     def is_under_way(self, who: str) -> bool:
-        """Return whether a goal that was sent from here has not ended."""
+        """Return True if a goal that was sent from here has not ended."""
         return who in self._sent and not self._sent[who][0].is_done
 
     def send(self, who: str, goal: Goal, action: str, kind: str, fields: Fields, acknowledged: bool) -> Goal:
