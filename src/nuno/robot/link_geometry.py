@@ -52,7 +52,7 @@ class LinkShape:
 
     @property
     def is_bare(self) -> bool:
-        """Whether this only stands for a joint that carries no shape."""
+        """Return whether this only stands for a joint that carries no shape."""
         return isinstance(self.shape, Sphere) and self.shape.radius == BARE
 
 

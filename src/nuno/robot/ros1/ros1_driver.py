@@ -33,8 +33,8 @@ ENDING = 5.0
 class Ros1Driver:
     """A node "/nuno" on a ROS master, for the robot of a server: topics, FollowJointTrajectory, grippers, tf, images.
 
-    It is a process of the system's own Python, which has rospy; Nuno's Python need not. What nobody has subscribed to is
-    not computed. Time is the simulation's: ``/use_sim_time`` is set and ``/clock`` published, so start programs after
+    It is a process of the system's own Python, which has rospy; Nuno's need not. What nobody has subscribed to is not
+    computed. Time is the simulation's: ``/use_sim_time`` is set and ``/clock`` published, so start programs after
     it. When this program or the process ends, all that ROS 1 has asked for stops.
 
     Args:

@@ -47,7 +47,7 @@ class TopicClient:
 
 
 class Ros2Server:
-    """A node-like participant in a ROS 2 graph: programs of ROS 2 on the same domain see the robot's topics and actions.
+    """A participant in a ROS 2 graph: programs of ROS 2 on the same domain see the robot's topics and actions.
 
     It needs no installation of ROS: CycloneDDS comes with pip. As with ``RobotServer`` the robot belongs to a thread of
     the server, and a program that uses it besides holds ``lock`` meanwhile. When all who publish to a topic, or send
