@@ -12,6 +12,7 @@ from typing import Any
 from nuno.errors import NotConnectedError
 from nuno.robot.ros1.ros1_node import NO_MASTER, READY
 from nuno.robot.wire.bridge import import_websockets
+from nuno.validation import checked
 
 logger = logging.getLogger(__name__)
 
@@ -47,6 +48,7 @@ class Ros1Driver:
             cannot be reached.
     """
 
+    @checked
     def __init__(self, url: str, python: str = PYTHON) -> None:
         import_websockets("a robot in a ROS 1 graph")
         self.url = url

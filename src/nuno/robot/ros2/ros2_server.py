@@ -17,7 +17,7 @@ from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import Names
 from nuno.robot.wire.protocol import Message
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -68,6 +68,7 @@ class Ros2Server:
         InvalidInputError: a value out of range.
     """
 
+    @checked
     def __init__(
         self, robot: RobotInterface, domain: int | None = None, *, real_time_factor: float = 1.0,
         names: Names | None = None, tick: float | None = None, image_rate: float = 10.0,
