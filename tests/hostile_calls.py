@@ -36,6 +36,7 @@ LONG = {
     "fit_material", "improve_fold", "lift_soft_cube", "minimise", "plan_walk", "plan_walk_footsteps",
     "plan_walk_velocity", "play_fold", "replay_fold", "sweep", "continue_walk", "stop_walk", "soft_sphere",
     "soft_cylinder", "soft_capsule", "SoftSphere", "SoftCylinder", "SoftCapsule", "RobotServer", "WireRobot",
+    "Ros1Driver", "Ros2Server", "describe_robot",
     "take_picture", "track_hands", "track_hands_in_stereo", "locate_marker", "World.save", "Body.export",
     "export_body", "Film.save", "Recording.save", "Recording.export", "SweepResult.save_csv", "SimulatedRobot",
     "Links", "Humanoid", "Humanoid.enter", "Humanoid.reach", "TowelPicker", "Snapshot.spread", "Picture.save",

@@ -277,6 +277,9 @@ CALLS = {
     "SimulatedRobot": {"robot": lambda r: r.robot, "world": lambda r: nuno.World(device="cpu")},
     "Stride.of": {"robot": lambda r: r.robot},
     "RobotServer": {"robot": lambda r: r.driver, "port": 0},
+    "Ros1Driver": {"url": "ws://127.0.0.1:1", "python": "/no/such/python"},
+    "Ros2Server": {"robot": lambda r: r.driver, "domain": 231},
+    "describe_robot": {"urdf": lambda r: r.robot.description.urdf},
     "TowelPicker": {"driver": lambda r: r.driver, "table": nuno.Table(0.0)},
     "WireRobot": {"url": "ws://127.0.0.1:1", "robot": lambda r: r.robot, "timeout": 0.1},
     # methods
@@ -382,8 +385,8 @@ OWNERS = {
 }  # fmt: skip
 OF_ROBOTS = {
     "Hand", "HeadCameras", "Humanoid", "JointTrajectory.of", "Links", "RobotInterface", "RobotServer", "Sensors",
-    "SimulatedRobot", "Stride.of", "TowelPicker", "Walk", "WireRobot", "continue_walk", "plan_walk",
-    "plan_walk_footsteps", "plan_walk_velocity", "stop_walk",
+    "Ros1Driver", "Ros2Server", "SimulatedRobot", "Stride.of", "TowelPicker", "Walk", "WireRobot", "continue_walk",
+    "describe_robot", "plan_walk", "plan_walk_footsteps", "plan_walk_velocity", "stop_walk",
 }  # fmt: skip
 # Properties that are set
 SETTERS = {"Body": ("color", "friction", "group", "collides_with"), "Joint": ("friction", "limits", "motor", "spring")}
@@ -471,6 +474,7 @@ UNCALLED = {
         "*.move_to_send",
         "*.move_to_wait",
         "RobotServer.join",
+        "Ros2Server.join",
         "SimulatedRobot.sleep",
         "SimulatedRobot.wait_until",
         "WireRobot.*",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.robot.assumed_limits import HINGE_SPEED, SLIDE_SPEED
 from nuno.robot.description import FileName
 from nuno.robot.guessed_frames import (
@@ -27,6 +27,7 @@ from nuno.robot.humanoid import Humanoid
 from nuno.robot.limb_tree import Limb, find_limbs
 from nuno.robot.srdf import Srdf, read_srdf
 from nuno.shapes import quaternion as quat
+from nuno.validation import checked
 
 FIELD_OF_VIEW = 1.047
 """[rad] Of a camera that nothing is known of: 60 degrees."""
@@ -37,6 +38,7 @@ HEAD = """# Guessed by nuno.describe_robot from {urdf}: look through every line,
 """
 
 
+@checked
 def describe_robot(
     urdf: FileName, out: FileName | None = None, *, srdf: FileName | None = None,
     package_dirs: Sequence[FileName] | None = None, name: str | None = None,
@@ -58,10 +60,12 @@ def describe_robot(
         The table's text.
 
     Raises:
+        InvalidInputError: a name or path of another type.
         RobotModelError: a file that is not there or cannot be read.
         MeshError: the URDF names a mesh that is not there.
         OSError: ``out`` cannot be written.
     """
+    goal = None if out is None else file_path(out, "out")
     robot = Humanoid(urdf, srdf=srdf, package_dirs=package_dirs)
     known = read_srdf(None if srdf is None else Path(srdf), robot.model)
     if known.posture is not None:
@@ -69,8 +73,8 @@ def describe_robot(
         robot.stand()
     points = shape_points(robot)
     limbs = find_limbs(robot, points)
-    own = name or robot.name
-    folder = Path.cwd() if out is None else Path(out).resolve().parent
+    own = robot.name if name is None else name
+    folder = Path.cwd() if goal is None else goal.resolve().parent
     lines = [HEAD.format(name=own, urdf=Path(urdf).name), f"[{_key(own)}]", f"urdf = {_text(_seen(urdf, out, folder))}"]
     if srdf is not None:
         lines.append(f"srdf = {_text(_seen(srdf, out, folder))}")
@@ -80,9 +84,8 @@ def describe_robot(
     lines += _groups(robot, own, limbs, known)
     lines += _speeds(robot, own)
     text = "\n".join(lines) + "\n"
-    if out is not None:
-        with replacing(out) as path:
-            Path(path).write_text(text, encoding="utf-8")
+    if goal is not None:
+        write_whole(goal, text)
     return text
 
 

@@ -232,7 +232,9 @@ class Humanoid(Coordinates):
             RobotModelError: the robot has no legs, or none that its description names.
         """
         if not self.description.feet:
-            raise RobotModelError(f"{self.name!r} has no legs to stand on: its description names no feet")
+            raise RobotModelError(
+                f"{self.name!r} has no legs to stand on: its description names no feet; describe_robot guesses"
+            )
         return self.description.feet
 
     def support_polygon(self) -> np.ndarray:

@@ -48,7 +48,7 @@ def main():
     kind = message_class(f"{ACTION}Action")
     assert kind._md5sum == CHECKSUM
     joints = [name for name in state.name if name in json.loads(sys.argv[2])]
-    before = dict(zip(state.name, state.position))
+    before = dict(zip(state.name, state.position, strict=True))
     client = actionlib.SimpleActionClient("/larm_controller/follow_joint_trajectory", kind)
     seen["server"] = client.wait_for_server(rospy.Duration(PATIENCE))
     goal = message_class(f"{ACTION}Goal")
@@ -81,10 +81,11 @@ def main():
     went.unregister()
     for _ in range(100):
         state = rospy.wait_for_message("/joint_states", JointState, PATIENCE)
-        seen["back"] = max(abs(dict(zip(state.name, state.position))[joint] - before[joint]) for joint in joints)
+        now = dict(zip(state.name, state.position, strict=True))
+        seen["back"] = max(abs(now[joint] - before[joint]) for joint in joints)
         if seen["back"] < 1e-6:
             break
-    print(json.dumps(seen))
+    sys.stdout.write(json.dumps(seen) + "\n")
 
 
 main()

@@ -17,10 +17,10 @@ for _name in TEXTS:
 control.msg.SingleJointPositionActionGoal = type("SingleJointPositionActionGoal", (), {})  # only asked for by class
 sys.modules |= {"control_msgs": control, "control_msgs.msg": control.msg}
 
-import numpy as np
-import rospy
-from skrobot.interfaces.ros.base import ROSRobotInterfaceBase
-from skrobot.models.urdf import RobotModelFromURDF
+import numpy as np  # noqa: E402
+import rospy  # noqa: E402
+from skrobot.interfaces.ros.base import ROSRobotInterfaceBase  # noqa: E402
+from skrobot.models.urdf import RobotModelFromURDF  # noqa: E402
 
 JOINTS = json.loads(sys.argv[2])
 
@@ -74,7 +74,7 @@ def main():
     ri.cancel_angle_vector()
     rospy.sleep(0.5)
     seen["cancelled"] = not ri.is_interpolating()
-    print(json.dumps(seen))
+    sys.stdout.write(json.dumps(seen) + "\n")
     rospy.signal_shutdown("done")
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from interrupts import heed_interrupts
 
 import nuno
+from interrupts import heed_interrupts
 from nuno.errors import NotConnectedError
 from nuno.robot.readings import ImageReading
 from nuno.robot.ros1.ros1_driver import CHECK, PYTHON, Ros1Driver
@@ -84,7 +84,7 @@ def run(python, script, plain):
 
 @needs_ros1
 def test_rospy_and_actionlib(master, plain):
-    """States, tf, images and parameters come; goals succeed, are cancelled and refused; commands and Twists are taken."""
+    """States, tf, images and parameters come; goals succeed, are cancelled, refused; commands and Twists are taken."""
     with RobotServer(plain, port=0) as server, Ros1Driver(server.url):
         seen = run(PYTHON, "rospy_client.py", plain)
     assert seen["names"] == list(plain.robot.joint_names)

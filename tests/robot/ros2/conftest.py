@@ -7,6 +7,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parents[1] / "wire"))  # for the plain robot
 
+
 @pytest.fixture
 def plain(still_g1):
     """A robot of its own to each test."""

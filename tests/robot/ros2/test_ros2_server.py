@@ -17,14 +17,42 @@ from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
 from cyclonedds.pub import DataWriter
 from cyclonedds.topic import Topic
-from interrupts import heed_interrupts
 from ros2_node import (
-    BEST_EFFORT, LATCHED, PATIENCE, UUID, CameraInfo, CancelRequest, CancelResponse, Clock, Duration, FeedbackMessage, FollowGoal,
-    GetResultRequest, GetResultResponse, GoalInfo, Header, Image, JointState, JointTrajectory, JointTrajectoryPoint,
-    MultiDOFJointTrajectory, Node, SendGoalRequest, SendGoalResponse, String, TFMessage, Time, Twist, Vector3, hear,
-    graph_domain, stay_here, until,
+    BEST_EFFORT,
+    LATCHED,
+    PATIENCE,
+    UUID,
+    CameraInfo,
+    CancelRequest,
+    CancelResponse,
+    Clock,
+    Duration,
+    FeedbackMessage,
+    FollowGoal,
+    GetResultRequest,
+    GetResultResponse,
+    GoalInfo,
+    Header,
+    Image,
+    JointState,
+    JointTrajectory,
+    JointTrajectoryPoint,
+    MultiDOFJointTrajectory,
+    Node,
+    SendGoalRequest,
+    SendGoalResponse,
+    String,
+    TFMessage,
+    Time,
+    Twist,
+    Vector3,
+    graph_domain,
+    hear,
+    stay_here,
+    until,
 )  # fmt: skip
 
+from interrupts import heed_interrupts
 from nuno.errors import InvalidInputError
 from nuno.robot.readings import ImageReading
 from nuno.robot.ros2.dds_bridge import DdsBridge

@@ -38,3 +38,12 @@ def test_serve_refuses(capsys):
     assert "no robot named 'c3po'" in capsys.readouterr().err
     assert main(["serve", "g1", "--port", "70000"]) == 2
     assert "port must be a whole number" in capsys.readouterr().err
+
+
+def test_graphs_of_ros_have_their_own_options(capsys):
+    """Time passes by itself there, and a domain is ROS 2's alone: the others are refused before anything is loaded."""
+    for graph in ("--ros1", "--ros2"):
+        assert main(["serve", "g1", graph, "--stepped"]) == 2
+        assert "--stepped needs clients of rosbridge" in capsys.readouterr().err
+    assert main(["serve", "g1", "--rosbridge", "--domain", "3"]) == 2
+    assert "--domain is of ROS 2" in capsys.readouterr().err

@@ -46,7 +46,7 @@ _made: dict[str, Any] = {}
 
 
 def message_class(kind: str) -> Any:
-    """Return the class of a ROS 1 message ("sensor_msgs/Image"): the package's own, or one made here; None of neither."""
+    """Return the class of a ROS 1 message ("sensor_msgs/Image"), the package's own or one made here, or None."""
     import roslib.message
 
     found = roslib.message.get_message_class(kind)

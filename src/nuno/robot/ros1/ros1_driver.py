@@ -12,6 +12,7 @@ from typing import Any
 from nuno.errors import NotConnectedError
 from nuno.robot.ros1.ros1_node import NO_MASTER, READY
 from nuno.robot.wire.bridge import import_websockets
+from nuno.validation import checked
 
 logger = logging.getLogger(__name__)
 
@@ -33,8 +34,8 @@ ENDING = 5.0
 class Ros1Driver:
     """A node "/nuno" on a ROS master, for the robot of a server: topics, FollowJointTrajectory, grippers, tf, images.
 
-    It is a process of the system's own Python, which has rospy; Nuno's Python need not. What nobody has subscribed to is
-    not computed. Time is the simulation's: ``/use_sim_time`` is set and ``/clock`` published, so start programs after
+    It is a process of the system's own Python, which has rospy; Nuno's need not. What nobody has subscribed to is not
+    computed. Time is the simulation's: ``/use_sim_time`` is set and ``/clock`` published, so start programs after
     it. When this program or the process ends, all that ROS 1 has asked for stops.
 
     Args:
@@ -47,6 +48,7 @@ class Ros1Driver:
             cannot be reached.
     """
 
+    @checked
     def __init__(self, url: str, python: str = PYTHON) -> None:
         import_websockets("a robot in a ROS 1 graph")
         self.url = url

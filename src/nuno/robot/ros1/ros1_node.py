@@ -93,7 +93,11 @@ class Topic:
 
         watch = None if name == "/clock" else Watch()  # all nodes live by the clock
         publisher = rospy.Publisher(
-            ros1_name(name), message_class(kind), subscriber_listener=watch, queue_size=QUEUE, latch=kind == "std_msgs/String"
+            ros1_name(name),
+            message_class(kind),
+            subscriber_listener=watch,
+            queue_size=QUEUE,
+            latch=kind == "std_msgs/String",
         )
         wire.calls[name] = lambda fields: publisher.publish(to_ros1(fields, kind))
         if watch is None:

@@ -102,7 +102,7 @@ class DdsBridge:
         return bool(self._readers[topic][1].get_subscription_matched_status().current_count > 0)
 
     def publish(self, topic: str, message: Fields, latched: bool = False) -> None:
-        """Send a message to all that have subscribed to its topic, without waiting for any; unknown topics are left out.
+        """Send a message to all that have subscribed to its topic, without waiting; unknown topics are left out.
 
         Args:
             topic: Its name.

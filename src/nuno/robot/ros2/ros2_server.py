@@ -17,7 +17,7 @@ from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import Names
 from nuno.robot.wire.protocol import Message
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class TopicClient:
 
 
 class Ros2Server:
-    """A node-like participant in a ROS 2 graph: programs of ROS 2 on the same domain see the robot's topics and actions.
+    """A participant in a ROS 2 graph: programs of ROS 2 on the same domain see the robot's topics and actions.
 
     It needs no installation of ROS: CycloneDDS comes with pip. As with ``RobotServer`` the robot belongs to a thread of
     the server, and a program that uses it besides holds ``lock`` meanwhile. When all who publish to a topic, or send
@@ -68,6 +68,7 @@ class Ros2Server:
         InvalidInputError: a value out of range.
     """
 
+    @checked
     def __init__(
         self, robot: RobotInterface, domain: int | None = None, *, real_time_factor: float = 1.0,
         names: Names | None = None, tick: float | None = None, image_rate: float = 10.0,
