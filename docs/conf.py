@@ -45,7 +45,7 @@ nitpick_ignore_regex = [
     ("py:class", r"DeviceArray"),  # Warp's arrays, under a name for type checkers
     # What a result holds for other functions to take
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
-    ("py:class", r"(.*\.)?(GripSpec|ImageReading|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
+    ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
 ]
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 LIFT = np.array([0.0, 0.0, 0.15])  # [m]
 BOX_MASS = 0.15  # [kg]
@@ -54,5 +53,5 @@ assert abs(load - WEIGHT) < 0.03 * WEIGHT, "the mean over some swings"
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((0.55, 0.7, 0.95), (0, 0, 0.58), 640, 480, 900.0)
+    camera = nuno.Camera.look_at((0.55, 0.7, 0.95), (0, 0, 0.58), fov=0.52)
     nuno.take_picture(world, camera, samples=3).save(out / "box_on_towel.png")

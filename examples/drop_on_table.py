@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 TABLE = (0.6, 0.6, 0.02)  # [m]
 TOP = 0.7  # [m] height of the table top
@@ -52,5 +51,5 @@ assert not napkin.is_dynamic and napkin.is_deformed
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((0.85, 0.65, 1.05), (0.24, 0, 0.66), 640, 480, 900.0)
+    camera = nuno.Camera.look_at((0.85, 0.65, 1.05), (0.24, 0, 0.66), fov=0.52)
     nuno.take_picture(world, camera, samples=3).save(out / "drop_on_table.png")

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.4, 0.3)  # [m]
 THICKNESS = 0.004  # [m]
@@ -53,5 +52,5 @@ assert apart.min() > 0.8 * THICKNESS, "two layers, one on the other: cloth touch
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((0.35, 0.6, 0.45), (-0.08, 0, 0.0), 640, 480, 900.0)
+    camera = nuno.Camera.look_at((0.35, 0.6, 0.45), (-0.08, 0, 0.0), fov=0.52)
     nuno.take_picture(world, camera, samples=3).save(out / "fold_towel.png")

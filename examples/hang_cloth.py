@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = (0.4, 0.3)  # [m]
 CELLS = (12, 9)
@@ -48,5 +47,5 @@ assert speed < 0.1, "after 4 s it is nearly at rest"
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((0.5, 1.0, 1.15), (0, 0.15, 0.85), 640, 480, 900.0)
+    camera = nuno.Camera.look_at((0.5, 1.0, 1.15), (0, 0.15, 0.85), fov=0.52)
     nuno.take_picture(world, camera, samples=3).save(out / "hang_cloth.png")

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 options.add_argument("--out", type=Path, help="a folder for the file and a picture")
@@ -55,5 +54,5 @@ np.testing.assert_array_equal(read, first)
 assert again[:, 2].max() > 0.16 and lower > 0.05, "it lies on the ball, and falls where there is none"
 
 if out:
-    camera = look_at_camera((0.5, 0.6, 0.45), (0, 0, 0.08), 640, 480, 1000.0)
+    camera = nuno.Camera.look_at((0.5, 0.6, 0.45), (0, 0, 0.08), fov=0.47)
     nuno.take_picture(other, camera, samples=3).save(out / "save_and_restore.png")

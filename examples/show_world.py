@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 TOP = 0.4  # [m] height of the table top
 LIFT = 0.2  # [m]
@@ -55,5 +54,5 @@ assert size < 2.0, "meshcat's page is 0.9 MB"
 assert napkin.vertices[:, 2].max() > TOP + 0.9 * LIFT, "the napkin hangs from its corner"
 
 if out:
-    camera = look_at_camera((0.9, -1.0, 0.95), (0, 0, 0.47), 640, 480, 800.0)
+    camera = nuno.Camera.look_at((0.9, -1.0, 0.95), (0, 0, 0.47), fov=0.58)
     nuno.take_picture(world, camera, samples=3).save(out / "show_world.png")

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 SIZE = 0.2  # [m]
 CELLS = 6
@@ -43,5 +42,5 @@ assert 0.985 < volume < 0.995, "1 - (1 - 2 nu) rho g h / 2E, a little less where
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((1.1, 0.8, 1.15), (0.6, 0, 0.79), 640, 480, 900.0)
+    camera = nuno.Camera.look_at((1.1, 0.8, 1.15), (0.6, 0, 0.79), fov=0.52)
     nuno.take_picture(world, camera, samples=3).save(out / "soft_cube.png")

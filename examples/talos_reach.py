@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 import nuno
-from nuno.tasks.look_at_camera import look_at_camera
 
 TABLE = 0.72  # [m] height of its top
 CORNERS = {"left": np.array((0.45, 0.2, TABLE)), "right": np.array((0.45, -0.2, TABLE))}
@@ -71,5 +70,5 @@ assert robot.self_collisions() == []
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = look_at_camera((1.9, -1.5, 1.6), (0.35, 0, 0.8), 640, 480, 640.0)
+    camera = nuno.Camera.look_at((1.9, -1.5, 1.6), (0.35, 0, 0.8), fov=0.72)
     nuno.HeadCameras(links, samples=2).look_from(camera).save(out / "talos_reach.png")

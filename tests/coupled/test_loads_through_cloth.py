@@ -221,6 +221,7 @@ def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass):
     assert ahead == pytest.approx(friction * length / (6.0 * stiffness), rel=0.1)
 
 
+@pytest.mark.long
 def test_a_soft_cube_goes_along_too():
     """A soft cube of 51 g on the drawn towel goes 100 mm (before: 159 mm)."""
     world = nuno.World(device="cpu")
@@ -237,7 +238,7 @@ def test_a_soft_cube_goes_along_too():
 
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
-@pytest.mark.parametrize("mass", [0.02, 0.29, 0.3])
+@pytest.mark.parametrize("mass", [0.02, pytest.param(0.29, marks=pytest.mark.long), 0.3])
 def test_a_tablecloth_pulled_from_under_a_box(where, mass):
     """Coulomb's law: mu g while the cloth slides under the box, and from what speed that gave the way that is left.
 
@@ -364,6 +365,7 @@ def test_plates_with_napkins_between(seconds):
     assert np.linalg.norm([plate.position for plate in plates] - before, axis=1).max() < 0.5e-3
 
 
+@pytest.mark.long
 def test_a_soft_cube_on_a_towel_on_a_ball():
     """A soft cube on a towel on a ball rests where it is, and the towel bears its weight."""
     world = nuno.World(device="cpu")
@@ -379,6 +381,7 @@ def test_a_soft_cube_on_a_towel_on_a_ball():
     assert np.linalg.norm((cube.vertices - before).mean(axis=0)) < 0.1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
 def test_a_tray_that_moves(where):
     """A tray that follows a path takes a towel and the box on it along: 100 mm at an eighth of mu g."""
