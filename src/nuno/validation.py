@@ -137,7 +137,7 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
         InvalidInputError: of another class.
     """
     if not isinstance(value, kind):
-        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+        raise InvalidInputError(f"{name} must be {_named(kind.__name__)}, got {_short(value)}")
     return value
 
 
@@ -256,11 +256,17 @@ def _part_rule(part: str, known: Mapping[str, Any]) -> Rule:
         rules = [_rule(item, known) for item in items if item != "..."]
         return _sequence_rule(rules, len(rules) if word == "tuple" and "..." not in items and rules else None, word)
     found = known.get(word)
-    if isinstance(found, type):
-        return f"a {word}", lambda value: isinstance(value, found)
-    if word in known or not word[:1].isupper() or word in UNCHECKED:
+    if word in UNCHECKED:
         return "anything", lambda value: True
-    return f"a {word}", lambda value: any(kind.__name__ == word for kind in type(value).__mro__)
+    if isinstance(found, type):
+        return _named(word), lambda value: isinstance(value, found)
+    if word in known or not word[:1].isupper():
+        return "anything", lambda value: True
+    return _named(word), lambda value: any(kind.__name__ == word for kind in type(value).__mro__)
+
+
+def _named(word: str) -> str:
+    return f"an {word}" if word[0] in "AEIOU" else f"a {word}"
 
 
 def _sequence_rule(rules: list[Rule], length: int | None, word: str) -> Rule:
@@ -338,7 +344,7 @@ SIMPLE: dict[str, Rule] = {
     "FileName": ("a path", _is_path),
     "Any": ("anything", lambda value: True),
 }
-UNCHECKED = ("Self", "Unpack", "TypeVar")
+UNCHECKED = ("Self", "Unpack", "TypeVar", "Executor")  # what takes an executor says itself where to get one
 
 
 def _short(value: Any) -> str:
