@@ -23,7 +23,7 @@ Kind = TypeVar("Kind")
 P = ParamSpec("P")
 R = TypeVar("R")
 NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
-MOST = 2**31 - 1
+MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
 
 
@@ -106,7 +106,7 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     return result
 
 
-def count(name: str, value: Any, *, low: int = 1, high: int = MOST) -> int:
+def count(name: str, value: Any, *, low: int = 1, high: int = MAX_COUNT) -> int:
     """Return ``value`` as an int of at least ``low`` and at most ``high``.
 
     Raises:
@@ -114,7 +114,7 @@ def count(name: str, value: Any, *, low: int = 1, high: int = MOST) -> int:
     """
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < low or value > high:
-        valid = f"of at least {low}" if high == MOST and not (whole and value > high) else f"from {low} to {high}"
+        valid = f"of at least {low}" if high == MAX_COUNT and not (whole and value > high) else f"from {low} to {high}"
         raise InvalidInputError(f"{name} must be a whole number {valid}, got {_short(value)}")
     return int(value)
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError
 from nuno.validation import as_array, checked, finite_array, number
 
-MOST_PIXELS = 16384
+MAX_PIXELS = 16384
 """Of a side of an image: 1 GB of depth a world, where both sides have as many."""
 _DISTORTIONS = (4, 5, 8, 12, 14)  # how many coefficients OpenCV's models have
 
@@ -161,7 +161,7 @@ def _rows(name: str, value: ArrayLike, size: int) -> np.ndarray:
 
 
 def _pixels(name: str, value: Any) -> int:
-    pixels = number(f"{name} in pixels", value, low=1.0, high=MOST_PIXELS)
+    pixels = number(f"{name} in pixels", value, low=1.0, high=MAX_PIXELS)
     if pixels != int(pixels):
         raise InvalidInputError(f"{name} must be a whole number of pixels, got {value!r}")
     return int(pixels)
