@@ -23,7 +23,7 @@ Kind = TypeVar("Kind")
 P = ParamSpec("P")
 R = TypeVar("R")
 NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
-MAX_INDEX = 2**31 - 1
+MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
 
 
@@ -106,7 +106,7 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     return result
 
 
-def count(name: str, value: Any, *, low: int = 1, high: int = MAX_INDEX) -> int:
+def count(name: str, value: Any, *, low: int = 1, high: int = MAX_COUNT) -> int:
     """Return ``value`` as an int of at least ``low`` and at most ``high``.
 
     Raises:
@@ -114,7 +114,7 @@ def count(name: str, value: Any, *, low: int = 1, high: int = MAX_INDEX) -> int:
     """
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < low or value > high:
-        valid = f"of at least {low}" if high == MAX_INDEX and not (whole and value > high) else f"from {low} to {high}"
+        valid = f"of at least {low}" if high == MAX_COUNT and not (whole and value > high) else f"from {low} to {high}"
         raise InvalidInputError(f"{name} must be a whole number {valid}, got {_short(value)}")
     return int(value)
 
@@ -137,7 +137,7 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
         InvalidInputError: of another class.
     """
     if not isinstance(value, kind):
-        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+        raise InvalidInputError(f"{name} must be {_named(kind.__name__)}, got {_short(value)}")
     return value
 
 
@@ -256,11 +256,17 @@ def _part_rule(part: str, known: Mapping[str, Any]) -> Rule:
         rules = [_rule(item, known) for item in items if item != "..."]
         return _sequence_rule(rules, len(rules) if word == "tuple" and "..." not in items and rules else None, word)
     found = known.get(word)
-    if isinstance(found, type):
-        return f"a {word}", lambda value: isinstance(value, found)
-    if word in known or not word[:1].isupper() or word in UNCHECKED:
+    if word in UNCHECKED:
         return "anything", lambda value: True
-    return f"a {word}", lambda value: any(kind.__name__ == word for kind in type(value).__mro__)
+    if isinstance(found, type):
+        return _named(word), lambda value: isinstance(value, found)
+    if word in known or not word[:1].isupper():
+        return "anything", lambda value: True
+    return _named(word), lambda value: any(kind.__name__ == word for kind in type(value).__mro__)
+
+
+def _named(word: str) -> str:
+    return f"an {word}" if word[0] in "AEIOU" else f"a {word}"
 
 
 def _sequence_rule(rules: list[Rule], length: int | None, word: str) -> Rule:
@@ -338,7 +344,7 @@ SIMPLE: dict[str, Rule] = {
     "FileName": ("a path", _is_path),
     "Any": ("anything", lambda value: True),
 }
-UNCHECKED = ("Self", "Unpack", "TypeVar")
+UNCHECKED = ("Self", "Unpack", "TypeVar", "Executor")  # what takes an executor says itself where to get one
 
 
 def _short(value: Any) -> str:

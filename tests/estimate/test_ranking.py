@@ -1,5 +1,7 @@
 """From comparisons to a ranking: what the evidence, the probabilities and the confidence are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,11 @@ def test_what_is_plausible_holds_most_of_the_probability():
     sure = Ranked("log_evidence", np.log([0.01, 0.98, 0.01]), np.zeros(3))
     assert list(sure.plausible(3)) == [0, 1]
     assert list(Ranked("iou", np.array((0.9, 0.1, 0.8)), np.zeros(3)).plausible(2)) == [0, 2]
+
+
+def test_a_future_that_is_no_number_is_never_the_best():
+    """Whatever its silhouette says, its error is infinite, and its evidence none."""
+    comparison = replace(looked_at([0, 1], [[0.0, 1.0]]), finite=np.array([[False, True]]))
+    for score in ("evidence", "chamfer", "iou", "eq1"):
+        assert comparison.error(score)[0, 0, 0] == np.inf and np.isfinite(comparison.error(score)[0, 0, 1])
+        assert rank([comparison], score, 2).order[0] == 1

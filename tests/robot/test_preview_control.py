@@ -76,3 +76,17 @@ def test_a_height_must_be_positive(height):
     """Named errors."""
     with pytest.raises(InvalidInputError, match="height must be > 0"):
         PreviewControl(height)
+
+
+def test_a_joined_reference_asks_for_the_state_that_there_is(control):
+    """Its divergent component, the integral of w exp(-w t) p(t), is x + x'/w of the state (Takenaka et al. 2009)."""
+    n = 4000
+    reference = np.where(np.arange(n)[:, None] * control.tick < 1.0, (0.0, 0.0), (0.05, -0.02))
+    state = np.array([[0.01, 0.02], [0.03, -0.05], [0.0, 0.0]])
+    joined = control.joined(reference, state)
+    w = np.sqrt(GRAVITY / HEIGHT)
+    times = np.arange(n) * control.tick
+    asked = np.trapezoid(w * np.exp(-w * times)[:, None] * joined, times, axis=0) + np.exp(-w * times[-1]) * joined[-1]
+    # the trapezium rule over ticks of 5 ms, of a function whose time constant is 0.3 s
+    np.testing.assert_allclose(asked, state[0] + state[1] / w, atol=2e-5)
+    np.testing.assert_array_equal(joined[times > 0.5], reference[times > 0.5])

@@ -164,3 +164,12 @@ def test_bad_input(talos, g1):
         Sensors(talos).read(stance=("tail",))
     with pytest.raises(InvalidInputError, match="links are those of another robot"):
         Sensors(talos, g1.enter(nuno.World(device="cpu")))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"latency": -0.1}, {"latency": float("nan")}, {"rate": 0.0}, {"noise": -1.0}, {"bias": [[1.0]]}]
+)
+def test_no_sensor_is_so(wrong):
+    """Samples from the future, no samples, noise below none."""
+    with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+        SensorModel(**wrong)

@@ -14,7 +14,7 @@ import searched
 
 import nuno.search as search
 from interrupts import heed_interrupts
-from nuno.errors import ResultsInUseError
+from nuno.errors import FileWriteError, ResultsInUseError
 from nuno.search.parameters import make_parameters
 from nuno.search.results_file import ResultsFile, make_header
 
@@ -150,7 +150,7 @@ def test_disk_full(tmp_path, monkeypatch):
         fsync(descriptor)
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="the disk is full"):
+    with pytest.raises(FileWriteError, match="the disk is full"):
         search.sweep(searched.square, {"x": [0, 1, 2, 3]}, results=results, batch=False)
     monkeypatch.setattr(os, "fsync", fsync)
     assert recorded(results) == [0] and results.read_bytes().count(b"\n") == 2

@@ -108,7 +108,7 @@ def test_over_an_executor():
         ({"x": (1.0, 0.0)}, {}, InvalidInputError, "low < high"),
         ({"x": (0.0, np.inf)}, {}, InvalidInputError, "must be finite"),
         ({"x": (0.0, 1.0)}, {"log_scale": ["x"]}, InvalidInputError, "positive for a log scale"),
-        ({"x": (0.0, 1.0)}, {"log_scale": "x"}, InvalidInputError, "sequence of text"),
+        ({"x": (0.0, 1.0)}, {"log_scale": "x"}, InvalidInputError, "log_scale must be a sequence"),
         ({"x": (0.0, 1.0)}, {"start": {"y": 0.0}}, UnknownNameError, "no bound named 'y'"),
         ({"x": (0.0, 1.0)}, {"start": {"x": 2.0}}, InvalidInputError, "start of 'x'"),
         ({"x": (0.0, 1.0)}, {"population": 2}, InvalidInputError, "population"),

@@ -24,5 +24,6 @@ def test_no_colour(color):
 def test_linear():
     """Ends stay, the middle of sRGB is 21.4 % of the light (IEC 61966-2-1), and the two pieces meet."""
     np.testing.assert_allclose(linear(np.array([0.0, 0.5, 1.0])), (0.0, 0.21404, 1.0), atol=1e-5)
+    np.testing.assert_allclose(linear(np.array([0.02])), 0.02 / 12.92, rtol=1e-12)  # the piece near black is a line
     low, high = linear(np.array([0.04045, 0.0404501]))
     assert high - low < 1e-7

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 import nuno
-from free_fall import free_fall  # noqa: F401
 from nuno import BodyStateError, Cloth, FileFormatError, InvalidInputError, Path, SurfacePoints
-
-pytestmark = pytest.mark.usefixtures("free_fall")
 
 
 def room():
@@ -110,7 +107,7 @@ def test_restore_from_a_file_in_an_empty_world(tmp_path):
         w.find("flag").translate((0, 0, 0.2))
         w.run(1.3)
     assert_same(everything(other), everything(world))
-    assert other.find("towel")._dynamics.solver.colliders.names == ["table", "flag", "rag"]
+    assert other.save().ignored == world.save().ignored != () != other.save().pair_friction
 
 
 def test_a_file_of_another_process_finds_its_bodies_by_name_and_shape(tmp_path):
@@ -124,7 +121,7 @@ def test_a_file_of_another_process_finds_its_bodies_by_name_and_shape(tmp_path):
     assert other.find("towel") is towel and other.find("table") is not table
     assert_same(everything(other), everything(world))
     other.step()
-    assert other.find("towel")._dynamics.solver.colliders.names == ["table", "flag", "rag"]
+    assert len(other.save().ignored) == len(other.save().pair_friction) == 1
 
 
 def test_files_that_cannot_be_read(tmp_path):
@@ -188,8 +185,9 @@ def test_arguments_by_world_and_adopt():
     futures.push(towel, [(1, 0, 0), (2, 0, 0)])
     futures.run(0.5)
     shape = futures.find("towel").vertices
-    np.testing.assert_array_equal(shape[[0, 1], [0, 3]], goals)
-    np.testing.assert_array_equal(shape[0, 11], goals[0])
+    # in the first world two corners are led to one place, where the cloth, 4 mm thick, keeps its layers apart
+    np.testing.assert_allclose(shape[[0, 1], [0, 3]], goals, atol=0.004)
+    np.testing.assert_allclose(shape[0, 11], goals[0], atol=0.004)
     world.adopt(futures, 1)
     assert world.find("towel") is towel and world.bodies == (table, towel) and world.time == 0.5
     np.testing.assert_array_equal(towel.vertices, shape[1])
@@ -304,3 +302,34 @@ def test_a_body_that_follows_a_frame_is_where_it_was_to_the_bit():
     world.restore(saved)
     assert cup.parent is frame
     np.testing.assert_array_equal(np.concatenate(cup.pose()), pose)
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_old_files_of_moving_rigid_bodies(version, tmp_path):
+    """Before format 3 they do not say where those are: they are refused by name, and what is static is read."""
+    world = nuno.World(device="cpu")
+    world.attach(world.add(nuno.box((0.1, 0.1, 0.1), name="brick")))
+    world.save(tmp_path / "now.npz")
+    with np.load(tmp_path / "now.npz") as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"])) | {"format": version}
+    np.savez(tmp_path / "then.npz", **{**arrays, "header": np.array(json.dumps(header))})
+    if version < 3:
+        with pytest.raises(FileFormatError, match="'brick'"):
+            world.restore(tmp_path / "then.npz")
+    else:
+        world.restore(tmp_path / "then.npz")
+
+
+def test_a_push_moves_in_time_with_its_snapshot():
+    """``at`` takes the end of a push along: restored later, it acts for as long as it had left."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    brick = world.add(nuno.box((0.1, 0.1, 0.1), name="brick"))
+    world.attach(brick, nuno.Rigid(mass=1.0))
+    world.push(brick, (1.0, 0.0, 0.0), duration=0.2)
+    saved = world.save()
+    world.run(1.0)
+    world.restore(saved.at(world.time))
+    world.run(1.0)
+    # 1 N on 1 kg for 0.2 s; a push that had ended would leave it at rest
+    np.testing.assert_allclose(brick.velocity, (0.2, 0.0, 0.0), atol=1e-5)

@@ -83,7 +83,7 @@ class Chequer:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        number("size", self.size, above=0.0)
+        number("a chequer's size", self.size, above=0.0)
         rgb(self.color)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nuno.errors import MeshError
-from nuno.validation import MAX_INDEX, checked, finite_array, index_array
+from nuno.validation import MAX_COUNT, checked, finite_array, index_array
 
 # The corner of a voxel at (x, y, z) in {0, 1} has the number x + 2 y + 4 z. A voxel's four outer tetrahedra stand on
 # every other corner, about the fifth; in the neighbours, which have the other corners, the diagonals of the common face
@@ -101,7 +101,7 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
     Raises:
         MeshError: no tetrahedra.
     """
-    return boundary_by_element(index_array("tets", tets, ("m", 4), low=0, high=MAX_INDEX, error=MeshError))[0]
+    return boundary_by_element(index_array("tets", tets, ("m", 4), low=0, high=MAX_COUNT, error=MeshError))[0]
 
 
 def boundary_by_element(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -73,8 +73,12 @@ class Minimum:
 
     @checked
     def near(self, excess: float) -> dict[str, tuple[float, float]]:
-        """Return the range, by name, of the parameters whose value is at most ``excess`` above the lowest."""
-        close = self.tried_values <= self.value + excess
+        """Return the range, by name, of the parameters whose value is at most ``excess`` above the lowest.
+
+        Raises:
+            InvalidInputError: an excess that is negative or not finite.
+        """
+        close = self.tried_values <= self.value + number("excess", excess, low=0.0)
         return {name: (float(column[close].min()), float(column[close].max())) for name, column in self.tried.items()}
 
 

@@ -106,6 +106,8 @@ def carry_mat(
     )
     rubbing = number("arm_friction", arm_friction, low=0.0)
     found_device(checked_device(device))
+    if executor is not None and not isinstance(executor, Executor):
+        raise InvalidInputError(f"executor must be a concurrent.futures.Executor, got {type(executor).__name__}")
     if arms not in ("boxes", "hulls") or (walks is not None and not isinstance(walks, Sequence)):
         raise InvalidInputError(f"arms must be hulls or boxes, and walks a sequence, got {arms!r} and {walks!r}")
     if isinstance(robot, ArmTracks):

@@ -193,6 +193,7 @@ class Controls(Following):
         self._plots = {other: plot for other, plot in self._plots.items() if other != name}
         self._plots_changed = True
 
+    @checked
     def look_at(
         self, worlds: int | Iterable[int] | None, *, spacing: float | tuple[float, float] | None = None
     ) -> None:

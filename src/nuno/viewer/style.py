@@ -47,7 +47,7 @@ class Style:
     color_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.mode not in MODES:
+        if not isinstance(self.mode, str) or self.mode not in MODES:
             raise InvalidInputError(f'mode must be "surface", "wireframe" or "tetrahedra", got {self.mode!r}')
         number("explode", self.explode, low=1.0)
         number("opacity", self.opacity, above=0.0, high=1.0)

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 CHUNK = 30  # frames between two looks at whether the state is finite: what a diverged run can lose
 CUDA_CHUNK = 60  # the same on CUDA, which idles while it is looked at
-MOST_SUBSTEPS = 10_000
+MAX_SUBSTEPS = 10_000
 """Of a frame: at 60 frames a second 1.7 us each, in which what moves at 1 cm/s does so by less than floats resolve."""
-MOST_FRAMES = 1_000_000.0
+MAX_FRAMES = 1_000_000.0
 """A second, [1/s]."""
 
 
@@ -54,8 +54,8 @@ class Simulation:
             found_device(device)
         gx, gy, gz = finite_array("gravity", gravity, (3,))
         self.gravity: tuple[float, float, float] = (float(gx), float(gy), float(gz))
-        self.frame_rate = number("frame_rate", frame_rate, above=0.0, high=MOST_FRAMES)
-        self.substeps = None if substeps is None else count("substeps", substeps, high=MOST_SUBSTEPS)
+        self.frame_rate = number("frame_rate", frame_rate, above=0.0, high=MAX_FRAMES)
+        self.substeps = None if substeps is None else count("substeps", substeps, high=MAX_SUBSTEPS)
         self.world_count = 1
         self.lock = FrameLock()  # hold it (``with world.lock:``) to read several bodies at the same instant
         self._time = 0.0
