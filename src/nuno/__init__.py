@@ -309,7 +309,8 @@ _LAZY = {
     name: module
     for module, names in {
         "nuno.bodies.element_state": "ElementState elements",
-        "nuno.camera.picture": "Chequer Lamp Picture take_picture",
+        "nuno.camera.lamp": "Lamp",
+        "nuno.camera.picture": "Chequer Picture take_picture",
         "nuno.camera.segmentation": "segment_after segment_before",
         "nuno.camera.table": "Table",
         "nuno.estimate.case": "PickCase read_case",
