@@ -123,14 +123,13 @@ class Coupling:
             return wp.zeros(max(1, count), dtype=dtype, device=self.device)
 
         made.p, made.u, made.w = (zeros(worlds * total, kind) for kind in (wp.vec3, wp.vec3, float))
-        made.pressed, made.bounded = zeros(worlds * total, int), zeros(worlds * total, int)
+        made.pressed, made.bounded, made.first_row = (zeros(worlds * total, int) for _ in range(3))
         made.bounded_count = zeros(worlds, int)
         made.shape = wp.full(max(1, MOST * worlds * total), -1, dtype=int, device=self.device)
         for name in ("normal", "motion", "drag"):
             setattr(made, f"shape_{name}", zeros(MOST * worlds * total, wp.vec3))
         for name in ("room", "friction", "push"):
             setattr(made, f"shape_{name}", zeros(MOST * worlds * total, float))
-        made.first_row = zeros(worlds * total, int)
         if self._at_once:
             made.sharers, made.joining, made.moved = (
                 zeros(worlds * total * k, kind) for k, kind in ((1, int), (1, int), (3, wp.int64))
