@@ -331,22 +331,31 @@ def test_a_book_on_a_folded_towel(layers):
     assert borne(world, cloth, "table")[2] == pytest.approx((1 + 0.2 * side * side * layers) * G, rel=0.02)
 
 
+@pytest.mark.parametrize("where", DEVICES, indirect=True)
+@pytest.mark.parametrize("shape", ["round", "square"])
+def test_a_napkin_between_plates_does_not_creep(where, shape):
+    """Nothing goes as fast as 0.1 mm in 60 s (one by one before: round ones by 8 um/s, square ones by 50)."""
+    world = nuno.World(device=where)
+    table(world)
+    shapes = [nuno.cylinder(0.08, 0.012) if shape == "round" else nuno.box((0.12, 0.12, 0.012)) for _ in range(2)]
+    plates = [load(world, 0.3, shapes[0], bottom=2e-4)]
+    napkin = towel(world, height=0.0144, name="napkin")
+    plates.append(load(world, 0.3, shapes[1], bottom=0.0166))
+    world.run(1.0, progress=False)
+    start = [plate.position for plate in plates]
+    world.run(0.25, progress=False)
+    moved = [plate.position - at for plate, at in zip(plates, start, strict=True)]
+    assert np.abs(moved).max() < 0.25 * 1e-4 / 60
+    assert borne(world, plates[1], napkin.name)[2] == pytest.approx(0.3 * G, rel=0.01)
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "seconds",
-    [
-        1.5,
-        pytest.param(
-            60.0,
-            marks=[
-                pytest.mark.slow,
-                pytest.mark.xfail(strict=True, reason="creeps: see docs/contact.md"),
-            ],
-        ),
-    ],
-)
+@pytest.mark.parametrize("seconds", [0.5, pytest.param(60.0, marks=pytest.mark.slow)])
 def test_plates_with_napkins_between(seconds):
-    """A pile of plates of 0.3 kg with napkins between stands, each a napkin above the other."""
+    """A pile of plates of 0.3 kg stands, each a napkin above the other, and wanders by less than 0.1 mm in 60 s.
+
+    Before: 15 um/s, as rows between two heavy bodies and a light cloth were not solved to their end.
+    """
     world = nuno.World(device="cpu")
     table(world)
     plates, height = [], 2e-4
@@ -356,13 +365,14 @@ def test_plates_with_napkins_between(seconds):
         if k < 2:
             towel(world, (0.16, 0.16), height=height + 2e-3, name=f"napkin{k}")
             height += 0.0042
-    world.run(seconds, progress=False)
+    world.run(1.5, progress=False)
     places = np.array([plate.position for plate in plates])
     assert np.diff(places[:, 2]) - 0.012 == pytest.approx([THICK, THICK], rel=0.05)
-    assert np.abs(places[:, :2]).max() < 2e-4
-    before = places.copy()
-    world.run(0.5, progress=False)
-    assert np.linalg.norm([plate.position for plate in plates] - before, axis=1).max() < 0.5e-3
+    assert np.abs(places[:, :2]).max() < 1e-5
+    world.run(seconds, progress=False)
+    moved = [plate.position for plate in plates] - places
+    assert np.linalg.norm(moved, axis=1).max() < 1e-4 * seconds / 60.0
+    assert max(np.linalg.norm(plate.velocities, axis=-1).max() for plate in plates) < 1e-3
 
 
 @pytest.mark.long
@@ -396,6 +406,38 @@ def test_a_tray_that_moves(where):
     world.run(1.2, progress=False)
     assert box.position - start == pytest.approx([0.1, 0.0, 0.0], abs=0.2e-3)
     assert borne(world, cloth, "tray")[2] == pytest.approx((1.0 + 0.2 * 0.16**2) * G, rel=0.01)
+
+
+def test_a_napkin_between_plates_elsewhere_changes_no_bit():
+    """A box on a towel goes as it does alone, and the pile in futures and a restored world as in its own."""
+    alone, world = nuno.World(device="cpu"), nuno.World(device="cpu")
+    for each in (alone, world):
+        table(each)
+        towel(each)
+        load(each, 0.1, nuno.box((0.1, 0.1, 0.05), name="box"))
+    pile = []
+    for height, shape in ((2e-4, "plate"), (0.0144, "napkin"), (0.0166, "top")):
+        if shape == "napkin":
+            body = world.add(nuno.sheet((0.08, 0.08), cells=(4, 4), position=(0.4, 0.0, height)))
+            world.attach(body, nuno.Cloth(friction=0.5))
+        else:
+            body = world.add(nuno.box((0.07, 0.06, 0.012), position=(0.4, 0.0, height + 0.006)))
+            world.attach(body, nuno.Rigid(mass=0.3))
+        pile.append(body)
+    alone.run(0.3, progress=False)
+    world.run(0.1, progress=False)
+    futures, moment = world.imagine(2), world.save()
+    world.run(0.2, progress=False)
+    for name in ("towel", "box"):
+        np.testing.assert_array_equal(world.find(name).vertices, alone.find(name).vertices)
+    ends = [body.vertices for body in world.bodies]
+    futures.run(0.2, progress=False)
+    world.restore(moment)
+    world.run(0.2, progress=False)
+    for body, copy, end in zip(world.bodies, futures.bodies, ends, strict=True):
+        np.testing.assert_array_equal(body.vertices, end)
+        np.testing.assert_array_equal(copy.vertices, np.broadcast_to(end, copy.vertices.shape))
+    assert pile[2].vertices[:, 2].min() - pile[0].vertices[:, 2].max() == pytest.approx(THICK, rel=0.05)
 
 
 def scene(world):

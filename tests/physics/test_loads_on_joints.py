@@ -64,6 +64,65 @@ def test_a_kilogram_rests_on_a_light_flap_at_its_stop(mass, x, drop):
     assert joint.effort == pytest.approx(-(box.position[0] + 0.2 * mass) * G, rel=5e-3)
 
 
+def test_five_kilograms_rest_on_a_flap_of_20_grams():
+    """250 times the flap's mass, at its stop (28 passes: 52 mm/s): at rest; hinge and stop bear it."""
+    world = nuno.World(device="cpu")
+    flap = board(world, 0.02)
+    joint = hinged(world, flap, limits=(-1.0, 0.0))
+    box = box_on(world, 0.2, mass=5.0)
+    check_rest(world, [flap, box], joint)
+    assert joint.wrench[0][2] == pytest.approx(-5.02 * G, rel=2e-3)
+    assert joint.effort == pytest.approx(-(5.0 * box.position[0] + 0.2 * 0.02) * G, rel=5e-3)
+
+
+@pytest.mark.parametrize(("mass", "load"), [(0.05, 1.0), (0.02, 5.0)])
+def test_a_load_rests_on_the_outer_of_two_leaves(mass, load):
+    """Each hinge bears what is beyond it, at rest (28 passes: 6 mm/s of 1 kg)."""
+    world = nuno.World(device="cpu")
+    inner, outer = board(world, mass, 0.2), board(world, mass, 0.2)
+    outer.translate((0.2, 0.0, 0.0))
+    first = hinged(world, inner, limits=(-1.0, 0.0))
+    second = nuno.hinge(outer, inner, point=(0.2, 0.0, 1.0), axis=Y, limits=(-1.0, 0.0))
+    box = box_on(world, 0.3, mass=load)
+    check_rest(world, [inner, outer, box], second)
+    assert gap(first) < 1e-6
+    for joint, x, beyond in ((first, 0.0, 2 * mass), (second, 0.2, mass)):
+        assert joint.wrench[0][2] == pytest.approx(-(load + beyond) * G, rel=2e-3)
+        moment = load * (box.position[0] - x) + (0.3 - x) * mass + (beyond - mass) * 0.1
+        assert joint.effort == pytest.approx(-moment * G, rel=5e-3)
+
+
+def test_a_table_on_motors_rests_on_its_feet():
+    """20 kg on four legs of three driven links each, feet of 100 g on a floor (28 passes: 90 mm/s)."""
+    world = nuno.World(device="cpu")
+    floor = world.add(nuno.box((2.0, 2.0, 0.1), position=(0.0, 0.0, -0.05)))
+    trunk = world.add(nuno.box((0.4, 0.25, 0.1), position=(0.0, 0.0, 0.45)))
+    world.attach(trunk, nuno.Rigid(mass=20.0))
+    feet = []
+    for x in (-0.15, 0.15):
+        for y in (-0.1, 0.1):
+            before = trunk
+            for size, z, mass, stiffness in (
+                ((0.05, 0.04, 0.2), 0.3, 1.0, 2e3),
+                ((0.04, 0.04, 0.195), 0.1025, 0.5, 2e3),
+                ((0.1, 0.06, 0.01), 0.0052, 0.1, 200.0),
+            ):
+                link = world.add(nuno.box(size, position=(x, y, z)))
+                world.attach(link, nuno.Rigid(mass=mass))
+                motor = nuno.Motor(position=0.0, stiffness=stiffness, damping=0.01 * stiffness, max_effort=80.0)
+                nuno.hinge(link, before, point=(x, y, z + 0.5 * size[2]), axis=Y, motor=motor)
+                before = link
+            feet.append(before)
+    world.run(1.0)
+    start = trunk.position.copy()
+    for _ in range(30):
+        world.step()
+        assert np.linalg.norm(trunk.velocities, axis=-1).max() < 1e-3
+    assert np.linalg.norm(trunk.position - start) < 1e-5
+    borne = sum(world.contacts(foot).impulses[floor.name][2] for foot in feet) * world.frame_rate
+    assert borne == pytest.approx((20.0 + 4 * 1.6) * G, rel=5e-3)
+
+
 def test_a_kilogram_rests_on_a_lid_on_a_tables_edge():
     """A lid of 50 g on a hinge and on a table's edge: the two bear 1 kg and the lid."""
     world = nuno.World(device="cpu")

@@ -13,15 +13,7 @@ restart for accelerated gradient schemes", 2015): without that, 2,000 passes are
 
 import warp as wp
 
-from nuno.coupled.bounded_particles import (
-    Particles,
-    bound,
-    bound_corners,
-    give_along,
-    is_between,
-    is_bounded,
-    rub_between,
-)
+from nuno.coupled.bounded_particles import Particles
 from nuno.rigid.rigid_body import RigidState, inverse_mass_at, point_motion, point_of, shift_whole, turn_whole
 
 LEAVE_SPEED = wp.constant(0.5)
@@ -55,6 +47,9 @@ class Rows:
     squeeze: wp.array(dtype=float)  # and how far that goes at most [m]
     push: wp.array(dtype=float)
     drag: wp.array(dtype=wp.vec3)
+    # of an active row with a rigid body, the next one of the same particle, -1: none
+    next: wp.array(dtype=int)
+    mate: wp.array(dtype=int)  # the row of the body on the particle's other side, -1: none; see `link_supports`
     # where all are solved at once: whether it has a share of the masses, and what its multipliers last changed by
     sharing: wp.array(dtype=int)
     push_change: wp.array(dtype=float)
@@ -131,32 +126,6 @@ def corners_weight(particles: Particles, first: int, rows: Rows, r: int, at_once
 
 
 @wp.func
-def push_step(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, gap: float,
-              compliance: float, at_once: int):  # fmt: skip
-    """By how much a row's multiplier is to grow so that its gap closes, as far as shapes let its particles go."""
-    n = rows.normal[r]
-    corners = rows.corners[r]
-    weights = rows.weights[r]
-    rigid_part = body_weight(particles, rigid, start, rows, r, n, at_once)
-    total = corners_weight(particles, first, rows, r, at_once) + rigid_part
-    step = -gap / (total + compliance)
-    if is_bounded(particles, first, corners):
-        # which particles end on a surface depends on the step, and the step on them
-        passes = int(2)
-        for _again in range(passes):
-            total = 1.0e-9 + rigid_part
-            left = float(gap)
-            for k in range(4):
-                if corners[k] >= 0:
-                    i = first + corners[k]
-                    share, besides = give_along(particles, i, n, step * weights[k] * particles.w[i])
-                    total += weights[k] * weights[k] * corner_weight(particles, i, at_once) * share
-                    left += weights[k] * besides
-            step = -left / (total + compliance)
-    return step
-
-
-@wp.func
 def row_weight(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, n: wp.vec3,
                at_once: int):  # fmt: skip
     """Return how far a row gives way along n for a unit of its multiplier."""
@@ -194,109 +163,6 @@ def apply_row(particles: Particles, rigid: RigidState, first: int, start: int, r
         else:
             shift_whole(rigid, i, rigid.weight[i] * -impulse)
             turn_whole(rigid, i, rigid.give[i] * wp.cross(arm, -impulse))
-
-
-@wp.func
-def join_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int):
-    """Give a row that is pressed its share of the masses, from the next pass on; returns how far it is pressed [m]."""
-    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), rows.normal[r]) - rows.distance[r]
-    if gap < 0.0:
-        rows.sharing[r] = 1
-        corners = rows.corners[r]
-        for k in range(4):
-            if corners[k] >= 0:
-                wp.atomic_add(particles.joining, first + corners[k], 1)
-        if rows.slot[r] >= 0:
-            wp.atomic_add(particles.body_joining, start + rows.slot[r], 1)
-    return wp.max(-gap, 0.0)
-
-
-@wp.func
-def push_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, at_once: int):
-    """One projection of a row along its normal; returns how far it was from where it asks to be [m]."""
-    n = rows.normal[r]
-    push = rows.push[r]
-    compliance = float(rows.compliance[r])
-    pressed = float(compliance * push)
-    if pressed > rows.squeeze[r]:
-        pressed = rows.squeeze[r]
-        compliance = 0.0
-    gap = wp.dot(row_gap(particles, rigid, first, start, rows, r), n) - rows.distance[r] + pressed
-    wrong = wp.max(-gap, 0.0)
-    if gap < 0.0 or push > 0.0:
-        step = push_step(particles, rigid, first, start, rows, r, gap, compliance, at_once)
-        if at_once != 0 and step * rows.push_change[r] > 0.0:
-            step = step + MOMENTUM * rows.push_change[r]
-        more = wp.max(push + step, 0.0)
-        rows.push[r] = more
-        rows.push_change[r] = more - push
-        apply_row(particles, rigid, first, start, rows, r, n * (more - push), at_once)
-        if at_once == 0:
-            bound_corners(particles, first, rows.corners[r], 0)
-        if push > 0.0:
-            wrong = wp.abs(gap)
-    return wrong
-
-
-@wp.func
-def drag_between(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, c: int,
-                 slip: wp.vec3, most: float, at_once: int):  # fmt: skip
-    """`drag_row` of a particle that a rigid body presses on a shape, its contact c; see `rub_between`."""
-    i = first + rows.corners[r][0]
-    n = rows.normal[r]
-    old = rows.drag[r]
-    before = particles.shape_drag[c]
-    w = corner_weight(particles, i, at_once)
-    own = particles.u[i] - n * wp.dot(particles.u[i], n)
-    motion = particles.shape_motion[c]
-    motion = motion - n * wp.dot(motion, n)
-    body_w = body_weight(particles, rigid, start, rows, r, wp.normalize(slip + n * 1.0e-12), at_once)
-    free = own - old * w - before
-    body_free = own - slip + old * body_w
-    most_shape = particles.shape_friction[c] * particles.shape_push[c]
-    drag, multiplier = rub_between(free, w, motion, most_shape, body_free, body_w, most)
-    rows.drag[r] = multiplier
-    rows.drag_change[r] = multiplier - old
-    apply_row(particles, rigid, first, start, rows, r, multiplier - old, at_once)
-    if at_once == 0:
-        particles.shape_drag[c] = drag
-        particles.u[i] = particles.u[i] + (drag - before)
-        bound(particles, i, 1)
-    return wp.length(drag - before) + wp.length(multiplier - old) * w
-
-
-@wp.func
-def drag_row(particles: Particles, rigid: RigidState, first: int, start: int, rows: Rows, r: int, at_once: int):
-    """Take back a row's slip, with up to mu times what its push has come to; returns what was left to take [m]."""
-    most = rows.friction[r] * rows.push[r]
-    old = rows.drag[r]
-    if most <= 0.0 and wp.length_sq(old) == 0.0:
-        return float(0.0)
-    slip = row_slip(particles, rigid, first, start, rows, r)
-    n = rows.normal[r]
-    slip = slip - n * wp.dot(slip, n)
-    length = wp.length(slip)
-    if rows.slot[r] >= 0 and rows.corners[r][1] < 0:
-        c = is_between(particles, first + rows.corners[r][0], n)
-        if c >= 0:
-            return drag_between(particles, rigid, first, start, rows, r, c, slip, most, at_once)
-    drag = old
-    if length > 1.0e-12:
-        step = -slip / row_weight(particles, rigid, first, start, rows, r, slip / length, at_once)
-        if at_once != 0 and wp.dot(step, rows.drag_change[r]) > 0.0:
-            step = step + MOMENTUM * rows.drag_change[r]
-        drag = old + step
-    size = wp.length(drag)
-    left = length
-    if size > most:
-        drag = drag * (most / size)
-        left = 0.0
-    rows.drag[r] = drag
-    rows.drag_change[r] = drag - old
-    apply_row(particles, rigid, first, start, rows, r, drag - old, at_once)
-    if at_once == 0:
-        bound_corners(particles, first, rows.corners[r], 1)
-    return left
 
 
 @wp.func

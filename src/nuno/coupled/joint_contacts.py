@@ -1,15 +1,16 @@
-"""Contacts of rigid bodies within the passes over joints.
+"""Contacts of rigid bodies within the passes over joints, and over cloth that lies between rigid bodies.
 
 What a heavy body presses on a light one that is joined, the joint has to bear: solved one after the other, once each
 substep, the light one would give way to the contact and come back by the joint, and nothing on it would rest. So where
 an island has joints its manifolds are gone through in every pass, before the joints. Their forces add up over the
-passes and last from substep to substep, as those of all manifolds do.
+passes and last from substep to substep, as those of all manifolds do. The same holds where a plate on a table bears
+others on napkins: it would give way to them in each substep, and the pile would tremble.
 """
 
 import warp as wp
 
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.pass_progress import Passing, goes_on, island_of, note_wrong
+from nuno.coupled.pass_progress import Passing, goes_on, is_linked, island_of, note_wrong
 from nuno.numbers.crew import barrier
 from nuno.rigid.convex import Parts
 from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, POINTS, Contacts
@@ -38,15 +39,15 @@ def press_entry(rigid: RigidState, parts: Parts, c: Contacts, world: int, e: int
 
 
 @wp.func
-def island_with_joints(joints: Joints, passing: Passing, world: int, a: int, b: int):
-    """The body among the coupled ones by which a manifold of two slots is gone through with the joints, or -1.
+def island_with_passes(joints: Joints, passing: Passing, world: int, a: int, b: int):
+    """The body among the coupled ones by which a manifold of two slots is gone through in every pass, or -1.
 
-    None is where no joint is in the island, nor between two bodies that are joined to each other: that may contradict
-    the joint, and pass after pass both would grow.
+    None is where neither a joint nor cloth between rigid bodies is in the island, nor between two bodies that are
+    joined to each other: that may contradict the joint, and pass after pass both would grow.
     """
     body = wp.max(passing.body_of[a], passing.body_of[b])
     if body >= 0:
-        if passing.jointed[world * passing.bodies + body] == 0:
+        if passing.jointed[world * passing.bodies + body] == 0 and is_linked(passing, world, body) == 0:
             body = -1
     for k in range(joints.count):
         if wp.min(joints.slot[k], joints.other[k]) == wp.min(a, b):
@@ -58,9 +59,9 @@ def island_with_joints(joints: Joints, passing: Passing, world: int, a: int, b: 
 @wp.func
 def press_entries(
     rigid: RigidState, parts: Parts, c: Contacts, joints: Joints, passing: Passing, world: int, dt: float, k_pass: int,
-    rank: int, size: int,
+    rowed: bool, rank: int, size: int,
 ):  # fmt: skip
-    """Take one pass over the manifolds of islands with joints; returns how far that moved anything [m].
+    """Take one pass over the manifolds of such islands; returns how far that moved anything [m].
 
     Not in the first pass: forces are those that the last substep ended with, and joints bear none yet. With joints
     first, what rests is where it should be after one pass.
@@ -72,7 +73,7 @@ def press_entries(
             e = c.order[base + k]
             a = parts.slot[(e - base) / c.row]
             b = parts.slot[c.partner[e]]
-            body = island_with_joints(joints, passing, world, a, b)
+            body = island_with_passes(joints, passing, world, a, b)
             if body >= 0:
                 island = island_of(passing, world, body)
                 if goes_on(passing, island):
@@ -81,8 +82,10 @@ def press_entries(
                     off = float(1.0)
                     if k_pass > 0:
                         off = press_entry(rigid, parts, c, world, e, i, j, dt)
-                    note_wrong(passing, island, off, size)
-                    wrong = wp.max(wrong, off)
+                    # once rows are left as they are, only joints are gone on for
+                    if rowed or passing.jointed[world * passing.bodies + body] != 0:
+                        note_wrong(passing, island, off, size)
+                        wrong = wp.max(wrong, off)
         barrier(size)
     return wrong
 
@@ -100,6 +103,6 @@ def press_others(
             a = parts.slot[(e - base) / c.row]
             b = parts.slot[c.partner[e]]
             held = rigid.weight[world * rigid.capacity + a] < 0.0 or rigid.weight[world * rigid.capacity + b] < 0.0
-            if held or island_with_joints(joints, passing, world, a, b) < 0:
+            if held or island_with_passes(joints, passing, world, a, b) < 0:
                 part_entry(rigid, parts, c, world, e, dt)
         barrier(size)

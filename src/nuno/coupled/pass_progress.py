@@ -19,6 +19,7 @@ class Passing:
     many: int  # whether any world has more than one island
     island: wp.array(dtype=int)
     jointed: wp.array(dtype=int)  # (worlds * bodies), whether the body's island has a joint
+    linked: wp.array(dtype=int)  # (worlds * bodies), of an island's first, whether particles lie between rigid bodies
     body_of: wp.array(dtype=int)  # (rigid slots), which of the bodies it is, -1: none
     wrong: wp.array(dtype=float)  # the farthest from where it should be, of this pass [m]
     done: wp.array(dtype=int)
@@ -31,6 +32,13 @@ def island_of(passing: Passing, world: int, body: int):
     if passing.many != 0:
         k = world * passing.bodies + passing.island[world * passing.bodies + body]
     return k
+
+
+@wp.func
+def is_linked(passing: Passing, world: int, body: int):
+    """Return whether particles of a body's island lie between rigid bodies."""
+    of = world * passing.bodies
+    return passing.linked[of + passing.island[of + body]]
 
 
 @wp.func

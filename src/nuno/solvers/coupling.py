@@ -16,6 +16,7 @@ from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_conta
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees
 from nuno.coupled.pass_progress import Passing
+from nuno.coupled.rigid_supports import held_slots
 from nuno.coupled.shape_bounds import Surroundings, bound_particles
 from nuno.coupled.tie_constraints import Holds, Ties
 from nuno.plans.recorded_launches import RecordedLaunches
@@ -90,7 +91,7 @@ class Coupling(CouplingResults):
         self._bodies = int(elements.bodies)
         self._island = np.zeros((0, 0), dtype=int)
         self._passing = Passing()
-        for name, kind in (("wrong", float), ("done", int)):
+        for name, kind in (("wrong", float), ("done", int), ("linked", int)):
             setattr(self._passing, name, wp.zeros(self.world_count * self._bodies, dtype=kind, device=self.device))
         numbers = np.full(max(1, int(self._state.capacity)), -1, dtype=np.int32)
         numbers[self._slots] = np.arange(len(self._solvers), self._bodies)
@@ -100,6 +101,7 @@ class Coupling(CouplingResults):
         self._firsts, total = [int(first) for first in firsts[:-1]], int(firsts[-1])
         self._layouts: list[Layout] = []
         self._particles = self._room(total)
+        self._particles.held = wp.array(held_slots(numbers.size, holds, joints), dtype=int, device=self.device)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
         self._cells = np.full(self._bodies, np.inf)
         self._cells[: len(self._solvers)] = [solver._cell_size for solver in self._solvers]
@@ -122,7 +124,7 @@ class Coupling(CouplingResults):
             return wp.zeros(max(1, count), dtype=dtype, device=self.device)
 
         made.p, made.u, made.w = (zeros(worlds * total, kind) for kind in (wp.vec3, wp.vec3, float))
-        made.pressed, made.bounded = zeros(worlds * total, int), zeros(worlds * total, int)
+        made.pressed, made.bounded, made.first_row = (zeros(worlds * total, int) for _ in range(3))
         made.bounded_count = zeros(worlds, int)
         made.shape = wp.full(max(1, MOST * worlds * total), -1, dtype=int, device=self.device)
         for name in ("normal", "motion", "drag"):
@@ -146,8 +148,8 @@ class Coupling(CouplingResults):
         kinds = {
             "corners": wp.vec4i, "kind": int, "slot": int, "part": int, "bodies": wp.vec2i, "point": wp.vec3,
             "weights": wp.vec4, "normal": wp.vec3, "distance": float, "friction": float, "compliance": float,
-            "squeeze": float, "push": float, "drag": wp.vec3, "sharing": int, "push_change": float,
-            "drag_change": wp.vec3, "active": int,
+            "squeeze": float, "push": float, "drag": wp.vec3, "next": int, "mate": int, "sharing": int,
+            "push_change": float, "drag_change": wp.vec3, "active": int,
         }  # fmt: skip
         for name, dtype in kinds.items():
             setattr(rows, name, wp.zeros(worlds * room, dtype=dtype, device=self.device))
@@ -239,10 +241,10 @@ class Coupling(CouplingResults):
             if self._rigid is not None:
                 self._rigid.predict()
             self._touch(k, dt, (k + 1) / substeps)
-            if self.joints.count:
-                wp.launch(
-                    end_contacts, dim=self.world_count * self._threads, device=self.device, block_dim=BLOCK_THREADS,
-                    inputs=[self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads],
+            if self.joints.count or not (self._at_once or self._rigid is None):
+                self._go(
+                    end_contacts, self.world_count * self._threads, self._state, *self._manifolds(), self.joints,
+                    self._passing, dt, self._threads,
                 )  # fmt: skip
             elif self._rigid is not None:
                 self._rigid.contacts()
@@ -333,6 +335,8 @@ class Coupling(CouplingResults):
                     solver.sums.add_bounds(layout, particles)
             for body, layout in enumerate(self._layouts):
                 self._go(scatter, (worlds, layout.particles), layout, particles, self._start, body=body)
+        else:
+            self._passing.linked.zero_()
 
     def _manifolds(self) -> tuple[Parts, Contacts]:
         """The rigid bodies' contacts with each other, which may be in new arrays since the last substep."""
