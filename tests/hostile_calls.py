@@ -27,6 +27,7 @@ MORE = {
     ("JointTrajectory.of", "names"): TEXTS,
     ("ServoCommand", "names"): TEXTS,
     ("RobotServer", "origins"): {"texts"},
+    ("take_picture", "without"): {"no rows"},  # none of them
     ("RobotInterface.angle_vector", "velocities"): {"no items"},  # as None
     ("World.reset", "worlds"): {"no items"},  # none of them
 }

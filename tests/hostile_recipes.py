@@ -324,7 +324,7 @@ CALLS = {
     "World.state": {"body": "towel"}, "World.step": {}, "World.stop": {}, "World.sum_impulses": {"body": "towel"},
     "World.trace": {"body": "towel", "times": [0.1]},
     "World.weld": {"a": "towel", "b": "brick", "where": [1], "compliance": 1e-3},
-    "Cloth.same_as": {"other": None}, "HandTrack.path": {"held": [True]}, "StereoTrack.path": {"held": [True]},
+    "HandTrack.path": {"held": [True]}, "StereoTrack.path": {"held": [True]},
     "Minimum.near": {"excess": 0.1}, "Names.full": {"name": "a"}, "Picture.save": {"path": "out.png"},
     "TaughtFold.from_hands": {
         "world": lambda s: s.world, "cloth": lambda s: s.still, "hands": lambda s: [s.hand], "material": nuno.Cloth(),
