@@ -42,9 +42,10 @@ nitpick_ignore_regex = [
     ("py:.*", r"(np|numpy|warp|collections|concurrent|contextlib|os|pathlib|matplotlib|trimesh|PIL|pinocchio)\..*"),
     ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
     ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
+    ("py:class", r"DeviceArray"),  # Warp's arrays, under a name for type checkers
     # What a result holds for other functions to take
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
-    ("py:class", r"(.*\.)?(Scene|SoftTopology)"),
+    ("py:class", r"(.*\.)?(GripSpec|ImageReading|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Directives for the gallery: ``{example-cards}`` and ``{example} NAME``, from examples/ and docs/images/examples.
+"""Directives of the gallery: ``{example-cards}``, ``{example} NAME`` and ``{notebook} NAME``.
 
 A picture that is not there is left out, so that an example can be written before its picture.
 """
@@ -6,10 +6,12 @@ A picture that is not there is left out, so that an example can be written befor
 from __future__ import annotations
 
 import ast
+import json
 from pathlib import Path
 from typing import Any, ClassVar
 
 from docutils import nodes
+from make_pictures import PICTURES
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
@@ -25,8 +27,8 @@ def summary(name: str) -> str:
 
 def picture(name: str) -> str | None:
     """Return the path of an example's picture as a page at the top of docs/ writes it, or None."""
-    path = f"images/examples/{name}.png"
-    return path if (DOCS / path).exists() else None
+    path = f"images/{next(iter(PICTURES[name][0][1]))}" if name in PICTURES else ""
+    return path if path and (DOCS / path).exists() else None
 
 
 class ExampleCards(SphinxDirective):
@@ -65,8 +67,27 @@ class Example(SphinxDirective):
         return self.parse_text_to_nodes("\n".join(lines))
 
 
+class Notebook(SphinxDirective):
+    """The first paragraph of a notebook, and its cells folded away."""
+
+    required_arguments = 1
+    option_spec: ClassVar[dict[str, Any]] = {}
+
+    def run(self) -> list[nodes.Node]:
+        """Return a paragraph and a dropdown."""
+        path = EXAMPLES / "notebooks" / f"{self.arguments[0]}.ipynb"
+        first, *cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        lines = ["".join(first["source"]).partition("\n\n")[2], ""]
+        lines.append(f"::::{{dropdown}} examples/notebooks/{path.name}")
+        for cell in cells:
+            text = "".join(cell["source"])
+            lines += [text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```", ""]
+        return self.parse_text_to_nodes("\n".join([*lines, "::::"]))
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the directives."""
     app.add_directive("example-cards", ExampleCards)
     app.add_directive("example", Example)
+    app.add_directive("notebook", Notebook)
     return {"parallel_read_safe": True}

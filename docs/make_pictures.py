@@ -19,15 +19,30 @@ from PIL import Image
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
-# By example: what it is asked for beside --out, and its files by the picture's name.
-PICTURES = {
-    "all_kinds": (["--film"], {"kinds.png": "all_kinds.png", "film.webp": "all_kinds.webp"}),
-    "closed_loop": ([], {"closed-loop.png": "closed_loop.png"}),
-    "pick_estimate": ([], {"pick.png": "result.png"}),
-    "replay_fold": ([], {"fold.png": "strip.png", "layers.png": "layers.png", "hands.png": "hands.png"}),
-    "talos_fold": ([], {"talos-fold.png": "talos-fold.png", "talos-fold-layers.png": "talos-fold-layers.png"}),
-    "talos_walk": ([], {"walk.png": "talos_walk.png"}),
-}
+LARGE = 120_000  # bytes of a PNG
+# By example, for each run: what it is asked for beside --out, and its files by the picture's name.
+PICTURES: dict[str, list[tuple[list[str], dict[str, str]]]] = {
+    "all_kinds": [(["--film"], {"kinds.png": "all_kinds.png", "film.webp": "all_kinds.webp"})],
+    "carry_mat": [
+        (["--all"], {"carry-best.webp": "best.png", "carry-failed.webp": "failed.png", "carry-plot.png": "plot.png"})
+    ],
+    "closed_loop": [
+        ([], {"closed-loop.webp": "closed_loop.png"}),
+        (["--point", "2", "2"], {"closed-loop-inside.webp": "closed_loop.png"}),
+    ],
+    "learn_fold": [([], {"learn_fold.png": "learn_fold.png"})],
+    "pick_estimate": [([], {"pick.webp": "result.png"})],
+    "replay_fold": [([], {"fold.webp": "strip.png", "layers.png": "layers.png", "hands.png": "hands.png"})],
+    "talos_fold": [([], {"talos-fold.png": "talos-fold.png", "talos-fold-layers.png": "talos-fold-layers.png"})],
+    "talos_walk": [([], {"walk.png": "talos_walk.png"})],
+    "viewer_page": [([], {"viewer.webp": "viewer_page.png"})],
+} | {
+    name: [([], {f"examples/{name}.webp": f"{name}.png"})]  # for the gallery alone
+    for name in (
+        "box_on_towel", "drop_on_table", "fit_material", "fold_towel", "hang_cloth", "imagine_futures",
+        "lift_soft_cube", "save_and_restore", "show_world", "soft_cube", "sweep_towel", "talos_reach",
+    )
+}  # fmt: skip
 
 
 def difference(picture: Path, other: Path) -> float:
@@ -53,11 +68,30 @@ def main() -> None:
     if unknown := set(names) - set(PICTURES):
         parser.error(f"no pictures are made of {sorted(unknown)[0]}; of these are: {', '.join(PICTURES)}")
     for name in names:
-        more, files = PICTURES[name]
-        with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([sys.executable, str(ROOT / f"examples/{name}.py"), "--out", folder, *more], check=True)
-            for picture, file in files.items():
-                shutil.copyfile(Path(folder) / file, IMAGES / picture)
+        for more, files in PICTURES[name]:
+            with tempfile.TemporaryDirectory() as folder:
+                subprocess.run([sys.executable, str(script(name)), "--out", folder, *more], check=True)
+                for picture, file in files.items():
+                    keep(Path(folder) / file, IMAGES / picture)
+
+
+def script(name: str) -> Path:
+    """Return the program that draws: an example, or the one that takes pictures of the viewer's page in Chromium."""
+    return ROOT / ("tests/viewer" if name == "viewer_page" else "examples") / f"{name}.py"
+
+
+def keep(drawn: Path, picture: Path) -> None:
+    """Put what an example drew into docs/images, packed: a large PNG in 256 colours, other formats by quality 85."""
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    if drawn.suffix == ".webp":  # a film
+        shutil.copyfile(drawn, picture)
+    elif picture.suffix == ".png":
+        image = Image.open(drawn).convert("RGB")
+        image.save(picture, optimize=True)
+        if picture.stat().st_size > LARGE:
+            image.quantize(256, dither=Image.Dither.NONE).save(picture, optimize=True)
+    else:
+        Image.open(drawn).convert("RGB").save(picture, quality=85, method=6)
 
 
 if __name__ == "__main__":

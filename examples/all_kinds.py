@@ -36,7 +36,7 @@ camera, film = look_at_camera((0.0, -1.5, 0.85), (0.18, 0.0, 0.19), 640, 360, 73
 
 def look(scale=1.5, samples=3):
     """Return a picture of the room."""
-    return nuno.take_picture(world, camera.scaled(scale), lamp=LAMP, background="white", samples=samples)
+    return nuno.take_picture(world, camera.scaled(scale), lamp=LAMP, background="#d3dde6", samples=samples)
 
 
 def run(seconds):

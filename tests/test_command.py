@@ -279,6 +279,6 @@ def test_in_a_process_of_its_own_without_a_traceback(tmp_path):
     """The statuses reach the shell."""
     nothing, out = str(tmp_path / "nothing"), str(tmp_path / "out")
     command = [sys.executable, "-m", "nuno", "pick", nothing, "--out", out]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
     assert done.returncode == 2 and done.stdout == ""
     assert "InvalidInputError" in done.stderr and "Traceback" not in done.stderr

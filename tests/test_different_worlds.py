@@ -66,6 +66,12 @@ def check(seeds, device):
     return happened
 
 
+def test_a_few_worlds_of_a_batch_that_differ():
+    """Of the same, so many as take seconds."""
+    assert "run" in check(SHORT[:1], "cpu")
+
+
+@pytest.mark.long
 def test_worlds_of_a_batch_that_differ():
     """Other places, velocities, pushes, paths, grips and friction in each world: each is what it is alone."""
     happened = check(SHORT, "cpu")

@@ -135,6 +135,8 @@ def test_every_example_is_in_the_gallery():
     assert sorted(cards.split()) == programs
     assert sorted(re.findall(r"^```{example} (\w+)$", page, re.M)) == programs
     assert sorted(re.findall(r"^\((\w+)\)=$", page, re.M)) == programs  # where the cards lead
+    notebooks = sorted(p.stem for p in (ROOT / "examples" / "notebooks").glob("*.ipynb"))
+    assert sorted(re.findall(r"^```{notebook} (\w+)$", page, re.M)) == notebooks
 
 
 def test_the_first_program_runs(tmp_path):

@@ -69,7 +69,7 @@ COMMANDS = sorted(
 def test_a_command_is_known(command):
     """What a page tells to type is a command, and its --help has the options that are typed."""
     words = command.split()
-    done = subprocess.run([sys.executable, "-m", *words[:2], "--help"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-m", *words[:2], "--help"], capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     for option in (word.partition("=")[0] for word in words if word.startswith("--")):
         assert option in done.stdout, f"{command}: {option}"

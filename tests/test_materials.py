@@ -109,5 +109,9 @@ def test_soft_and_rigid_resolve():
     rigid = Rigid(mass=[1.0, 2.0])
     assert rigid.resolved(2)["restitution"].shape == rigid.resolved(2)["air_drag"].shape == (2, 1)
     assert rigid.of_world(1, 2).mass == 2.0 and rigid.inertia is None
+    tensor, centre = np.diag([1.0, 1.0, 2.0]), (0.1, 0.0, 0.2)
+    one = Rigid(mass=[1.0, 2.0, 3.0], inertia=tensor, centre_of_mass=centre).of_world(1, 3)
+    np.testing.assert_array_equal(one.inertia, tensor)
+    np.testing.assert_array_equal(one.centre_of_mass, centre)
     assert Rigid(inertia=np.diag([1.0, 1.0, 2.0])).same_as(Rigid(inertia=np.diag([1.0, 1.0, 2.0])))
     assert not Rigid().same_as(Soft())

@@ -30,6 +30,7 @@ from nuno.errors import (
     ConnectionLostError,
     EstimationError,
     FileFormatError,
+    FileWriteError,
     ImageError,
     InvalidInputError,
     MeshError,
@@ -71,6 +72,7 @@ from nuno.world.world import World
 if TYPE_CHECKING:
     from nuno.bodies.element_state import ElementState, elements
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
+    from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
@@ -87,6 +89,7 @@ if TYPE_CHECKING:
     from nuno.mesh.fitted import fitted_tetrahedra
     from nuno.mesh.lattice import lattice_tetrahedra
     from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra
+    from nuno.robot.describe_robot import describe_robot
     from nuno.robot.footsteps import Footstep
     from nuno.robot.goal import Goal, Tolerances
     from nuno.robot.hands import Hand
@@ -95,6 +98,8 @@ if TYPE_CHECKING:
     from nuno.robot.interface import RobotInterface
     from nuno.robot.links import Links
     from nuno.robot.reach import Reach
+    from nuno.robot.ros1.ros1_driver import Ros1Driver
+    from nuno.robot.ros2.ros2_server import Ros2Server
     from nuno.robot.sensor_model import SensorModel
     from nuno.robot.sensors import Readings, Sensors
     from nuno.robot.servo import ServoCommand
@@ -108,6 +113,7 @@ if TYPE_CHECKING:
     from nuno.robot.wire.names import Names
     from nuno.robot.wire.server import RobotServer
     from nuno.search.minimise import Minimum, minimise
+    from nuno.search.planner import Plan, plan
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
@@ -148,6 +154,7 @@ __all__ = [
     "ElementState",
     "EstimationError",
     "FileFormatError",
+    "FileWriteError",
     "Film",
     "FoldCase",
     "FoldResult",
@@ -185,6 +192,7 @@ __all__ = [
     "PickCase",
     "PickResult",
     "Picture",
+    "Plan",
     "Plane",
     "PlayedFold",
     "Reach",
@@ -200,6 +208,8 @@ __all__ = [
     "RobotModelError",
     "RobotServer",
     "RobotTimeoutError",
+    "Ros1Driver",
+    "Ros2Server",
     "SensorModel",
     "Sensors",
     "ServoCommand",
@@ -247,6 +257,7 @@ __all__ = [
     "compound",
     "continue_walk",
     "cylinder",
+    "describe_robot",
     "draw",
     "each",
     "elements",
@@ -263,6 +274,7 @@ __all__ = [
     "locate_marker",
     "mesh",
     "minimise",
+    "plan",
     "plan_walk",
     "plan_walk_footsteps",
     "plan_walk_velocity",
@@ -272,6 +284,8 @@ __all__ = [
     "read_fold_case",
     "read_sweep",
     "replay_fold",
+    "segment_after",
+    "segment_before",
     "sheet",
     "similarity",
     "slider",
@@ -307,10 +321,13 @@ _LAZY = {
     "PickCase": "nuno.estimate.case",
     "PickResult": "nuno.estimate.pick_result",
     "Table": "nuno.camera.table",
+    "segment_after": "nuno.camera.segmentation",
+    "segment_before": "nuno.camera.segmentation",
     "estimate_pick": "nuno.estimate.pick",
     "read_case": "nuno.estimate.case",
     "similarity": "nuno.estimate.similarity",
     "Humanoid": "nuno.robot.humanoid",
+    "describe_robot": "nuno.robot.describe_robot",
     "Links": "nuno.robot.links",
     "Reach": "nuno.robot.reach",
     "Film": "nuno.viewer.film",
@@ -338,6 +355,8 @@ _LAZY = {
     "StereoPoints": "nuno.robot.stereo",
     "locate_marker": "nuno.robot.stereo",
     "RobotServer": "nuno.robot.wire.server",
+    "Ros1Driver": "nuno.robot.ros1.ros1_driver",
+    "Ros2Server": "nuno.robot.ros2.ros2_server",
     "WireRobot": "nuno.robot.wire.client",
     "SimulatedRobot": "nuno.robot.simulated_robot",
     "RobotInterface": "nuno.robot.interface",
@@ -351,6 +370,8 @@ _LAZY = {
     "each": "nuno.search.trial",
     "Trial": "nuno.search.trial",
     "minimise": "nuno.search.minimise",
+    "plan": "nuno.search.planner",
+    "Plan": "nuno.search.planner",
     "Minimum": "nuno.search.minimise",
     "Uniform": "nuno.search.sampler",
     "Footage": "nuno.estimate.footage",

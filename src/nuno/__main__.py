@@ -1,4 +1,4 @@
-"""The command line: ``python -m nuno pick CASE_DIR --out DIR``, ``fold`` likewise, ``serve talos`` and ``compile``."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compile``."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
 from nuno.estimate.lift_prior import SIDEWAYS
+
+if TYPE_CHECKING:
+    from nuno.robot.simulated_robot import SimulatedRobot
 
 ANSWERED, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -36,9 +40,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
     serve = commands.add_parser(
-        "serve", help="put a simulated robot on the wire, for clients of the rosbridge protocol"
+        "serve", help="put a simulated robot on the wire, for programs that speak to it as to a real one"
     )
     serve.add_argument("robot", nargs="?", default="talos", help="talos (default), g1, or the path of a URDF file")
+    graph = serve.add_mutually_exclusive_group()
+    graph.add_argument("--rosbridge", action="store_true", help="for clients of the rosbridge protocol (default)")
+    graph.add_argument("--ros1", action="store_true", help="in a ROS 1 graph too, by the system's rospy")
+    graph.add_argument("--ros2", action="store_true", help="in a ROS 2 graph, over CycloneDDS")
+    serve.add_argument("--domain", type=int, metavar="N", help="ROS 2's domain (default: ROS_DOMAIN_ID, else 0)")
+    serve.add_argument(
+        "--ros1-python", metavar="FILE", default="/usr/bin/python3", help="the Python with rospy (default %(default)s)"
+    )
     serve.add_argument("--host", default="127.0.0.1", help="address to listen at (default: this machine only)")
     serve.add_argument("--port", type=int, default=9090, help="0 takes a free one (default 9090)")
     serve.add_argument(
@@ -50,6 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--factor", type=float, default=1.0, help="simulated over real time (default 1; inf: at full speed)"
     )
     pace.add_argument("--stepped", action="store_true", help="let time pass only while a client waits for it")
+    describe = commands.add_parser(
+        "describe-robot", help="guess from a URDF the table of hands, feet, cameras and groups of a robot, to be edited"
+    )
+    describe.add_argument("urdf", metavar="URDF", help="the robot's file")
+    describe.add_argument("--srdf", metavar="FILE", help="pairs of links that may overlap, postures, groups")
+    describe.add_argument("--packages", nargs="+", metavar="DIR", help="folders that package:// is looked up in")
+    describe.add_argument("--name", help="what the robot is to be called (default: the file's name)")
+    describe.add_argument("--out", metavar="FILE", help="where the table goes (default: to the terminal)")
     ahead = commands.add_parser(
         "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
         description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
@@ -71,7 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
-        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile}
+        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
+                       "describe-robot": _describe_robot}  # fmt: skip
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
@@ -129,21 +150,54 @@ def _fold(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
+    from nuno.errors import ConnectionLostError, InvalidInputError
     from nuno.robot.humanoid import Humanoid
+    from nuno.robot.ros1.ros1_driver import Ros1Driver
     from nuno.robot.simulated_robot import SimulatedRobot
     from nuno.robot.wire.server import RobotServer
     from nuno.world.world import World
 
+    if (options.ros1 or options.ros2) and options.stepped:
+        raise InvalidInputError("--stepped needs clients of rosbridge, which ask for time; ROS takes --factor")
+    if options.domain is not None and not options.ros2:
+        raise InvalidInputError("--domain is of ROS 2: it needs --ros2")
     _start_warp()
     robot = SimulatedRobot(Humanoid(options.robot), World(device=options.device))
+    if options.ros2:
+        return _serve_ros2(robot, options)
     factor = None if options.stepped else options.factor
     origins = tuple(options.origins)
     with RobotServer(robot, options.host, options.port, real_time_factor=factor, origins=origins) as server:
         gc.freeze()  # else one message in many thousands waits until all that was loaded is looked through for garbage
-        sys.stdout.write(f"{robot.robot.name} at {server.url}; Ctrl-C ends it\n")
+        with Ros1Driver(server.url, options.ros1_python) if options.ros1 else nullcontext() as driver:
+            where = f"{server.url} and in the ROS 1 graph" if options.ros1 else server.url
+            sys.stdout.write(f"{robot.robot.name} at {where}; Ctrl-C ends it\n")
+            sys.stdout.flush()
+            while not server.join(1.0):
+                if driver is not None and not driver.alive:
+                    raise ConnectionLostError("the ROS 1 node has ended; its messages above say why")
+    return ANSWERED
+
+
+def _serve_ros2(robot: SimulatedRobot, options: argparse.Namespace) -> int:
+    from nuno.robot.ros2.ros2_server import Ros2Server
+
+    with Ros2Server(robot, options.domain, real_time_factor=options.factor) as server:
+        gc.freeze()
+        sys.stdout.write(f"{robot.robot.name} in the ROS 2 domain {server.domain}; Ctrl-C ends it\n")
         sys.stdout.flush()
         while not server.join(1.0):
             pass
+    return ANSWERED
+
+
+def _describe_robot(options: argparse.Namespace) -> int:
+    from nuno.robot.describe_robot import describe_robot
+
+    text = describe_robot(
+        options.urdf, options.out, srdf=options.srdf, package_dirs=options.packages, name=options.name
+    )  # fmt: skip
+    sys.stdout.write(text if options.out is None else f"see {options.out}, and correct what says CHECK\n")
     return ANSWERED
 
 

@@ -66,6 +66,19 @@ class FileFormatError(NunoError, ValueError):
     """A file that Nuno cannot read: another format, a newer version, or damaged."""
 
 
+class FileWriteError(NunoError, OSError):
+    """A file that cannot be written: no such folder, a read-only one, a full disk; what was there is still whole.
+
+    Args:
+        message: What could not be written, and what helps.
+        number: The system's number of the error (``errno``), where it has one.
+    """
+
+    def __init__(self, message: str, number: int | None = None) -> None:
+        super().__init__(message)
+        self.errno = number
+
+
 class ImageError(InvalidInputError):
     """An image that cannot be read or does not fit its camera."""
 

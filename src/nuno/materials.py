@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import count, finite_array
+from nuno.validation import checked, count, finite_array, flag
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -35,6 +35,7 @@ class Material:
     PER_ELEMENT: ClassVar[tuple[str, ...]] = ()
     DIRECTED: ClassVar[tuple[str, ...]] = ()  # one value or (warp, weft)
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = ("friction", "damping", "air_drag")
+    OF_BODY: ClassVar[tuple[str, ...]] = ()  # vectors and tensors, the same in all worlds
     PRESETS: ClassVar[dict[str, dict[str, Any]]] = {}
 
     def __post_init__(self) -> None:
@@ -55,7 +56,7 @@ class Material:
         Raises:
             UnknownNameError: there is no such preset.
         """
-        if name not in cls.PRESETS:
+        if not isinstance(name, str) or name not in cls.PRESETS:
             raise UnknownNameError(f"{cls.__name__.lower()} preset", name, list(cls.PRESETS))
         return cls(**cls.PRESETS[name])
 
@@ -80,6 +81,7 @@ class Material:
                 result[f"{item.name}_{side}"] = _by_world(item.name, part, worlds, own)
         return result
 
+    @checked
     def of_world(self, world: int, world_count: int) -> Self:
         """Return the material of one world of a batch of ``world_count``."""
 
@@ -90,7 +92,9 @@ class Material:
                 return value[world]
             return value[0] if isinstance(value, np.ndarray) and value.ndim == 2 else value
 
-        return replace(self, **{item.name: pick(getattr(self, item.name)) for item in fields(self)})
+        return replace(
+            self, **{f.name: pick(getattr(self, f.name)) for f in fields(self) if f.name not in self.OF_BODY}
+        )
 
     def same_as(self, other: Any) -> bool:
         """Return True if another material is of the same kind and has exactly the same values."""
@@ -208,10 +212,10 @@ class Soft(Material):
     }
 
     def __post_init__(self) -> None:
-        if np.ndim(self.self_contact) or self.self_contact not in (False, True):
-            raise InvalidInputError(f"self_contact must be True or False, got {self.self_contact!r}")
+        touching = flag("self_contact", self.self_contact)
+        object.__setattr__(self, "self_contact", float(touching))  # a value as all others, while they are checked
         super().__post_init__()
-        object.__setattr__(self, "self_contact", bool(self.self_contact))
+        object.__setattr__(self, "self_contact", touching)
         if np.max(self.poisson_ratio) >= 0.5:
             raise InvalidInputError(f"poisson_ratio must be at least 0 and below 0.5, got {self.poisson_ratio!r}")
 
@@ -220,7 +224,7 @@ class Soft(Material):
 class Rigid(Material):
     """A rigid solid. Its mass is that of its volume at ``density``, or ``mass`` where it is given.
 
-    Every value but ``inertia`` may be an array (worlds,), one value a world.
+    Every value but ``inertia`` and ``centre_of_mass`` may be an array (worlds,), one value a world.
 
     Attributes:
         density: Mass per volume [kg/m3]; of a cloth or an open mesh, of its faces' area times its thickness.
@@ -230,6 +234,7 @@ class Rigid(Material):
         friction: Coulomb's coefficient, against other bodies by the geometric mean with theirs.
         restitution: Speed after a bounce over the speed before it, from 0 to 1.
         air_drag: Rate at which still air takes velocity and spin away [1/s].
+        centre_of_mass: (3,) [m] in the body's frame, or None for that of the volume.
 
     Raises:
         InvalidInputError: a value is not finite, negative, zero where it must be positive, a restitution above 1, or
@@ -242,8 +247,10 @@ class Rigid(Material):
     friction: Value = 0.5
     restitution: Value = 0.0
     air_drag: Value = 0.0
+    centre_of_mass: Any = None
 
     MAY_BE_ZERO = ("friction", "restitution", "air_drag")
+    OF_BODY = ("inertia", "centre_of_mass")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -251,12 +258,14 @@ class Rigid(Material):
             raise InvalidInputError(f"restitution must be at most 1, got {self.restitution!r}")
 
     def _checked(self, name: str, value: Any) -> Any:
-        if value is None and name in ("mass", "inertia"):
+        if value is None and name in ("mass", "inertia", "centre_of_mass"):
             return None
+        if name == "centre_of_mass":
+            return _checked_centre(value)
         return _checked_inertia(value) if name == "inertia" else super()._checked(name, value)
 
     def resolved(self, world_count: int, element_count: int = 1) -> dict[str, np.ndarray]:
-        """Return float32 arrays (worlds, 1); ``mass`` and ``inertia`` are left out."""
+        """Return float32 arrays (worlds, 1); ``mass``, ``inertia`` and ``centre_of_mass`` are left out."""
         worlds = count("world_count", world_count)
         if self.mass is not None:
             _by_world("mass", self.mass, worlds, None)
@@ -277,11 +286,20 @@ def _checked_inertia(value: Any) -> np.ndarray:
     return inertia
 
 
+def _checked_centre(value: Any) -> np.ndarray:
+    centre = finite_array("centre_of_mass", value, (3,))
+    centre.setflags(write=False)
+    return centre
+
+
 def _checked(name: str, value: Any, *, zero: bool, deepest: int) -> Any:
     valid = "finite and at least 0" if zero else "finite and greater than 0"
     try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        array = np.array(value)
+        if array.dtype.kind not in "iufO":
+            raise TypeError(f"{array.dtype} is no real number")
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(f"{name} must be {valid}, got {value!r}") from error
     if array.ndim > deepest or array.size == 0:
         raise InvalidInputError(f"{name} must be a number or an array of at most {deepest} axes, got {array.shape}")

@@ -5,13 +5,26 @@ Every check runs before any state changes, and its message says what was receive
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, UnknownNameError
 
 Shape = tuple[int | str, ...]
+Rule = tuple[str, Callable[[Any], bool]]  # what a value must be, in words, and whether it is
+Kind = TypeVar("Kind")
+P = ParamSpec("P")
+R = TypeVar("R")
+NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
+MAX_INDEX = 2**31 - 1
+"""A count beyond this fits no index of a kernel."""
 
 
 def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError) -> np.ndarray:
@@ -28,8 +41,8 @@ def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] =
     """
     try:
         array = np.array(value)
-        if array.dtype.kind in "SU":
-            raise ValueError("text is no number")
+        if array.dtype.kind not in "iufO":
+            raise ValueError(f"{array.dtype} is no real number")
         array = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as problem:
         raise error(f"{name} must be numbers of shape {_shape_text(shapes)}, got {_short(value)}") from problem
@@ -49,8 +62,8 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     """
     try:
         array = np.array(value)
-    except ValueError as problem:
-        raise error(f"{name} must be indices of shape {_shape_text(shapes)}, got {value!r}") from problem
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise error(f"{name} must be indices of shape {_shape_text(shapes)}, got {_short(value)}") from problem
     if array.dtype.kind not in "iu":
         raise error(f"{name} must be whole numbers of shape {_shape_text(shapes)}, got {array.dtype}")
     if not any(_fits(array.shape, shape) for shape in shapes):
@@ -58,6 +71,18 @@ def index_array(name: str, value: Any, *shapes: Shape, low: int, high: int,
     if array.min() < low or array.max() >= high:
         raise error(f"{name} must lie in [{low}, {high - 1}], got {array.min()} to {array.max()}")
     return array.astype(np.int32)
+
+
+def as_array(name: str, value: Any, error: type[Exception] = InvalidInputError) -> np.ndarray:
+    """Return ``value`` as an array, of whatever type and shape; a copy only where it is none yet.
+
+    Raises:
+        InvalidInputError: (or ``error``) rows of different lengths.
+    """
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise error(f"{name} must be an array, got {_short(value)}: {problem}") from problem
 
 
 def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.inf, high: float = np.inf) -> float:
@@ -70,7 +95,7 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     if high < np.inf:
         valid += f" and <= {high:g}"
     try:
-        if isinstance(value, str | bytes | bool):
+        if isinstance(value, NO_NUMBERS) or np.ndim(value):
             raise TypeError("no number")
         result = float(value)
     except (TypeError, ValueError, OverflowError) as problem:
@@ -81,19 +106,246 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     return result
 
 
-def count(name: str, value: Any, *, low: int = 1) -> int:
-    """Return ``value`` as an int of at least ``low``.
+def count(name: str, value: Any, *, low: int = 1, high: int = MAX_INDEX) -> int:
+    """Return ``value`` as an int of at least ``low`` and at most ``high``.
 
     Raises:
-        InvalidInputError: not a whole number, or too small.
+        InvalidInputError: not a whole number, too small or too large.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-        raise InvalidInputError(f"{name} must be a whole number of at least {low}, got {value!r}")
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < low or value > high:
+        valid = f"of at least {low}" if high == MAX_INDEX and not (whole and value > high) else f"from {low} to {high}"
+        raise InvalidInputError(f"{name} must be a whole number {valid}, got {_short(value)}")
     return int(value)
 
 
+def flag(name: str, value: Any) -> bool:
+    """Return ``value`` as a bool.
+
+    Raises:
+        InvalidInputError: neither True nor False.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInputError(f"{name} must be True or False, got {_short(value)}")
+    return bool(value)
+
+
+def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
+    """Return ``value``, of a class.
+
+    Raises:
+        InvalidInputError: of another class.
+    """
+    if not isinstance(value, kind):
+        raise InvalidInputError(f"{name} must be a {kind.__name__}, got {_short(value)}")
+    return value
+
+
+def function(name: str, value: Any) -> Any:
+    """Return ``value``, which can be called.
+
+    Raises:
+        InvalidInputError: it cannot.
+    """
+    if not callable(value):
+        raise InvalidInputError(f"{name} must be a function, got {_short(value)}")
+    return value
+
+
+def choice(name: str, value: Any, valid: Sequence[str]) -> str:
+    """Return ``value``, one of the valid names.
+
+    Raises:
+        UnknownNameError: it is none of them.
+    """
+    if not isinstance(value, str) or value not in valid:
+        raise UnknownNameError(name, value, list(valid))
+    return value
+
+
+def text(name: str, value: Any) -> str:
+    """Return ``value``, text that is not empty.
+
+    Raises:
+        InvalidInputError: no text, or none in it.
+    """
+    if not isinstance(value, str) or not value:
+        raise InvalidInputError(f"{name} must be text that is not empty, got {_short(value)}")
+    return value
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Check a public function's arguments by their annotations, before it begins.
+
+    It is told what a type alone can tell: a number that is finite, a Camera, a function, a path, True or False. Ranges
+    and shapes are the function's own to check. An annotation that says nothing of the kind (Any, an alias) lets all
+    pass.
+
+    Raises:
+        InvalidInputError: from the function that is returned, where an argument is of another type.
+    """
+    form = signature(function)
+    rules: dict[str, Rule] = {}
+
+    @wraps(function)
+    def run(*args: P.args, **kwargs: P.kwargs) -> R:
+        if not rules:  # at the first call, when all names of the module are there
+            known = getattr(function, "__globals__", {})
+            rules.update({name: _rule(str(each.annotation), known) for name, each in form.parameters.items()})
+        try:
+            given = form.bind(*args, **kwargs).arguments
+        except TypeError:
+            given = {}  # Python says what is missing or unknown
+        for name, value in given.items():
+            kind = form.parameters[name].kind
+            if kind not in (Parameter.VAR_KEYWORD, Parameter.VAR_POSITIONAL):
+                _check(name, value, rules[name])
+        return function(*args, **kwargs)
+
+    return run
+
+
+def check_fields(record: Any) -> None:
+    """Check the fields of a dataclass by their annotations, as ``checked`` checks arguments.
+
+    Raises:
+        InvalidInputError: one is of another type.
+    """
+    known = vars(sys.modules[type(record).__module__])
+    for field in fields(record):
+        if field.init:
+            _check(field.name, getattr(record, field.name), _rule(str(field.type), known))
+
+
+def _check(name: str, value: Any, rule: Rule) -> None:
+    said, passes = rule
+    if not passes(value):
+        raise InvalidInputError(f"{name} must be {said}, got {_short(value)}")
+
+
+def _rule(annotation: str, known: Mapping[str, Any]) -> Rule:
+    """Return what an annotation means in words, and whether a value is of its type.
+
+    Args:
+        annotation: As text.
+        known: Names of the module that it stands in; others are those of classes that only type checkers import.
+    """
+    parts = [_part_rule(part, known) for part in _split(annotation.strip("'\""), "|")]
+    said = list(dict.fromkeys(words for words, _ in parts))
+    passes = [each for _, each in parts]
+    text = " or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+    return text, lambda value: any(each(value) for each in passes)
+
+
+def _part_rule(part: str, known: Mapping[str, Any]) -> Rule:
+    word, _, inner = part.partition("[")
+    word, items = word.split(".")[-1], _split(inner.removesuffix("]"), ",") if inner else []
+    if word in SIMPLE:
+        return SIMPLE[word]
+    if word in ("Mapping", "dict"):
+        each = [_rule(item, known) for item in items]
+        values = f" of {each[1][0]}" if len(each) == 2 else ""
+        return (
+            f"a mapping{values}",
+            lambda value: (
+                isinstance(value, Mapping)
+                and (len(each) < 2 or all(each[0][1](k) and each[1][1](v) for k, v in value.items()))
+            ),
+        )
+    if word in ("Sequence", "Iterable", "tuple", "list"):
+        rules = [_rule(item, known) for item in items if item != "..."]
+        return _sequence_rule(rules, len(rules) if word == "tuple" and "..." not in items and rules else None, word)
+    found = known.get(word)
+    if isinstance(found, type):
+        return f"a {word}", lambda value: isinstance(value, found)
+    if word in known or not word[:1].isupper() or word in UNCHECKED:
+        return "anything", lambda value: True
+    return f"a {word}", lambda value: any(kind.__name__ == word for kind in type(value).__mro__)
+
+
+def _sequence_rule(rules: list[Rule], length: int | None, word: str) -> Rule:
+    words = f" of {rules[0][0]}" if rules and len({said for said, _ in rules}) == 1 else ""
+    number_of = f"{length} values" if length is not None else "a sequence"
+
+    def passes(value: Any) -> bool:
+        if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__") or isinstance(value, type):
+            return False
+        if not isinstance(value, Sequence | np.ndarray | set | frozenset):
+            return word == "Iterable"
+        if (isinstance(value, np.ndarray) and not value.ndim) or (length is not None and len(value) != length):
+            return False
+        if isinstance(value, np.ndarray) and words and not any(of in words for of in ("number", "anything", "True")):
+            return False
+        each = [rule for _, rule in rules]
+        return not each or all(each[k % len(each)](item) for k, item in enumerate(value))
+
+    return f"{number_of}{words}", passes
+
+
+def _split(text: str, mark: str) -> list[str]:
+    """Split an annotation at marks that are in no brackets."""
+    parts, depth = [""], 0
+    for letter in text:
+        depth += (letter in "[(") - (letter in ")]")
+        if letter == mark and not depth:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts if part.strip()]
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        number("it", value)
+    except InvalidInputError:
+        return False
+    return True
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and abs(int(value)) < 2**63
+
+
+def _is_array(value: Any) -> bool:
+    if type(value).__module__.partition(".")[0] == "warp":
+        return True
+    if isinstance(value, bool):
+        return False
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind == "O":
+            array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return array.dtype.kind in "biu" or (array.dtype.kind == "f" and bool(np.isfinite(array).all()))
+
+
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | os.PathLike) and "\0" not in str(value) and str(value) not in ("", ".")
+
+
+SIMPLE: dict[str, Rule] = {
+    "None": ("None", lambda value: value is None),
+    "float": ("a finite number", _is_number),
+    "int": ("a whole number", _is_whole),
+    "bool": ("True or False", lambda value: isinstance(value, bool | np.bool_)),
+    "str": ("text", lambda value: isinstance(value, str)),
+    "Literal": ("text", lambda value: isinstance(value, str)),
+    "Callable": ("a function", callable),
+    "ArrayLike": ("finite numbers", _is_array),
+    "ndarray": ("finite numbers", lambda value: _is_array(value) and np.size(value) > 0),
+    "PathLike": ("a path", _is_path),
+    "FileName": ("a path", _is_path),
+    "Any": ("anything", lambda value: True),
+}
+UNCHECKED = ("Self", "Unpack", "TypeVar")
+
+
 def _short(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception as problem:  # of somebody else's class; or an int of more digits than Python writes
+        return f"a {type(value).__name__} ({problem})"
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 

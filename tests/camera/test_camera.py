@@ -137,3 +137,32 @@ def test_pixels_above_the_horizon_do_not_back_project():
     level = Camera(64, 48, 50.0, 50.0, 31.5, 23.5, camera_to_world=_pose((0, 0, 1), (1, 0, 1)))
     with pytest.raises(InvalidInputError, match="plane"):
         level.back_project((31.5, 5.0), 0.0)
+
+
+@pytest.mark.parametrize("eye, target, up, top", [
+    ((0.3, -0.5, 1.2), (0.1, 0.0, 0.2), (0, 0, 1), (0, 0, 1)),
+    ((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (0, 0, 1), (0, 1, 0)),  # straight down: +y points up
+    ((0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0, 1, 0), (1, 0, 0)),  # up is the line of sight, and so is +y
+])  # fmt: skip
+def test_look_at(eye, target, up, top):
+    """The target is in the middle, what is above it is above it there, and the edges are half the angle away."""
+    camera = Camera.look_at(eye, target, np.radians(50.0), width=80, height=60, up=up)
+    np.testing.assert_allclose(camera.project(target), (39.5, 29.5), atol=1e-9)
+    across, down = camera.project(np.add(target, 0.01 * np.array(top))) - camera.project(target)
+    assert abs(across) < 1e-9 and down < 0.0
+    np.testing.assert_allclose(camera.camera_to_world[:3, 3], eye)
+    middle, edge = camera.rays([39.5, 29.5]), camera.rays([39.5, -0.5])  # the first row's upper edge
+    angle = np.arccos(middle @ edge / np.linalg.norm(middle) / np.linalg.norm(edge))
+    assert np.degrees(angle) == pytest.approx(25.0, abs=1e-9)
+
+
+def test_look_at_names_what_it_cannot_do():
+    """Degrees, a camera on its target, no direction, no pixels."""
+    with pytest.raises(InvalidInputError, match=r"np.radians\(45\)"):
+        Camera.look_at((0, 0, 1), (0, 0, 0), 45)
+    with pytest.raises(InvalidInputError, match="same point"):
+        Camera.look_at((0, 0, 1), (0, 0, 1), 0.7)
+    with pytest.raises(InvalidInputError, match="direction"):
+        Camera.look_at((0, 0, 1), (0, 0, 0), 0.7, up=(0, 0, 0))
+    with pytest.raises(InvalidInputError, match="width"):
+        Camera.look_at((0, 0, 1), (0, 0, 0), 0.7, width=0.5)

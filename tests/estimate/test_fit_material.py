@@ -109,6 +109,7 @@ def test_value_on_its_bound_is_named():
     assert any("bending_rigidity lies at its bound" in warning for warning in found.warnings)
 
 
+@pytest.mark.long
 def test_fold_case():
     """The bundled fold: a plausible material, that agrees with the video as well as the presets do."""
     case = nuno.read_fold_case(EXAMPLES / "fold-case")

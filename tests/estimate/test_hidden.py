@@ -51,6 +51,7 @@ def test_arm_is_no_cloth(case, arm):
     assert ((found ^ bare) & ~arm).sum() < 0.03 * bare.sum()
 
 
+@pytest.mark.long
 def test_answer_with_an_arm_in_the_image(case, arm):
     """The answer is that without an arm, and hidden pixels are ignored in the comparison."""
     quick = [Discretisation(cells=15, substeps=12, hypotheses=HYPOTHESES[1::2])]

@@ -84,14 +84,27 @@ def test_empty_masks_have_defined_scores():
     """Empty masks never give NaN: nothing against nothing agrees, nothing against something is far."""
     empty, full, blob = np.zeros((30, 40), bool), np.ones((30, 40), bool), np.zeros((30, 40), bool)
     blob[10:20, 10:30] = True
-    scores = similarity(np.stack([empty, blob, full]), empty, "all")
+    scores = score_masks(np.stack([empty, blob, full]), Silhouette(empty))
     np.testing.assert_array_equal(scores["eq1"], [1.0, 1.0 - 200 / 1200, 0.0])
     np.testing.assert_array_equal(scores["iou"], [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(scores["chamfer"], [0.0, 50.0, 0.0])  # the diagonal of 30 x 40
     np.testing.assert_array_equal(scores["centroid"], [[-1, -1], [19.5, 14.5], [19.5, 14.5]])
     assert similarity(empty, blob, "chamfer") == 50.0
-    everything_ignored = similarity(blob, blob, "all", ignore=full)
-    assert np.isfinite([*everything_ignored["centroid"], *(everything_ignored[s] for s in module.SCORES)]).all()
+    everything_ignored = score_masks(blob[None], Silhouette(blob, full))
+    assert np.isfinite(np.concatenate([np.ravel(value) for value in everything_ignored.values()])).all()
+
+
+def test_nothing_to_compare_with_is_refused():
+    """Two empty masks are no likeness, and probabilities no masks."""
+    blob, empty = np.eye(8, dtype=bool), np.zeros((8, 8), bool)
+    for masks, real, ignore in ((empty, empty, None), (blob, empty, None), (blob, blob, ~empty)):
+        with pytest.raises(InvalidInputError, match="real mask is empty"):
+            similarity(masks, real, ignore=ignore)
+    chances = np.full((8, 8), 0.1)
+    for masks, real, ignore in ((chances, blob, None), (blob, chances, None), (blob, blob, chances)):
+        with pytest.raises(InvalidInputError, match=r"threshold=0\.5"):
+            similarity(masks, real, ignore=ignore)
+    assert similarity(blob.astype(np.uint8) * 255, blob) == 1.0
 
 
 def test_region_counts_the_background_outside_exactly():
@@ -144,20 +157,42 @@ def test_cuda_repeats_its_bits_and_agrees_with_the_cpu():
 
 def test_bad_arguments_are_refused():
     """Shapes, kinds and names that do not fit are named."""
-    masks, real = np.zeros((2, 10, 12), bool), np.zeros((10, 12), bool)
+    masks, real = np.zeros((2, 10, 12), bool), np.ones((10, 12), bool)
     with pytest.raises(UnknownNameError, match="chamfer"):
         similarity(masks, real, "dice")
     with pytest.raises(InvalidInputError, match="12 x 10"):
-        similarity(np.zeros((2, 5, 6)), real)
+        similarity(np.zeros((2, 5, 6), bool), real)
     with pytest.raises(InvalidInputError, match="do not fit"):
         score_masks(masks, Silhouette(real), region=Region(1, 0, 12, 10))
     with pytest.raises(InvalidInputError, match="mask must be"):
-        similarity(masks, np.zeros((3, 10, 12)))
+        similarity(masks, np.zeros((3, 10, 12), bool))
     with pytest.raises(InvalidInputError, match="ignore mask has shape"):
-        similarity(masks, real, ignore=np.zeros((9, 12)))
+        similarity(masks, real, ignore=np.zeros((9, 12), bool))
     with pytest.raises(InvalidInputError, match="ignore"):
         similarity(masks, Silhouette(real), ignore=real)
     with pytest.raises(InvalidInputError, match="masks must be"):
-        similarity(np.zeros(12), real)
+        similarity(np.zeros(12, bool), real)
     with pytest.raises(InvalidInputError, match="bool or uint8"):
         similarity(wp.zeros((2, 10, 12), dtype=wp.int32, device="cpu"), real)
+
+
+@pytest.mark.parametrize("on_device", [False, True])
+def test_masks_of_real_numbers_are_refused_or_cut_at_a_threshold(on_device):
+    """Probabilities are no masks: without a threshold they are refused, with one they are what is above it."""
+    chances = np.random.default_rng(3).uniform(size=(2, HEIGHT, WIDTH)).astype(np.float32)
+    real = _blobs(1, 2)[0]
+    given = wp.array(chances, dtype=wp.float32, device="cpu") if on_device else chances
+    with pytest.raises(InvalidInputError, match=r"threshold=0\.5"):
+        similarity(given, real)
+    for level in (0.25, 0.75):
+        np.testing.assert_array_equal(similarity(given, real, threshold=level), similarity(chances > level, real))
+        assert similarity(given[0], real, threshold=level) == similarity(chances[0] > level, real)
+    with pytest.raises(InvalidInputError, match="real_mask"):
+        similarity(chances > 0.5, real.astype(float))
+    assert similarity(real, real.astype(float), threshold=0.5) == 1.0
+    with pytest.raises(InvalidInputError, match="whole numbers"):
+        similarity(chances > 0.5, real, threshold=0.5)
+    with pytest.raises(InvalidInputError, match="ignore"):
+        similarity(chances > 0.5, real, ignore=chances[0])
+    with pytest.raises(InvalidInputError, match="finite"):
+        similarity(np.full((4, 5), np.nan), np.ones((4, 5), bool), threshold=0.5)

@@ -6,7 +6,7 @@ import pytest
 import nuno
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate import pick, together
+from nuno.estimate import pick_trials, together
 from nuno.estimate.futures import imagine_picks, solver_of
 from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.together import alike, imagine_together
@@ -84,7 +84,7 @@ def test_an_estimate_is_the_same(monkeypatch):
     imagine = together.imagine_together
     monkeypatch.setattr(together, "imagine_together", lambda *a, **k: batches.append(imagine(*a, **k)) or batches[-1])
     for room in (False, True):
-        monkeypatch.setattr(pick, "has_room", lambda device, room=room: room)
+        monkeypatch.setattr(pick_trials, "has_room", lambda device, room=room: room)
         result = nuno.estimate_pick(
             None, None, camera=camera, table_height=TOP, table_half_extents=(0.6, 0.6), hand=HAND, before_mask=before,
             after_mask=after, candidates=(3, 2), discretisations=stages, sure=1.0, device="cpu",

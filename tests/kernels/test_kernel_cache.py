@@ -57,6 +57,7 @@ def test_devices_are_told_of_modules_that_there_are():
     assert all(module.blocks for module in kernel_modules() if "cuda" in module.devices)
 
 
+@pytest.mark.long
 def test_names_in_the_cache_do_not_depend_on_what_was_imported_when(tmp_path):
     """Two processes that import in other orders: a name of another hash would be compiled again."""
     told = """
@@ -70,6 +71,7 @@ print([each.module.get_module_identifier(block_dim=1) for each in kernel_modules
     assert run(tmp_path, "-c", late + told, PYTHONHASHSEED="2") == first
 
 
+@pytest.mark.long
 def test_cuda_is_compiled_for_without_a_device_and_once(tmp_path):
     """Machine code where Warp looks for it; a second time nothing in the folder changes."""
     command = ("-m", "nuno", "compile", "--arch", "sm_90", "--only", "nuno.state.finite", "nuno.camera.extent")

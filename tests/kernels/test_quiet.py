@@ -7,6 +7,7 @@ import sys
 import warp as wp
 
 from nuno.kernels import quiet
+from nuno.kernels.compile_watch import compiling_watched
 
 PROGRAM = """
 import nuno
@@ -23,6 +24,18 @@ def test_a_program_prints_its_own_lines_only():
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "done\n"
+
+
+def test_an_estimate_prints_nothing_either(monkeypatch):
+    """What it watches compiling with stands on the quiet logger, not on Warp's own."""
+    before = wp.get_logger()
+    try:
+        wp.set_logger(None)
+        monkeypatch.setattr(wp.config, "log_level", wp.LOG_INFO)
+        with compiling_watched():
+            assert isinstance(wp.get_logger().logger, quiet._Quiet)
+    finally:
+        wp.set_logger(before)
 
 
 def test_long_compiling_is_told_and_the_rest_is_not(monkeypatch, caplog):

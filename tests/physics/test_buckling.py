@@ -68,6 +68,7 @@ def test_greenhills_load_is_where_the_deflection_has_no_bound():
     assert leaning(GREENHILL + 1e-3) < 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["sheet", "right-angled", "equilateral"])
 def test_a_strip_stands_below_greenhills_load_and_falls_above(kind):
     """Closed form G = 7.8373, with rigidities 8 % above and below; 10 % is what Nuno promises of them."""

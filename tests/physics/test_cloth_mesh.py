@@ -56,6 +56,7 @@ def rigidities(kind, cells, across=2):
     return np.array(ratios)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_strip_of_any_triangles_has_its_nominal_rigidity_at_default_substeps(kind):
     """Elastica within 10 %, what Nuno promises for G from 1 to 30."""
@@ -74,6 +75,7 @@ def test_a_strip_of_any_width_has_its_nominal_rigidity_at_default_substeps(kind,
     np.testing.assert_allclose(rigidities(kind, cells, across), 1.0, atol=0.13 if rough else 0.10)
 
 
+@pytest.mark.long
 def test_an_irregular_mesh_hangs_like_a_sheet():
     """Invariance: a square hung by two corners has the same outline in irregular triangles as in a grid."""
     size, n = 0.4, 16

@@ -79,6 +79,7 @@ def hung(loads, *, kind, cells=24, across=1):
     return (1.0 - rows(body)[:, bottom, 2]).mean(axis=1)
 
 
+@pytest.mark.long
 def test_a_heart_loop_hangs_as_its_rigidity_says():
     """The loop's equation, solved above, for G = 10, 30 and 100, and nearer to it on the finer of two meshes."""
     loads = [10.0, 30.0, 100.0]

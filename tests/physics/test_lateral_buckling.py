@@ -97,6 +97,7 @@ def on_edge(loads, depth, *, force, duration=None, seconds=5.0, kind="sheet", ce
     return np.abs(rows(body)[:, tip, 1].mean(axis=1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["sheet", "right-angled"])
 def test_a_strip_on_edge_stands_below_the_load_and_falls_aside_above(kind):
     """Closed form, solved above for this depth, with rigidities 10 % above and below: what Nuno promises of them."""

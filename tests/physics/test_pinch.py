@@ -37,6 +37,7 @@ def slip(cloth, fingers, near):
     return cloth.vertices[near] - fingers[0].position
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("seconds", [2.0, pytest.param(10.0, marks=pytest.mark.slow)])
 def test_a_lifted_cloth_does_not_creep(seconds, device):
@@ -59,6 +60,7 @@ SIZES = {
 
 
 # on CUDA, where a frame of these takes 0.1 s, the test of forces below tells as much sooner
+@pytest.mark.long
 @pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=[pytest.mark.cuda, pytest.mark.slow])])
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize(("part", "holds"), [(0.95, True), (1.05, False)])

@@ -6,6 +6,7 @@ import pytest
 import nuno
 from nuno.errors import FileFormatError, InvalidInputError, MeshError, RobotModelError, UnknownNameError
 from nuno.robot.description import find_description
+from nuno.robot.pinocchio import pin
 
 URDF = """<robot name="stick">
   <link name="base">
@@ -71,7 +72,7 @@ def test_a_joint_that_turns_freely_has_no_limits(tmp_path):
 
 
 @pytest.mark.parametrize(("entry", "told"), [
-    ('frame.hand = { link = "arm" }', "has 'frame'; it may have urdf, srdf, posture, frames, feet, cameras, hands"),
+    ('frame.hand = { link = "arm" }', "has 'frame'; it may have urdf, srdf, posture, frames, feet, cameras, hands, g"),
     ('feet.foot = { link = "base" }', "the foot 'foot' of 'stick' needs the size of its sole"),
 ])  # fmt: skip
 def test_slips_in_a_table_are_told(tmp_path, entry, told):
@@ -151,3 +152,91 @@ def test_bad_tables_raise_named_errors(tmp_path):
         with pytest.raises(error, match=message):
             nuno.Humanoid("stick", robots=table)
     assert find_description(urdf, None, None, None).feet == ()
+
+
+BARE = """<robot name="bare">
+  <link name="base">
+    <inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="arm">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>LIMIT</joint>
+</robot>"""
+NO_SPEED = '<limit lower="-1" upper="1" velocity="0" effort="0"/>'
+
+
+def bare(folder, limit=NO_SPEED):
+    """Write a robot without any shapes, and return its path."""
+    path = folder / "bare.urdf"
+    path.write_text(BARE.replace("LIMIT", limit))
+    return path
+
+
+def test_a_robot_without_shapes_moves(tmp_path):
+    """Kinematic models of people have links alone; they enter a world, and their joints arrive."""
+    world = nuno.World(device="cpu")
+    robot = nuno.SimulatedRobot(nuno.Humanoid(bare(tmp_path, NO_SPEED.replace('"0"', '"2"'))), world)
+    assert world.bodies == ()
+    robot.angle_vector([0.5], 0.3)
+    assert robot.wait_interpolation() == [False]
+    np.testing.assert_allclose(robot.angle_vector(), [0.5], atol=1e-6)
+    world.step()
+
+
+def test_a_velocity_limit_of_zero_is_assumed_with_a_warning(tmp_path, caplog):
+    """Generators of URDFs leave zeros where nothing was known: the log says so once, by name and with the cure."""
+    robot = nuno.SimulatedRobot(nuno.Humanoid(bare(tmp_path)), nuno.World(device="cpu"))
+    (speed, effort) = [own.getMessage() for own in caplog.records if own.levelname == "WARNING"]
+    assert "velocity of 1 joints to zero or not at all, the first is 'shoulder'" in speed
+    assert "velocity_limits in a table" in speed
+    assert "effort of 1 joints to zero" in effort
+    assert robot.robot.velocity_limits == np.pi
+    assert robot.robot.effort_limits == np.inf
+    assert np.isclose(robot.angle_vector_duration([0.0], [0.5]), 0.5 / np.pi)
+    robot.angle_vector([0.5])  # five times the shortest
+    robot.wait_interpolation()
+    assert np.isclose(robot.now(), 2.5 / np.pi, atol=2.0 / robot.world.frame_rate)
+
+
+def test_a_table_gives_velocity_limits_and_groups(tmp_path, caplog):
+    """They take the place of the URDF's, and nothing is assumed; what names no joint is refused by name."""
+    bare(tmp_path, NO_SPEED.replace('effort="0"', 'effort="1"'))
+    table = tmp_path / "mine.toml"
+    entry = '[bare]\nurdf = "bare.urdf"\ngroups.swing = ["shoulder"]\nvelocity_limits.shoulder = 0.25\n'
+    table.write_text(entry)
+    robot = nuno.SimulatedRobot(nuno.Humanoid("bare", robots=table), nuno.World(device="cpu"))
+    assert not [own for own in caplog.records if own.levelname == "WARNING"]
+    assert robot.robot.velocity_limits == 0.25
+    assert set(robot.controller_table) == {"default_controller", "swing_controller"}
+    table.write_text(entry.replace("velocity_limits.shoulder", "velocity_limits.elbow"))
+    with pytest.raises(UnknownNameError, match="'elbow'; there are: shoulder"):
+        nuno.Humanoid("bare", robots=table)
+    table.write_text(entry.replace('["shoulder"]', '["shoulder", "shoulder"]'))
+    with pytest.raises(InvalidInputError, match="'shoulder' is in the groups 'swing' and 'swing'"):
+        nuno.SimulatedRobot(nuno.Humanoid("bare", robots=table), nuno.World(device="cpu"))
+
+
+def test_convex_shapes_of_a_urdf_are_taken(tmp_path):
+    """Pinocchio makes a hull of a mesh that <collision_checking> names; the body is that hull."""
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.2, 0.3, 0.4)).export(tmp_path / "brick.stl")
+    path = stick(tmp_path, '<mesh filename="brick.stl"/>')
+    checking = '<collision_checking><convex name="brick"/></collision_checking>'
+    named = path.read_text().replace("<collision>", '<collision name="brick">')
+    path.write_text(named.replace("</collision>", f"</collision>{checking}"))
+    robot = nuno.Humanoid(path)
+    assert "Convex" in type(robot.geometry._read(pin.GeometryType.COLLISION).geometryObjects[0].geometry).__name__
+    (body,) = robot.enter(nuno.World(device="cpu")).bodies
+    assert len(body.shape.vertices) == 8
+    np.testing.assert_allclose(np.ptp(body.shape.vertices, axis=0), (0.2, 0.3, 0.4), atol=1e-6)
+
+
+def test_package_names_with_a_slash_too_many_are_found(tmp_path):
+    """As Pinocchio finds them."""
+    trimesh = pytest.importorskip("trimesh")
+    (tmp_path / "mine").mkdir()
+    trimesh.creation.box((0.2, 0.3, 0.4)).export(tmp_path / "mine" / "brick.stl")
+    robot = nuno.Humanoid(stick(tmp_path, '<mesh filename="package:///mine/brick.stl"/>'))
+    (body,) = robot.enter(nuno.World(device="cpu")).bodies
+    np.testing.assert_allclose(np.ptp(body.shape.vertices, axis=0), (0.2, 0.3, 0.4), atol=1e-6)

@@ -43,7 +43,7 @@ def test_what_is_held_goes_where_the_hand_goes(talos):
     """The vertices keep their places in the hand's frame while the robot moves and turns its arm."""
     world, links, towel, hand = with_towel(talos)
     hand.close()
-    held = hand.grips[0]._spec.vertices[0]
+    held = hand.grips[0].spec.vertices[0]
     before = talos.frame_pose("left_hand").to_local(towel.vertices[held])
     for k in range(10):
         talos.angle_vector({"arm_left_4_joint": -1.2 + 0.02 * k, "torso_1_joint": 0.02 * k})
@@ -114,7 +114,7 @@ def test_a_coarse_cloth_is_held_by_its_surface(talos):
     world.attach(sheet, TOWEL)
     hand = Hand(links, "left_hand")
     assert hand.close() == (sheet,)
-    points = hand.grips[0]._spec
+    points = hand.grips[0].spec
     assert points.vertices is None and points.corners.shape == (1, 3, 3)
     start = np.einsum("kc,kcx->kx", points.barycentric[0], sheet.vertices[points.corners[0]])
     world.run(0.3)

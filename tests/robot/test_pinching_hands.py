@@ -26,7 +26,7 @@ def held_width(driver, towel, place):
     """How wide [m] what the hand holds is along the axis on which its fingers close."""
     grips = driver.hands["left_hand"].grips
     assert [grip.body for grip in grips] == [towel]
-    local = place.to_local(towel.vertices[grips[0]._spec.vertices[0]])
+    local = place.to_local(towel.vertices[grips[0].spec.vertices[0]])
     return np.ptp(local[:, FINGERS])
 
 
@@ -54,7 +54,7 @@ def test_closing_again_keeps_hold(scene):
     """A hand that is told to close while it holds goes on holding the same vertices (a float tells 7e-9 m)."""
     driver, towel, place = scene
     driver.start_grasp("larm")
-    before, held = held_width(driver, towel, place), driver.hands["left_hand"].grips[0]._spec.vertices
+    before, held = held_width(driver, towel, place), driver.hands["left_hand"].grips[0].spec.vertices
     driver.start_grasp("larm")
-    np.testing.assert_array_equal(driver.hands["left_hand"].grips[0]._spec.vertices, held)
+    np.testing.assert_array_equal(driver.hands["left_hand"].grips[0].spec.vertices, held)
     assert held_width(driver, towel, place) == pytest.approx(before, abs=2e-8)

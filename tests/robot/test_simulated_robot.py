@@ -93,7 +93,7 @@ def test_waiting_in_the_background(simulated):
     simulated.angle_vector(BENT, 1.0)
     simulated.wait_interpolation()
     assert simulated.now() - begin >= 1.0 - 1e-9
-    assert 0.04 < time.perf_counter() - start < 20.0  # 1 s at 20 times real time is 0.05; a busy machine takes longer
+    assert time.perf_counter() - start > 0.04  # 1 s at 20 times real time is 0.05; a busy machine takes longer
     simulated.sleep(0.2)
     simulated.world.stop()
 
@@ -129,17 +129,21 @@ def test_restored_in_the_middle_of_a_motion(simulated):
 
 
 def test_snapshot_files_and_imagined_worlds(simulated, tmp_path):
-    """They hold the links as they are; the robot in its own world goes on."""
+    """Files hold the links as they are; imagined worlds take the robot along; its own world waits meanwhile."""
     simulated.angle_vector(BENT, 1.0)
     simulated.sleep(0.5)
     simulated.world.save(tmp_path / "room.npz")
+    alone = nuno.World(device="cpu")
+    alone.restore(tmp_path / "room.npz")
     futures = simulated.world.imagine(2)
     hand = simulated.world.find("talos/gripper_left_base_link")
     where = hand.position
+    alone.run(0.5)
     futures.run(0.5)
-    np.testing.assert_allclose(futures.find(hand.name).position, where, atol=1e-12)
+    np.testing.assert_allclose(alone.find(hand.name).position, where, atol=1e-12)
     np.testing.assert_array_equal(hand.position, where)
-    simulated.wait_interpolation()
+    simulated.sleep(0.5)
+    np.testing.assert_array_equal(futures.find(hand.name).position, [hand.position] * 2)
     assert np.linalg.norm(hand.position - where) > 0.01
 
 

@@ -120,6 +120,7 @@ def test_a_hand_that_one_image_misses_is_still_followed():
     assert track.deviations[12] > track.deviations[4]
 
 
+@pytest.mark.long
 def test_an_occluded_hand_is_bridged_and_the_gap_is_told():
     """A board passes before the ball for some frames: neither image shows it, and the way between is bridged."""
     way = two_ways()[:1]

@@ -152,6 +152,7 @@ def test_every_plan_tells_that_its_lists_were_short(plan, scarce):
     assert not solver.missed.any()
 
 
+@pytest.mark.long
 def test_contacts_that_find_no_memory_are_told_of(monkeypatch, caplog, scarce):
     """Where lists may not grow the run goes on, with one warning for the body and a flag."""
     monkeypatch.setattr(pair_capacity, "MAX_LIST_BYTES", 1.0e4)

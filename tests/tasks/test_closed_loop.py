@@ -115,6 +115,7 @@ def loop():
     return room, border, talos, answer
 
 
+@pytest.mark.long
 def test_answer_is_right(loop):
     """The robot names the point at which the real hand really holds the towel."""
     room, _, talos, answer = loop
@@ -123,6 +124,7 @@ def test_answer_is_right(loop):
     assert answer.pick == INSIDE
 
 
+@pytest.mark.long
 def test_towel_was_found(loop):
     """The towel as the robot saw it is that which is there: 0.4 x 0.3 m, within the 3 mm and 2 % asked of cases."""
     room, _, talos, _ = loop
@@ -133,6 +135,7 @@ def test_towel_was_found(loop):
         assert np.linalg.norm(room.lay - corner, axis=1).min() < 0.006
 
 
+@pytest.mark.long
 def test_nothing_else_gets_in(loop):
     """What passed the border gives the same answer, to the bit, where there is no real room at all."""
     _, border, _, answer = loop
@@ -142,6 +145,7 @@ def test_nothing_else_gets_in(loop):
     assert np.array_equal(again.held, answer.held)
 
 
+@pytest.mark.long
 def test_what_passes_the_border(loop):
     """Images and joints' readings, and neither arrays that the real room still writes to nor its bodies."""
     room, border, talos, _ = loop
@@ -152,6 +156,7 @@ def test_what_passes_the_border(loop):
     assert {image.dtype for images in border.images for image in images.values()} == {np.dtype(np.uint8)}
 
 
+@pytest.mark.long
 def test_hand_by_stereo(loop):
     """The held point by both images is where the joints have it, to what a bead of 13 px tells at 0.5 m.
 
@@ -164,6 +169,7 @@ def test_hand_by_stereo(loop):
     assert np.linalg.norm(answer.held - room.held_at()) < 0.008
 
 
+@pytest.mark.long
 def test_hand_stays_above_the_table(loop):
     """No link of the robot was in the table when the fingers closed on what lies on it."""
     _, border, _, _ = loop
@@ -172,6 +178,7 @@ def test_hand_stays_above_the_table(loop):
     assert height < TABLE.height + 0.01, "it did go down to the towel"
 
 
+@pytest.mark.long
 def test_robot_world_is_like_the_real_one(loop):
     """The towel in the robot's world hangs as the real one, to less than half of a step of the grid in the mean."""
     room, _, talos, answer = loop

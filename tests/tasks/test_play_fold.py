@@ -72,6 +72,7 @@ def played(taught):
     return better, result, robot
 
 
+@pytest.mark.long
 def test_the_search_makes_it_square(played):
     """As it was taught, the fold drags the towel along and misses by far; the best one is square, to 1 cm."""
     better, _, _ = played
@@ -84,6 +85,7 @@ def test_the_search_makes_it_square(played):
     assert better.minimum.value == pytest.approx(better.doubtful_errors.mean(axis=1).max())
 
 
+@pytest.mark.long
 def test_what_the_robot_did_is_what_was_imagined(played):
     """Square to 1 cm too; the hands stray by less than 1 mm, and the towel lies where it was imagined.
 
@@ -95,6 +97,7 @@ def test_what_the_robot_did_is_what_was_imagined(played):
     assert np.linalg.norm(result.vertices - better.vertices, axis=1).mean() < 0.0036
 
 
+@pytest.mark.long
 def test_how_it_lies(played):
     """A square fold doubles half of the cloth; its surface is nearer to the taught one than those corners were off."""
     better, result, _ = played
@@ -106,6 +109,7 @@ def test_how_it_lies(played):
     assert end.share == pytest.approx(end.distance / 0.36)
 
 
+@pytest.mark.long
 def test_how_the_robot_moved(played):
     """Each hand took one point and let it go; in no frame did links meet or come below the table; feet stayed."""
     _, result, robot = played

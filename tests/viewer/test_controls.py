@@ -73,7 +73,7 @@ def test_a_program_that_is_paused_gets_the_same(page):
     feed.say("speed", factor=2.0)
     feed.wait_for(lambda: feed.latest["controls"]["speed"] == 2.0)
     feed.say("resume")
-    program.join(60.0)
+    program.join()
     assert not program.is_alive()
     alone = make_world()
     alone.run(0.5)
@@ -89,7 +89,7 @@ def test_closing_lets_a_paused_program_go_on():
     program = threading.Thread(target=world.run, args=(0.1,))
     program.start()
     viewer.close()
-    program.join(60.0)
+    program.join()
     assert world.time == pytest.approx(0.1) and not world._pace.is_paused
 
 

@@ -1,11 +1,12 @@
 """What a browser shows is where Nuno's own renderer sees it."""
 
-import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from browser import Browser, needs_chromium, save_picture
+from viewer_page import viewer_page
 
 import nuno
 from nuno.viewer import Film, Viewer
@@ -178,7 +179,7 @@ def test_the_live_page_follows_in_all_modes(browser, tmp_path):
             viewer.draw(ball, mode, explode=1.6)
             world.run(0.1)
             browser.wait_for(f"nuno.messages > {seen} && [...nuno.things.values()].some((t) => t.path[1] === 'ball')")
-            time.sleep(0.3)  # of thirty looks a second
+            browser.wait_for(f"document.getElementById('clock').textContent === 't = {world.time:.2f} s'")
             picture = browser.picture()
             save_picture(picture, tmp_path / f"{mode}.png")
             covered[mode] = blue(picture)
@@ -264,3 +265,14 @@ def test_the_page_controls_the_world(browser, tmp_path):
         assert not towel.is_dynamic
         assert browser.complaints == []
     browser.wait_for("!document.getElementById('notice').hidden")
+
+
+def test_the_documentation_shows_the_page(tmp_path):
+    """Its picture of the viewer is what a browser shows now, but for fonts."""
+    viewer_page(tmp_path / "viewer_page.png")
+    shown = cv2.imread(str(tmp_path / "viewer_page.png"))
+    kept = cv2.imread(str(Path(__file__).parents[2] / "docs" / "images" / "viewer.webp"))
+    assert shown.shape == kept.shape
+    small = [cv2.resize(image, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA) for image in (shown, kept)]
+    off = np.abs(small[0].astype(float) - small[1]).mean()
+    assert off < 2.0, "stale: python docs/make_pictures.py viewer_page"

@@ -15,7 +15,7 @@ import pytest
 from feed import Feed
 
 import nuno
-from nuno.viewer import Film, Viewer
+from nuno.viewer import Film, Viewer, page_server
 from nuno.viewer import following as following_module
 from nuno.viewer.scene import Scene
 
@@ -82,8 +82,10 @@ def test_only_what_moved_is_sent():
         )
         seen = len(shown(feed))
         viewer.update()
-        time.sleep(0.1)
-        assert len(shown(feed)) == seen, "nothing happened, nothing is sent"
+        world.find("ball").translate((0, 0, 0.1))
+        viewer.update()
+        feed.wait_for(lambda: len(shown(feed)) >= seen + 1)
+        assert shown(feed)[seen]["do"] == "place", "where nothing happened, nothing is sent"
 
 
 def test_bodies_come_and_go_while_it_looks():
@@ -165,14 +167,15 @@ def test_a_stepped_world_is_followed():
     world = make_world()
     with Viewer(world) as viewer:
         feed = Feed(viewer)
-        world.run(40.0)  # 0.5 s or more of real time
-        between = [c["time"] for c in feed.commands if c["do"] == "clock" and 0.0 < c["time"] < 40.0]
-        assert len(between) >= 5, "of 30 in a second"
+        between = set()
+        while len(between) < 5:
+            begin = world.time
+            world.run(20.0)
+            clocks = [command["time"] for command in list(feed.commands) if command["do"] == "clock"]
+            between |= {time for time in clocks if begin < time < world.time}
         seen = len(feed.commands)
-        end = time.monotonic() + 1.0
-        while time.monotonic() < end:
+        while sum(command["do"] == "clock" for command in feed.commands[seen:]) < 5:
             world.step()
-        assert sum(c["do"] == "clock" for c in feed.commands[seen:]) >= 5, "of 30 in a second"
 
 
 def test_it_looks_rarely_while_nobody_does(monkeypatch):
@@ -207,11 +210,11 @@ def test_it_takes_a_share_of_the_time_only(monkeypatch):
     with Viewer(nuno.World(device="cpu"), frame_rate=1000.0) as viewer:
         Feed(viewer)
         monkeypatch.setattr(Scene, "look", look)
-        time.sleep(3.0)
-    assert len(looks) > 3
+        while len(looks) < 16:
+            time.sleep(0.01)
     # what is measured is an average of the last five or so, which have to be taken in first: 5 of them in a hurry,
-    # then one in busy / SHARE = 0.2 s; in a hurry there would be a hundred and more
-    assert len(looks) < 30
+    # then one in busy / SHARE = 0.2 s, or more where others take the machine; in a hurry it would be busy
+    assert np.median(np.diff(looks)[8:]) > 5 * busy
 
 
 def test_modes_are_what_draw_draws():
@@ -250,9 +253,9 @@ def test_a_look_that_fails_lets_go_of_the_world(monkeypatch, caplog):
     with caplog.at_level(logging.ERROR), Viewer(world, frame_rate=200.0) as viewer:
         feed = Feed(viewer)
         monkeypatch.setattr(Scene, "look", fails_once)
-        assert failed.wait(5.0)
-        assert world.lock.acquire(timeout=5.0), "the viewer's thread has let go of it"
-        world.lock.release()
+        failed.wait()
+        with world.lock:  # the viewer's thread has let go of it
+            pass
         world.step()
         feed.wait_for(lambda: feed.commands[-1].get("time") == world.time)
     assert "could not draw" in caplog.text
@@ -393,18 +396,26 @@ def test_a_closed_viewer_says_so():
     assert "closed" in repr(viewer) and "iframe" not in viewer._repr_html_()
 
 
+def test_a_port_is_found_where_the_first_ones_are_taken(monkeypatch):
+    """Programs that leave many viewers open keep nobody from opening one more."""
+    with Viewer(make_world()) as first:
+        monkeypatch.setattr(page_server, "FIRST_PORT", int(first.url.rstrip("/").rpartition(":")[2]))
+        monkeypatch.setattr(page_server, "PORTS", 1)
+        with Viewer(make_world()) as second:
+            assert second.url != first.url
+            assert Feed(second).paths()
+
+
 def test_a_viewer_that_is_dropped_ends():
     """With its thread and its server, once nobody holds the viewer or the world."""
     world = make_world()
     viewer = Viewer(world)
     watched, thread = weakref.ref(viewer), viewer._thread
     del viewer, world
-    end = time.monotonic() + 10.0
-    while watched() is not None and time.monotonic() < end:
+    while watched() is not None:
         gc.collect()
         time.sleep(0.05)
-    assert watched() is None
-    thread.join(5.0)
+    thread.join()
     assert not any(t.name == "nuno-viewer" for t in threading.enumerate())
 
 

@@ -176,3 +176,20 @@ def test_a_static_body_that_went_along_a_path_and_back_is_met_where_it_is():
     table.locate((0.0, 0.0, -0.05))
     world.run(1.0)
     assert ball.position[2] == pytest.approx(0.025, abs=1e-4)  # at rest on it, half its height above
+
+
+def test_a_batch_takes_room_for_its_own_bodies_and_more_where_one_comes():
+    """Copies of a box on a floor have room for two parts in each world; a third body moves as it does alone."""
+    world, a, b = two_boxes()
+    world.remove(b)
+    world.attach(a)
+    world.run(0.1)
+    batch = world.imagine(3)
+    batch.run(1.0 / 60.0)
+    assert batch._rigid.solver.table.parts.capacity == 2
+    for each in (world, batch):
+        if each is world:
+            each.run(1.0 / 60.0)
+        each.attach(each.add(nuno.box((0.1, 0.1, 0.1), name="c", position=(0.04, 0.0, 0.17))))
+        each.run(0.2)
+    assert_equal(places(batch), places(world))

@@ -116,5 +116,5 @@ def test_the_force_of_contacts_by_world():
 def test_a_world_is_not_copied_by_accident(copied):
     """A copy would share its bodies: it is refused, with what copies a world."""
     world, _ = batch_of()
-    with pytest.raises(BodyStateError, match="imagine|save"):
+    with pytest.raises(BodyStateError, match=r"imagine|save"):
         copied(world)

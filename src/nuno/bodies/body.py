@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nuno.bodies.body_facts import body_facts, millimetres
 from nuno.bodies.quantities import Quantities
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.materials import Cloth, Material
+from nuno.shapes.color import checked_color
 from nuno.shapes.coordinates import Coordinates, Pose, apply, compose, invert
 from nuno.shapes.path import Path
 from nuno.shapes.shape import Shape, Sheet
@@ -88,8 +91,11 @@ class Body(Quantities, Coordinates):
     def __repr__(self) -> str:
         state = "dynamic" if self.is_dynamic else "static"
         place = np.asarray(self.position)
-        where = f"at {_millimetres(place)} m" if place.ndim == 1 else f"in {len(place)} worlds"
+        where = f"at {millimetres(place)} m" if place.ndim == 1 else f"in {len(place)} worlds"
         return f"<{self._shape.kind} {self._name!r} {where}, {state}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(f"Body {self._name!r}", body_facts(self))
 
     @property
     def name(self) -> str:
@@ -141,6 +147,15 @@ class Body(Quantities, Coordinates):
     def resolution(self) -> Resolution | None:
         """Return how a cloth's or soft body's substeps resolve its material, None for a static or rigid body."""
         return None if self._dynamics is None else self._dynamics.resolution
+
+    @property
+    def color(self) -> Color:
+        """A name or (r, g, b) in [0, 1], as it was given."""
+        return self._color
+
+    @color.setter
+    def color(self, value: Color) -> None:
+        self._color = checked_color(value)
 
     @property
     def friction(self) -> Any:
@@ -381,7 +396,3 @@ def _mask(name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value <= ALL_GROUPS:
         raise InvalidInputError(f"{name} must be a bit mask from 0 to {ALL_GROUPS:#x}, got {value!r}")
     return int(value)
-
-
-def _millimetres(place: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.3f}" for value in np.round(place, 3) + 0.0) + ")"

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nuno.bodies.body import Body
 from nuno.bodies.shape_topology import topology_of
 from nuno.errors import InvalidInputError
 from nuno.materials import Soft
-
-if TYPE_CHECKING:
-    from nuno.bodies.body import Body
+from nuno.validation import instance
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +45,9 @@ def elements(body: Body) -> ElementState:
     """
     from nuno.bodies import soft_measures
 
-    if not body.shape.is_soft:
-        raise InvalidInputError(f"only soft bodies have tetrahedra; {body.name!r} is a {body.shape.kind}")
+    shape = instance("body", body, Body).shape
+    if not shape.is_soft:
+        raise InvalidInputError(f"only soft bodies have tetrahedra; {body.name!r} is a {shape.kind}")
     topology, vertices, material = topology_of(body.shape), body.vertices, body.material
     stresses = None
     if isinstance(material, Soft):

@@ -13,7 +13,7 @@ from nuno.mesh.load import MeshSource, has_faces, load_mesh
 from nuno.shapes.compound import Compound
 from nuno.shapes.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 from nuno.shapes.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra, closed_mesh
-from nuno.validation import number
+from nuno.validation import flag, number, text
 
 
 def box(size: ArrayLike, **options: Unpack[BodyOptions]) -> Body:
@@ -93,7 +93,7 @@ def compound(parts: Sequence[Any], **options: Unpack[BodyOptions]) -> Body:
     Raises:
         InvalidInputError: no parts, or a plane or cloth among them.
     """
-    return Body(Compound(tuple(parts)), **options)
+    return Body(Compound(tuple(parts) if isinstance(parts, Sequence) else parts), **options)
 
 
 def mesh(source: MeshSource, **options: Unpack[BodyOptions]) -> Body:
@@ -257,12 +257,13 @@ def soft_mesh(
         InvalidInputError: another tetrahedraliser, or a length that is not positive.
         MissingPackageError: pytetwild is asked for and not installed.
     """
+    text("tetrahedraliser", tetrahedraliser)
     vertices, faces = load_mesh(source)
     if tetrahedraliser in ("fitted", "lattice"):
         return Body(SoftMesh(vertices, faces, cell, tetrahedraliser, mean_strain), **options)
     if tetrahedraliser != "pytetwild":
         raise InvalidInputError(f'tetrahedraliser must be "fitted", "lattice" or "pytetwild", got {tetrahedraliser!r}')
-    if mean_strain:
+    if flag("mean_strain", mean_strain):
         raise InvalidInputError("mean_strain is for voxels, and pytetwild makes none; leave it out")
     from nuno.mesh.tetrahedraliser import fitted_tetrahedra
 

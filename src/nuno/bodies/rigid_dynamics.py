@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,9 +10,10 @@ import warp as wp
 from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
 from nuno.bodies.dynamics import Dynamics, State, check_material
 from nuno.bodies.given_velocity import GivenVelocity
+from nuno.bodies.static_place import StaticPlace, same_deformation, what_of
 from nuno.materials import Rigid
 from nuno.rigid.convex_parts import RigidPart, rigid_shape
-from nuno.rigid.rigid_arrays import SAVED
+from nuno.rigid.rigid_arrays import PARTS, SAVED
 from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, compose, invert
@@ -24,28 +24,6 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.bodies.dynamics import Push
     from nuno.world.simulation import Simulation
-    from nuno.world.snapshot import BodyRecord
-
-
-@dataclass
-class StaticPlace:
-    """A static body as the rigid solver was told of it.
-
-    Attributes:
-        slot: Its slot.
-        what: Shape, friction, groups and thickness; None of a body that the solver is yet to forget.
-        deformed: Its vertices (worlds, n, 3) [m] where it was deformed, and the pose that they belong to.
-        where: Its pose, as bytes; None where the solver has moved it since.
-    """
-
-    slot: int
-    what: tuple[Any, ...] | None
-    deformed: tuple[np.ndarray, Pose] | None
-    where: tuple[bytes, bytes] | None
-
-    def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
-        """Return True if this is what a body is, or was when it was saved, but for where it is."""
-        return self.what == _what(body) and _same_shape(self.deformed, deformed)
 
 
 class RigidScene:
@@ -56,12 +34,17 @@ class RigidScene:
         settings: What of the world it was made for.
         static: The static bodies, by key.
         kept: By key, the slot and rows that are kept for bodies that are still to come.
+
+    Args:
+        world: The world.
+        origin: (3,) or (worlds, 3) [m], about where the bodies are.
+        parts: Parts that there is room for at first.
     """
 
-    def __init__(self, world: Simulation, origin: np.ndarray) -> None:
+    def __init__(self, world: Simulation, origin: np.ndarray, parts: int = PARTS) -> None:
         self.solver = RigidSolver(
             world.world_count, device=world.device, gravity=world.gravity, frame_rate=world.frame_rate,
-            substeps=world.substeps, origin=np.round(np.asarray(origin) * 1024.0) / 1024.0,
+            substeps=world.substeps, origin=np.round(np.asarray(origin) * 1024.0) / 1024.0, parts=parts,
         )  # fmt: skip
         self.settings = self.settings_of(world)
         self.static: dict[str, StaticPlace] = {}
@@ -182,7 +165,7 @@ class RigidScene:
             parts_of(body, moves=False), position=pose[0], quaternion=pose[1], friction=body.friction,
             group=body.group, collides_with=body.collides_with, slot=slot, rows=rows,
         )  # fmt: skip
-        self.static[body.key] = StaticPlace(slot, _what(body), body._deformed, where)
+        self.static[body.key] = StaticPlace(slot, what_of(body), body._deformed, where)
         return slot
 
     def keep_stale(self, key: str, slot: int, rows: tuple[int, ...]) -> None:
@@ -332,7 +315,7 @@ class RigidDynamics(Dynamics):
 
     def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
         """Return True if it moves a body in this shape, deformed or not, of this thickness [m]."""
-        return self.thickness == thickness and _same_shape(self.deformed, deformed)
+        return self.thickness == thickness and same_deformation(self.deformed, deformed)
 
     def finite(self) -> np.ndarray:
         """Return (worlds,) bool, whether pose and velocities are finite."""
@@ -364,6 +347,9 @@ def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
 
 def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
+    if material.mass is not None and material.inertia is not None and material.centre_of_mass is not None:
+        mass = np.broadcast_to(np.asarray(material.mass, dtype=float), density.shape)
+        return mass, np.broadcast_to(material.inertia, (len(mass), 3, 3)), np.asarray(material.centre_of_mass)
     vertices = body.local_vertices() if body._deformed is not None else None
     if vertices is not None and vertices.ndim == 3:
         vertices = vertices[0]
@@ -375,19 +361,8 @@ def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarr
         inertia, mass = inertia * (given / mass)[:, None, None], given
     if material.inertia is not None:
         inertia = np.broadcast_to(material.inertia, inertia.shape)
-    return mass, inertia, unit.centre
-
-
-def _what(body: Body | BodyRecord) -> tuple[Any, ...]:
-    """Return what the solver takes of a static body, besides its pose and how it was deformed."""
-    return body.shape, np.asarray(body.friction).tobytes(), body.group, body.collides_with, body.thickness
-
-
-def _same_shape(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pose] | None) -> bool:
-    """Return True if two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
-    if a is None or b is None:
-        return a is b
-    return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))
+    centre = unit.centre if material.centre_of_mass is None else np.asarray(material.centre_of_mass)
+    return mass, inertia, centre
 
 
 def _replaced(numbers: np.ndarray, by: dict[int, int]) -> np.ndarray:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, number
+from nuno.validation import as_array, checked, finite_array, number
 
+MAX_PIXELS = 16384
+"""Of a side of an image: 1 GB of depth a world, where both sides have as many."""
 _DISTORTIONS = (4, 5, 8, 12, 14)  # how many coefficients OpenCV's models have
 
 
@@ -39,6 +41,13 @@ class Camera:
     camera_to_world: np.ndarray = field(default_factory=lambda: np.eye(4))
     distortion: np.ndarray | None = None
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, width: int, height: int, fx: float, fy: float, cx: float, cy: float,
+            camera_to_world: ArrayLike = ..., distortion: ArrayLike | None = None,
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
         pose = finite_array("camera_to_world", self.camera_to_world, (4, 4))
         rotation = pose[:3, :3]
@@ -58,7 +67,7 @@ class Camera:
             number(name, getattr(self, name))
         object.__setattr__(self, "camera_to_world", pose)
         if self.distortion is not None:
-            distortion = np.asarray(self.distortion)
+            distortion = as_array("distortion", self.distortion)
             if distortion.size:
                 distortion = finite_array("distortion", distortion.ravel(), *((n,) for n in _DISTORTIONS))
             object.__setattr__(self, "distortion", distortion if distortion.size else None)
@@ -81,6 +90,50 @@ class Camera:
         except InvalidInputError as error:
             raise InvalidInputError(f"camera: {error}") from error
 
+    @classmethod
+    def look_at(
+        cls, eye: ArrayLike, target: ArrayLike, fov: float, *, width: int = 640, height: int = 480,
+        up: ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Camera:  # fmt: skip
+        """Return a camera at a point that looks at another, upright, with square pixels and no distortion.
+
+        Args:
+            eye: (3,) [m], where the camera is.
+            target: (3,) [m], what is in the middle of the image.
+            fov: Field of view from the image's upper edge to its lower one [rad], below pi.
+            width: Image width [px].
+            height: Image height [px].
+            up: (3,), the direction that points up in the image. Where the camera looks along it, straight down say,
+                +y points up, or +x where that is the same line.
+
+        Raises:
+            InvalidInputError: the two points are one, or a value that is not finite or out of range.
+        """
+        place, aim = finite_array("eye", eye, (3,)), finite_array("target", target, (3,))
+        upward = finite_array("up", up, (3,))
+        angle = number("fov", fov)
+        if not 0.0 < angle < np.pi:
+            raise InvalidInputError(
+                f"fov must be in (0, pi) rad, got {angle!r}" + (f"; np.radians({angle:g})?" if angle >= np.pi else "")
+            )
+        forward = aim - place
+        distance, length = float(np.linalg.norm(forward)), float(np.linalg.norm(upward))
+        if distance < 1e-9:
+            raise InvalidInputError(f"eye and target are the same point, {place.tolist()}")
+        if length < 1e-9:
+            raise InvalidInputError(f"up must be a direction, got {upward.tolist()}")
+        forward /= distance
+        for upright in (upward / length, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])):
+            right = np.cross(forward, upright)
+            if np.linalg.norm(right) > 1e-6:
+                break
+        right /= np.linalg.norm(right)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = np.stack([right, np.cross(forward, right), forward], axis=1), place
+        columns, rows = _pixels("width", width), _pixels("height", height)
+        focal = 0.5 * rows / float(np.tan(0.5 * angle))
+        return cls(columns, rows, focal, focal, 0.5 * (columns - 1), 0.5 * (rows - 1), pose)
+
     @property
     def matrix(self) -> np.ndarray:
         """(3, 3) float, the intrinsic matrix K."""
@@ -91,6 +144,7 @@ class Camera:
         """(4, 4) float, the inverse of ``camera_to_world``."""
         return np.linalg.inv(self.camera_to_world)
 
+    @checked
     def scaled(self, factor: float) -> Camera:
         """The same view with ``factor`` times as many pixels each way (pixel centres stay centres)."""
         return replace(
@@ -99,14 +153,16 @@ class Camera:
             cx=(self.cx + 0.5) * factor - 0.5, cy=(self.cy + 0.5) * factor - 0.5,
         )  # fmt: skip
 
+    @checked
     def depth_of(self, points: ArrayLike) -> np.ndarray:
         """Depth [m] (..., ) of world points (..., 3) along the optical axis; negative behind the camera."""
         pose = self.camera_to_world
-        return (np.asarray(points, dtype=float) - pose[:3, 3]) @ pose[:3, 2]
+        return (_rows("points", points, 3) - pose[:3, 3]) @ pose[:3, 2]
 
+    @checked
     def project(self, points: ArrayLike) -> np.ndarray:
         """Pixels (..., 2) of world points (..., 3) [m]; NaN for points behind the camera."""
-        points = np.asarray(points, dtype=float)
+        points = _rows("points", points, 3)
         pose = self.camera_to_world
         local = (points - pose[:3, 3]) @ pose[:3, :3]
         depth = np.where(local[..., 2] > 1e-9, local[..., 2], np.nan)
@@ -119,9 +175,10 @@ class Camera:
             return pixels.reshape((*points.shape[:-1], 2))
         return xy * (self.fx, self.fy) + (self.cx, self.cy)
 
+    @checked
     def rays(self, pixels: ArrayLike) -> np.ndarray:
         """Directions (..., 3) in the world through pixels (..., 2), scaled to one metre of depth."""
-        pixels = np.asarray(pixels, dtype=float)
+        pixels = _rows("pixels", pixels, 2)
         if self.distortion is not None:
             import cv2
 
@@ -131,6 +188,7 @@ class Camera:
         local = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
         return local @ self.camera_to_world[:3, :3].T
 
+    @checked
     def back_project(self, pixels: ArrayLike, height: float) -> np.ndarray:
         """World points (..., 3) [m] where the rays of pixels (..., 2) meet the plane z = height.
 
@@ -146,8 +204,15 @@ class Camera:
         return origin + distance[..., None] * rays
 
 
+def _rows(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    rows = np.asarray(value, dtype=float)
+    if rows.ndim < 1 or rows.shape[-1] != size:
+        raise InvalidInputError(f"{name} must have the shape (..., {size}), got {rows.shape}")
+    return rows
+
+
 def _pixels(name: str, value: Any) -> int:
-    pixels = number(f"{name} in pixels", value, low=1.0)
+    pixels = number(f"{name} in pixels", value, low=1.0, high=MAX_PIXELS)
     if pixels != int(pixels):
         raise InvalidInputError(f"{name} must be a whole number of pixels, got {value!r}")
     return int(pixels)

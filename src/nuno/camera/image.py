@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.errors import ImageError
+from nuno.validation import as_array
 
 
 def read_image(path: str | Path) -> np.ndarray:
@@ -53,7 +54,7 @@ def check_image(image: ArrayLike, camera: Camera, name: str = "image") -> np.nda
     Raises:
         ImageError: it is not.
     """
-    array = np.asarray(image)
+    array = as_array(name, image, ImageError)
     expected = (camera.height, camera.width, 3)
     if array.shape != expected or array.dtype != np.uint8:
         raise ImageError(
@@ -74,10 +75,12 @@ def check_mask(mask: ArrayLike, camera: Camera, name: str = "mask") -> np.ndarra
     Raises:
         ImageError: it is of another shape.
     """
-    array = np.asarray(mask)
+    array = as_array(name, mask, ImageError)
     expected = (camera.height, camera.width)
     if array.shape != expected:
         raise ImageError(f"{name} must have shape {expected} to fit its camera, got {array.shape}")
+    if array.dtype.kind not in "biuf":
+        raise ImageError(f"{name} must be bool or numbers, got {array.dtype}")
     if array.dtype == bool:
         return array
     return array > 0.5 * max(float(array.max()), 1e-9)

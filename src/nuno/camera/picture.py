@@ -6,21 +6,25 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from os import PathLike
-from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from nuno.camera import raster, shading
+from nuno.camera.body_masks import masks_by_name
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
-from nuno.camera.render import _hidden, _index, _split
+from nuno.camera.render import _hidden, _split, body_index
+from nuno.camera.small_png import small_png
 from nuno.errors import InvalidInputError
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.shape import Shape
-from nuno.validation import count, finite_array, number
+from nuno.validation import check_fields, checked, count, finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.numbers.device_array import DeviceArray
 
 SHADOW_PIXELS = 1024
 SHADOW_SLACK = 1e-3
@@ -48,6 +52,12 @@ class Lamp:
     shadows: bool = True
     radius: float = 0.0
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+        finite_array("the lamp's position", self.position, (3,))
+        for name in ("strength", "sky", "radius"):
+            number(f"the lamp's {name}", getattr(self, name), low=0.0)
+
     def points(self) -> np.ndarray:
         """Return the points (n, 3) [m] of the disc that stand for it, each for the same area (Vogel 1979)."""
         place = finite_array("the lamp's position", self.position, (3,))
@@ -71,6 +81,11 @@ class Chequer:
     size: float
     color: Any = "black"
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+        number("size", self.size, above=0.0)
+        rgb(self.color)
+
 
 @dataclass(frozen=True, eq=False)
 class Picture:
@@ -87,34 +102,36 @@ class Picture:
 
     camera: Camera
     time: float
-    color: Any
-    depth: Any
-    ids: Any
+    color: DeviceArray
+    depth: DeviceArray
+    ids: DeviceArray
     bodies: tuple[Any, ...] = field(repr=False)
 
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"
         return f"<Picture of {size} at t = {self.time:.3f} s, {len(self.bodies)} bodies>"
 
+    def _repr_png_(self) -> bytes:
+        """Return a small PNG, of a batch its first worlds side by side."""
+        return small_png(self.color.numpy())
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the colours to a file, whose ending names the format (PNG loses nothing).
 
         Raises:
             InvalidInputError: the picture of a batch, or an ending that OpenCV cannot write.
-            OSError: the file cannot be written.
+            FileWriteError: the file cannot be written.
         """
         import cv2
 
-        colors = self.color.numpy()
+        goal, colors = file_path(path), self.color.numpy()
         if colors.ndim != 3:
             raise InvalidInputError(f"one world's picture can be saved, got those of {len(colors)}")
-        ending = FilePath(path).suffix
         try:
-            _, packed = cv2.imencode(ending, colors[..., ::-1])
+            _, packed = cv2.imencode(goal.suffix, colors[..., ::-1])
         except cv2.error as error:
             raise InvalidInputError(f"a picture's file ends in .png, .jpg or the like, got {str(path)!r}") from error
-        with replacing(path) as partial:
-            partial.write_bytes(packed.tobytes())
+        write_whole(goal, packed.tobytes())
 
     def mask(self, *bodies: Any) -> np.ndarray:
         """Return where any of the bodies, or of their names, is seen: bool (h, w), in a batch (worlds, h, w).
@@ -122,10 +139,19 @@ class Picture:
         Raises:
             UnknownNameError: a body that was not there.
         """
-        wanted = [_index(self, body) for body in bodies]
+        wanted = [body_index(self, body) for body in bodies]
         return np.isin(self.ids.numpy(), wanted)
 
+    def masks(self, *bodies: Any) -> dict[str, DeviceArray]:
+        """Return where each of some bodies, or of all, is seen: by name, bool Warp arrays of the shape of ``ids``.
 
+        Raises:
+            UnknownNameError: a body that was not there.
+        """
+        return masks_by_name(self.ids, self, bodies)
+
+
+@checked
 def take_picture(
     world: Any, camera: Camera, *, lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7),
     patterns: Mapping[Any, Chequer] | None = None, without: Iterable[Any] = (),
@@ -155,6 +181,8 @@ def take_picture(
     lamp = Lamp() if lamp is None else lamp
     samples = count("samples", samples)
     number("noise", noise, low=0.0)
+    if not hasattr(world, "lock") or not hasattr(world, "bodies"):
+        raise InvalidInputError(f"world must be a World, got {type(world).__name__}")
     with world.lock:
         drawn = _Drawn(world, camera, patterns or {}, _hidden(world, without), instead or {})
         time, bodies = world.time, tuple(world.bodies)
@@ -202,8 +230,8 @@ class _Drawn:
         instead: Mapping[Any, Sequence[Any]],
     ) -> None:  # fmt: skip
         self.device, self.worlds = world.device, int(world.world_count)
-        chequers = {_index(world, body): pattern for body, pattern in patterns.items()}
-        replaced = {_index(world, body): others for body, others in instead.items()}
+        chequers = {body_index(world, body): pattern for body, pattern in patterns.items()}
+        replaced = {body_index(world, body): others for body, others in instead.items()}
         shown = [
             (k, each) for k, body in enumerate(world.bodies) if k not in hidden for each in replaced.get(k, (body,))
         ]

@@ -7,7 +7,7 @@ arrays (``.numpy()`` copies them). Bodies that are the same in all worlds are dr
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -16,6 +16,9 @@ from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, view
 from nuno.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from nuno.numbers.device_array import DeviceArray
 
 CHUNK_BYTES = 512 * 2**20  # key images held at a time; 8,192 worlds of 320 x 240 px would be 2.5 GB at once
 # With distortion, static meshes are split until an edge spans 1/20 of its depth: for k1 = 0.3, half a metre
@@ -27,7 +30,7 @@ _MAX_SPLITS = 64  # of a mesh's extent, so that a mesh that touches the camera s
 def render_masks(
     world: Any, camera: Camera, body: Any, *, region: Region | None = None, without: Iterable[Any] = (),
     cloth_thickness: float = 0.0,
-) -> wp.array:  # fmt: skip
+) -> DeviceArray:  # fmt: skip
     """Return where a body is seen, and not hidden by another.
 
     Args:
@@ -46,7 +49,7 @@ def render_masks(
         UnknownNameError: the world has no such body.
         InvalidInputError: the region is not inside the image, or the camera's distortion cannot be drawn.
     """
-    target = _index(world, body)
+    target = body_index(world, body)
     label = [0 if k == target else 1 for k in range(len(world.bodies))]
     hidden = _hidden(world, without)
     if target in hidden:
@@ -57,7 +60,7 @@ def render_masks(
 def render_depth(
     world: Any, camera: Camera, *, region: Region | None = None, without: Iterable[Any] = (),
     cloth_thickness: float = 0.0,
-) -> wp.array:  # fmt: skip
+) -> DeviceArray:  # fmt: skip
     """Depth along the optical axis.
 
     Args:
@@ -83,7 +86,7 @@ def render_depth(
 def render_ids(
     world: Any, camera: Camera, *, region: Region | None = None, without: Iterable[Any] = (),
     cloth_thickness: float = 0.0,
-) -> wp.array:  # fmt: skip
+) -> DeviceArray:  # fmt: skip
     """Return which body is seen: its index in ``world.bodies``, -1 where nothing is.
 
     Args:
@@ -105,7 +108,12 @@ def render_ids(
     return _render(world, camera, region, label, hidden, cloth_thickness, wp.int32, raster.ids_of)
 
 
-def _index(world: Any, body: Any) -> int:
+def body_index(world: Any, body: Any) -> int:
+    """Return a body's index in ``world.bodies``; the body may be one of another world, or a name.
+
+    Raises:
+        UnknownNameError: the world has no such body.
+    """
     name = body if isinstance(body, str) else getattr(body, "name", repr(body))
     bodies = list(world.bodies)
     for k, candidate in enumerate(bodies):
@@ -118,13 +126,13 @@ def _index(world: Any, body: Any) -> int:
 
 
 def _hidden(world: Any, without: Iterable[Any]) -> set[int]:
-    return {_index(world, body) for body in without}
+    return {body_index(world, body) for body in without}
 
 
 def _render(
     world: Any, camera: Camera, region: Region | None, labels: list[int], hidden: set[int],
     cloth_thickness: float, dtype: Any, read: Callable[..., wp.array],
-) -> wp.array:  # fmt: skip
+) -> Any:  # fmt: skip
     if not isinstance(camera, Camera):
         raise InvalidInputError(f"a Camera is needed to draw with, got {type(camera).__name__}")
     region = Region.full(camera) if region is None else region

@@ -8,6 +8,7 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError
+from nuno.validation import check_fields
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Table:
     thickness: float = 0.04
 
     def __post_init__(self) -> None:
+        check_fields(self)
         numbers = [self.height, self.thickness, *(self.half_extents or ()), *(self.centre or ())]
         if not np.isfinite(np.asarray(numbers, dtype=float)).all():
             raise InvalidInputError(f"a table's numbers must be finite, got {self}")

@@ -15,7 +15,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.pick import estimate_pick
 from nuno.estimate.pick_result import PickResult
-from nuno.validation import finite_array
+from nuno.validation import check_fields, checked, finite_array
 
 NEEDED = ("camera", "image_before", "image_after", "table_height_m", "hand_position_m")
 
@@ -44,6 +44,9 @@ class PickCase:
     table_centre: tuple[float, float] | None
     table_thickness: float
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def __repr__(self) -> str:
         size = f"{self.camera.width} x {self.camera.height} px"
         return f"<PickCase: two images of {size}, table at {self.table_height:g} m, hand at {self.hand} m>"
@@ -57,6 +60,7 @@ class PickCase:
         )  # fmt: skip
 
 
+@checked
 def read_case(folder: str | os.PathLike[str]) -> PickCase:
     """Read input.json of a folder and the two images that it names; nothing else there is opened.
 

@@ -19,10 +19,11 @@ from nuno.estimate.futures import LIFT_SECONDS, SETTLE_SECONDS, is_turned
 from nuno.estimate.hand_sight import disc
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.seeing import HAND_MARGIN
+from nuno.files.html_table import html_table
 from nuno.materials import Cloth
 from nuno.search.minimise import Minimum, minimise
 from nuno.shapes.path import Path
-from nuno.validation import count, finite_array, number
+from nuno.validation import checked, count, finite_array, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -72,7 +73,15 @@ class MaterialFit:
     minimum: Minimum = field(repr=False)
     warnings: list[str] = field(default_factory=list)
 
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, f"{value:.3g}", "{:.3g} to {:.3g}".format(*self.ranges[name])) for name, value in self.params.items()
+        ]
+        title = f"MaterialFit: nearest to {self.name}, {self.distance:.2f} px off, overlap {self.overlap:.3f}"
+        return html_table(title, rows, columns=("parameter", "value", "range"), notes=self.warnings)
 
+
+@checked
 def fit_material(
     seen: Footage | FoldCase | FoldResult | PickCase,
     *,

@@ -31,7 +31,7 @@ from nuno.estimate.hypotheses import cell_counts
 from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.materials import Cloth
-from nuno.validation import count, finite_array, number
+from nuno.validation import checked, count, finite_array, number
 from nuno.world.device import checked_device, found_device
 from nuno.world.progress import with_bar
 
@@ -60,6 +60,7 @@ Picture = ArrayLike | str | FilePath
 
 
 @compiling_watched()
+@checked
 def replay_fold(
     first_image: Picture | None,
     hands: Sequence[HandPath],

@@ -17,7 +17,7 @@ from nuno.estimate.case_file import read_case_file, read_table
 from nuno.estimate.fold import replay_fold
 from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.hand_path import HandPath
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 NEEDED = ("camera", "table_height_m", "frames")
 NEEDED_OF_A_FRAME = ("t", "hands_m", "held")
@@ -64,6 +64,7 @@ class FoldCase:
         )  # fmt: skip
 
 
+@checked
 def read_fold_case(folder: str | os.PathLike[str]) -> FoldCase:
     """Read input.json of a folder and the images that its frames name; nothing else there is opened.
 

@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,9 @@ from nuno.estimate.fold_view import CLOTH_COLOUR, hand_spheres
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.imagined_fold import ImaginedFold
 from nuno.estimate.layers import Layers, find_layers
+from nuno.files.html_table import html_table
 from nuno.files.recording import RecordedBody, Recording
+from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.materials import Cloth
 
 if TYPE_CHECKING:
@@ -83,6 +84,12 @@ class FoldResult:
         rated = f", agreement {np.mean(agreement):.3f}" if agreement else ""
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
         return f"<FoldResult: {len(self.times)} frames as {self.material_name}{rated}{odd}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(name, f"{score:.3f}") for name, score in self.scores.items()]
+        title = f"FoldResult: {len(self.times)} frames as {self.material_name}"
+        columns = ("material", "mean overlap") if rows else ()
+        return html_table(title, rows, columns=columns, notes=self.warnings, figure=self.figure())
 
     @property
     def final(self) -> np.ndarray:
@@ -183,25 +190,28 @@ class FoldResult:
             folder: Where.
             names: What stands for NNN by frame; None names all frames by their number.
             pictures: Whether to draw pictures.
+
+        Raises:
+            FileWriteError: the folder or a file in it cannot be written.
         """
         import cv2
 
-        folder = FilePath(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = made_folder(folder)
         chosen = {k: f"{k:03d}" for k in range(len(self.times))} if names is None else names
         for k, name in chosen.items():
             encoded = cv2.imencode(".png", self.masks[k].astype(np.uint8) * 255)[1]
-            (folder / f"mask_{name}.png").write_bytes(encoded.tobytes())
-        np.savez_compressed(folder / "final.npz", vertices=self.final, faces=self.faces)
+            write_whole(folder / f"mask_{name}.png", encoded.tobytes())
+        with replacing(folder / "final.npz") as partial, open(partial, "wb") as stream:
+            np.savez_compressed(stream, vertices=self.final, faces=self.faces)
         recording = self.recording()
         recording.save(folder / "replay.npz")
         recording.export(folder / "replay.glb")
         if pictures:
-            self.figure().savefig(folder / "strip.png", dpi=110)
-            self.layers.figure().savefig(folder / "layers.png", dpi=110)
-            self.hands_figure().savefig(folder / "hands.png", dpi=110)
+            write_figure(folder / "strip.png", self.figure())
+            write_figure(folder / "layers.png", self.layers.figure())
+            write_figure(folder / "hands.png", self.hands_figure())
         text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
-        (folder / "result.json").write_text(text + "\n", encoding="utf-8")
+        write_whole(folder / "result.json", text + "\n")
 
 
 def _number(value: float) -> float | None:

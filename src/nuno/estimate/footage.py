@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike
 
 from nuno.camera import raster
 from nuno.camera.camera import Camera
@@ -23,7 +24,7 @@ from nuno.estimate.hand_sight import disc
 from nuno.estimate.imagined_fold import imagine_fold
 from nuno.estimate.similarity import Silhouette, score_masks
 from nuno.materials import Cloth
-from nuno.validation import finite_array, number
+from nuno.validation import check_fields, finite_array, number
 from nuno.world.world import World
 
 Scores = dict[str, np.ndarray]
@@ -58,11 +59,24 @@ class Footage:
     ignored: Sequence[np.ndarray] | np.ndarray | None = None
     drawn_thickness: float = DRAWN_THICKNESS
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, world: World, cloth: str, move: Callable[[World], Any], camera: Camera, times: ArrayLike,
+            masks: Sequence[ArrayLike] | ArrayLike, ignored: Sequence[ArrayLike] | ArrayLike | None = None,
+            drawn_thickness: float = DRAWN_THICKNESS,
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
+        check_fields(self)
         number("drawn_thickness", self.drawn_thickness, low=0.0)
         times = finite_array("times", self.times, ("k",))
         if (np.diff(times) <= 0.0).any() or times[0] < self.world.time:
             raise InvalidInputError(f"times must increase from the world's {self.world.time:g} s on")
+        for name in ("masks", "ignored"):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, Sequence | np.ndarray):
+                raise InvalidInputError(f"{name} must be images, one for each time, got {getattr(self, name)!r}")
         if len(self.masks) != len(times):
             raise InvalidInputError(f"there must be a mask for each of {len(times)} times, got {len(self.masks)}")
         if self.ignored is not None and len(self.ignored) != len(times):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array
+from nuno.validation import as_array, checked, finite_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,12 @@ class HandPath:
     positions: np.ndarray
     held: np.ndarray
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, times: ArrayLike, positions: ArrayLike, held: ArrayLike,
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
         times = finite_array("a hand's times", self.times, ("k",))
         later = np.diff(times)
@@ -37,7 +44,7 @@ class HandPath:
                 f"a hand's times must increase; number {k + 1} is {times[k + 1]} s, after {times[k]} s"
             )
         positions = finite_array("a hand's positions", self.positions, (len(times), 3))
-        held = np.asarray(self.held)
+        held = as_array("held", self.held)
         if held.shape != times.shape or held.dtype != bool:
             raise InvalidInputError(
                 f"held must be bool of shape ({len(times)},), one for each time, got {held.dtype} of shape {held.shape}"
@@ -62,11 +69,13 @@ class HandPath:
             ends.append(np.inf)
         return [(float(a), float(b)) for a, b in zip(begins, ends, strict=True)]
 
+    @checked
     def at(self, time: ArrayLike) -> np.ndarray:
         """Return positions (..., 3) [m] at ``time`` (...) [s]; before the first and after the last it rests."""
         when = np.asarray(time, dtype=float)
         return np.stack([np.interp(when, self.times, self.positions[:, axis]) for axis in range(3)], axis=-1)
 
+    @checked
     def holds_at(self, time: float) -> bool:
         """Return True if it holds at ``time`` [s]."""
         return any(begin <= time < end for begin, end in self.holds)

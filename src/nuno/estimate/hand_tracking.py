@@ -16,7 +16,7 @@ from nuno.camera.image import check_image, read_image
 from nuno.errors import InvalidInputError
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hand_sight import CORE, disc
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +53,7 @@ class HandTrack:
     found: np.ndarray
     gaps: tuple[tuple[float, float], ...]
 
+    @checked
     def path(self, held: ArrayLike) -> HandPath:
         """Return the path for a replay; ``held`` (k,) bool says when the hand held."""
         return HandPath(self.times, self.positions, np.asarray(held))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, index_array, number
+from nuno.files.html_table import html_table
+from nuno.validation import checked, finite_array, index_array, number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +47,7 @@ class Layers:
         cell = (self.x[1] - self.x[0]) * (self.y[1] - self.y[0])
         return [float((self.count == n).sum() * cell) for n in range(1, self.height.shape[-1] + 1)]
 
+    @checked
     def over(self, u: float, v: float) -> list[tuple[float, float]]:
         """Return the points (u, v) of the cloth that lie over the point (u, v), the top one first.
 
@@ -54,6 +56,10 @@ class Layers:
         away = np.linalg.norm(self.material - (u, v), axis=-1)
         row, column, layer = np.unravel_index(np.nanargmin(away), away.shape)
         return [(float(a), float(b)) for a, b in self.material[row, column, :layer]]
+
+    def _repr_html_(self) -> str:
+        rows = [(n, f"{1e4 * area:.1f}") for n, area in enumerate(self.area, 1)]
+        return html_table("Layers", rows, columns=("layers", "area [cm2]"), figure=self.figure())
 
     def figure(self) -> Figure:
         """Two maps: how many layers lie where, from above; and, on the cloth spread flat, how deep each part lies."""
@@ -99,7 +105,7 @@ def find_layers(vertices: np.ndarray, faces: np.ndarray, fractions: np.ndarray, 
     points = finite_array("vertices", vertices, ("n", 3))
     triangles = index_array("faces", faces, ("m", 3), low=0, high=len(points))
     uv = finite_array("fractions", fractions, (len(points), 2))
-    width = number("step", step, above=0.0)
+    width = number("step", step, low=1e-6)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     x, y = (np.arange(a - 1.5 * width, b + 2.5 * width, width) for a, b in zip(low, high, strict=True))
     if len(x) * len(y) > 4_000_000:

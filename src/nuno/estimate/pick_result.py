@@ -6,7 +6,6 @@ import json
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,8 @@ from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.ranking import confidence, probabilities
 from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
+from nuno.files.html_table import html_table
+from nuno.files.whole_file import made_folder, write_figure, write_whole
 from nuno.shapes.shape import Plane
 
 if TYPE_CHECKING:
@@ -83,6 +84,17 @@ class PickResult:
     def __repr__(self) -> str:
         odd = f", {len(self.warnings)} warnings" if self.warnings else ""
         return f"<PickResult: {self.best} of {len(self.labels)}, confidence {self.confidence:.2f}{odd}>"
+
+    def _repr_html_(self) -> str:
+        likely = self.probabilities
+        rows = [
+            (self._label(int(k)), f"{self.scores[k]:.4g}", "" if likely is None else f"{likely[k]:.3f}")
+            for k in self.order[:5]
+        ]
+        title = f"PickResult: {self.best} of {len(self.labels)}, confidence {self.confidence:.2f}"
+        columns = ("candidate", self.score_name.replace("_", " "), "probability")
+        seen = self.image_before is not None
+        return html_table(title, rows, columns=columns, notes=self.warnings, figure=self.figure() if seen else None)
 
     @property
     def best(self) -> tuple[Any, Any]:
@@ -186,13 +198,16 @@ class PickResult:
         return contact_sheet(self)
 
     def save(self, folder: str | os.PathLike[str], *, picture: bool = True) -> None:
-        """Write result.json, and result.png where ``picture`` is set, into a folder that is made if need be."""
-        folder = FilePath(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "result.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        """Write result.json, and result.png where ``picture`` is set, into a folder that is made if need be.
+
+        Raises:
+            FileWriteError: the folder or a file in it cannot be written.
+        """
+        folder = made_folder(folder)
+        write_whole(folder / "result.json", json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
         if picture:
             # packed no harder than is quick: a third larger, in a third of the time
-            self.figure().savefig(folder / "result.png", dpi=110, pil_kwargs={"compress_level": 1})
+            write_figure(folder / "result.png", self.figure(), pil_kwargs={"compress_level": 1})
 
     def _label(self, k: int) -> tuple[Any, Any]:
         a, b = self.labels[k]

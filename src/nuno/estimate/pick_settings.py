@@ -79,8 +79,10 @@ def check_settings(
     number("sure", sure, above=0.0, high=1.0)
     if sideways is not None:
         number("sideways", sideways, above=0.0)
-    if score not in RANKINGS:
+    if not isinstance(score, str) or score not in RANKINGS:
         raise InvalidInputError(f"score must be one of {', '.join(RANKINGS)}, got {score!r}")
+    if not isinstance(discretisations, Sequence) or not all(isinstance(d, Discretisation) for d in discretisations):
+        raise InvalidInputError(f"discretisations must be a sequence of Discretisation, got {discretisations!r}")
     if not discretisations or discretisations[0].best is not None:
         raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
     angles = checked_turns(turns)

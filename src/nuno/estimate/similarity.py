@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
 from nuno.errors import InvalidInputError, UnknownNameError
+from nuno.estimate.mask_threshold import cut, images_of, is_real
 
 wp.set_module_options({"enable_backward": False})
 
@@ -343,44 +344,51 @@ def _from_sums(sums: np.ndarray, real: Silhouette, with_contour: bool) -> dict[s
 
 
 def similarity(
-    masks: ArrayLike | wp.array,
-    real_mask: ArrayLike | Silhouette,
-    score: str = "eq1",
-    *,
-    ignore: ArrayLike | None = None,
-) -> Any:
+    masks: ArrayLike | wp.array, real_mask: ArrayLike | Silhouette, score: str = "eq1", *,
+    ignore: ArrayLike | None = None, threshold: float | None = None,
+) -> Any:  # fmt: skip
     """Return how alike masks are to a real mask.
 
     With S the simulated and R the real mask, N the number of pixels that are not ignored, and d the distance
     [px] to the nearest pixel of the other contour:
 
     - "eq1" = (``|S and R|`` + ``|not S and not R|``) / N, the paper's eq. (1); 0 to 1, higher is better;
-    - "iou" = ``|S and R|`` / ``|S or R|``; 1 if both are empty;
+    - "iou" = ``|S and R|`` / ``|S or R|``;
     - "chamfer" = (mean of d over S's contour + mean of d over R's contour) / 2 [px], lower is better.
 
     Args:
-        masks: (worlds, h, w), or one mask (h, w): a NumPy array of bool or numbers of which the non-zero are
-            the mask, or a Warp array of bool or uint8.
+        masks: (worlds, h, w) or (h, w): NumPy of bool or whole numbers (non-zero is in), Warp of bool or uint8.
         real_mask: (h, w) likewise, or a prepared `Silhouette`.
         score: "eq1", "iou", "chamfer", or "all".
-        ignore: (h, w) pixels that do not count; not together with a Silhouette, which has its own.
+        ignore: (h, w) pixels that do not count, bool or whole numbers; a Silhouette has its own.
+        threshold: Where masks of real numbers, such as probabilities, are cut: what is above it is in the mask.
 
     Returns:
         (worlds,) float64, or a float for one mask; for "all", a dict of these by name.
 
     Raises:
         UnknownNameError: there is no such score.
-        InvalidInputError: shapes or types do not fit.
+        InvalidInputError: shapes or types do not fit, the real mask is empty, or masks of real numbers without a
+            threshold.
     """
-    if score not in (*SCORES, "all"):
+    if not isinstance(score, str) or score not in (*SCORES, "all"):
         raise UnknownNameError("score", score, [*SCORES, "all"])
+    batch = masks if isinstance(masks, wp.array) else images_of(masks, "masks")
+    has_real = is_real(batch)
     if isinstance(real_mask, Silhouette):
         if ignore is not None:
             raise InvalidInputError("a Silhouette carries its own ignore mask; pass ignore= to Silhouette instead")
         real = real_mask
     else:
-        real = Silhouette(real_mask, ignore)
-    batch = masks if isinstance(masks, wp.array) else np.asarray(masks)
+        given = images_of(real_mask, "real_mask")
+        has_real = has_real or is_real(given)
+        outside = None if ignore is None else cut(images_of(ignore, "ignore"), None, "ignore")
+        real = Silhouette(cut(given, threshold, "real_mask"), outside)
+    if threshold is not None and not has_real:
+        raise InvalidInputError("threshold is for masks of real numbers; these are bool or whole numbers")
+    if not real.mask.any():
+        raise InvalidInputError("the real mask is empty: there is nothing that masks could be alike to")
+    batch = cut(batch, threshold, "masks")
     if isinstance(batch, wp.array) and batch.dtype not in (wp.bool, wp.uint8):
         raise InvalidInputError(f"masks on a device must be bool or uint8, got {batch.dtype.__name__}")
     single = batch.ndim == 2

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
+from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import rgb
+from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -35,6 +37,7 @@ def to_trimesh(body: Body, world: int | None = None) -> Any:
     return trimesh.Trimesh(points, faces, vertex_colors=np.tile(color, (len(points), 1)), process=False)
 
 
+@checked
 def export_body(path: str | os.PathLike[str], body: Body, world: int | None = None) -> None:
     """Write a body's surface as it is now to a mesh file; a file that is there is replaced.
 
@@ -47,11 +50,12 @@ def export_body(path: str | os.PathLike[str], body: Body, world: int | None = No
         world: Which world of a batch; None for a single world.
 
     Raises:
-        InvalidInputError: another extension, a batch without ``world``, or out of range.
+        InvalidInputError: no body, another extension, a batch without ``world``, or out of range.
+        FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
     """
-    goal = FilePath(path)
+    goal = file_path(path)
     check_extension(goal, *EXTENSIONS)
-    to_trimesh(body, world).export(goal)
+    write_whole(goal, to_trimesh(body, world).export(file_type=goal.suffix[1:].lower()))
 
 
 def check_extension(path: FilePath, *extensions: str) -> None:

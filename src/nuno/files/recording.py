@@ -15,10 +15,11 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, UnknownNameError
 from nuno.files.export import check_extension, one_world
-from nuno.files.whole_file import replacing
+from nuno.files.html_table import html_table
+from nuno.files.whole_file import file_path, replacing, write_whole
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.soft_shape import SoftShape
-from nuno.validation import count, finite_array, index_array, number
+from nuno.validation import checked, count, finite_array, index_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -27,7 +28,17 @@ if TYPE_CHECKING:
 FORMAT, VERSION = "nuno-recording", 1
 UNITS = {"length": "m", "time": "s", "up": "+z"}
 # What NumPy and JSON raise over a file that is none of theirs, or damaged
-UNREADABLE = (OSError, ValueError, KeyError, TypeError, EOFError, IndexError, AttributeError, zipfile.BadZipFile)
+UNREADABLE = (
+    OSError,
+    MemoryError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    IndexError,
+    AttributeError,
+    zipfile.BadZipFile,
+)
 ARRAYS = ("vertices", "faces", "skin_corners", "skin_weights")
 
 
@@ -75,6 +86,10 @@ class Recording:
     """
 
     def __init__(self, world: World, bodies: Iterable[Body | str] | None = None) -> None:
+        if not hasattr(world, "_own"):
+            raise InvalidInputError(f"a recording needs a World, got {type(world).__name__}")
+        if isinstance(bodies, str) or not isinstance(bodies, Iterable | None):
+            raise InvalidInputError(f"bodies must be a sequence of bodies or names, or None, got {bodies!r}")
         chosen = list(world.bodies) if bodies is None else [world._own(body) for body in bodies]
         if not chosen:
             raise InvalidInputError("a recording needs at least one body")
@@ -85,6 +100,7 @@ class Recording:
         self._loaded: tuple[RecordedBody, ...] = ()
 
     @classmethod
+    @checked
     def of(cls, world: World, seconds: float, bodies: Iterable[Body | str] | None = None) -> Recording:
         """Run a world and return a recording of how it is now and after each frame.
 
@@ -103,6 +119,7 @@ class Recording:
         return recording
 
     @classmethod
+    @checked
     def from_frames(cls, times: ArrayLike, bodies: Iterable[RecordedBody]) -> Recording:
         """Return a recording of frames that are known, without a world.
 
@@ -130,6 +147,15 @@ class Recording:
 
     def __repr__(self) -> str:
         return f"<Recording of {len(self._times)} frames, {', '.join(body.name for body in self.bodies)}>"
+
+    def _repr_html_(self) -> str:
+        span = f", t = {self._times[0]:.3f} to {self._times[-1]:.3f} s" if self._times else ""
+        rows = []
+        for body in self.bodies if self._times else ():
+            moves = np.ptp(body.vertices, axis=0).any()
+            rows.append((body.name, body.vertices.shape[-2], len(body.faces), "yes" if moves else "no"))
+        columns = ("body", "vertices", "triangles", "moves")
+        return html_table(f"Recording of {len(self._times)} frames{span}", rows, columns=columns if rows else ())
 
     def __getitem__(self, name: str) -> RecordedBody:
         found = next((body for body in self.bodies if body.name == name), None)
@@ -180,6 +206,7 @@ class Recording:
 
         Raises:
             InvalidInputError: the recording is empty, or the path does not end with .npz.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
         goal = self._goal(path, ".npz")
         arrays: dict[str, np.ndarray] = {"times": self.times}
@@ -194,6 +221,7 @@ class Recording:
         with replacing(goal) as partial, open(partial, "wb") as stream:
             np.savez_compressed(stream, header=np.array(header), **arrays)  # type: ignore[arg-type]
 
+    @checked
     def export(self, path: str | os.PathLike[str], *, world: int | None = None, every: int = 1) -> None:
         """Write the recording as an animation, .glb, that other programs show; a file that is there is replaced.
 
@@ -206,6 +234,7 @@ class Recording:
 
         Raises:
             InvalidInputError: the recording is empty, the path does not end with .glb, or a batch without ``world``.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
         from nuno.files.glb import MovingMesh, glb_bytes
 
@@ -216,10 +245,10 @@ class Recording:
             for body in self.bodies
         ]
         written = glb_bytes(meshes, (self.times - self.times[0])[::step])
-        with replacing(goal) as partial:
-            partial.write_bytes(written)
+        write_whole(goal, written)
 
     @classmethod
+    @checked
     def load(cls, path: str | os.PathLike[str]) -> Recording:
         """Return a recording that ``save`` wrote.
 
@@ -252,7 +281,7 @@ class Recording:
         return recording
 
     def _goal(self, path: str | os.PathLike[str], extension: str) -> FilePath:
-        goal = FilePath(path)
+        goal = file_path(path)
         check_extension(goal, extension)
         if not self._times:
             raise InvalidInputError("the recording is empty; add a frame first")

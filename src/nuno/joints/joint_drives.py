@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array
+from nuno.validation import as_array, finite_array
 
 DRIVES = (
     "lower", "upper", "friction", "stiffness", "damping", "position", "velocity", "max_effort", "spring", "rest",
@@ -18,13 +18,18 @@ DRIVES = (
 """Numbers of a drive along the free direction, in the solver's order."""
 
 
+SLACK = 1e-6
+"""[N m s/rad] or [N s/m] Damping of a motor that has none, by which it exerts an effort."""
+
+
 @dataclass(frozen=True, eq=False)
 class Motor:
     """A motor of a hinge or slider; each value is a number or (worlds,).
 
     Without ``position`` it turns or slides at ``velocity``: exactly, as long as that takes no more than
     ``max_effort``, or with ``damping`` as a gain. With ``position`` its effort is ``stiffness`` times what is missing,
-    less ``damping`` times what the velocity is over ``velocity``.
+    less ``damping`` times what the velocity is over ``velocity``, and ``effort`` besides; ``effort`` alone is a motor
+    under torque or force control.
 
     Attributes:
         velocity: [rad/s] or [m/s].
@@ -32,9 +37,11 @@ class Motor:
         stiffness: [N m/rad] or [N/m], with ``position`` only.
         damping: [N m s/rad] or [N s/m]; None is 0 with ``position``, else endless.
         max_effort: [N m] or [N].
+        effort: Besides what the gains ask for [N m] or [N]; not with a velocity that is kept exactly.
 
     Raises:
-        InvalidInputError: a gain or effort that is negative, a position without stiffness, or stiffness without one.
+        InvalidInputError: a gain or limit that is negative, an effort that nothing can add to, a position without
+            stiffness, or stiffness without one.
     """
 
     velocity: Any = 0.0
@@ -42,6 +49,7 @@ class Motor:
     stiffness: Any = 0.0
     damping: Any = None
     max_effort: Any = math.inf
+    effort: Any = 0.0
 
     def __post_init__(self) -> None:
         _checked("velocity", self.velocity)
@@ -49,7 +57,10 @@ class Motor:
         if self.damping is not None:
             _checked("damping", self.damping, low=0.0)
         _checked("max_effort", self.max_effort, low=0.0, endless=True)
+        _checked("effort", self.effort)
         if self.position is None:
+            if np.any(self.effort) and self.damping is None and np.any(self.velocity):
+                raise InvalidInputError("a motor with an effort keeps no velocity exactly; give it a damping")
             if np.any(stiffness > 0.0):
                 raise InvalidInputError("a motor's stiffness needs the position that it pulls to")
         else:
@@ -94,7 +105,7 @@ def drive_table(worlds: int, values: dict[str, Any], before: np.ndarray | None =
 
 
 def _checked(name: str, value: Any, *, low: float = -np.inf, endless: bool = False) -> np.ndarray:
-    if endless and np.ndim(value) == 0 and value == np.inf:
+    if endless and as_array(name, value).ndim == 0 and value == np.inf:
         return np.array(np.inf)
     checked = finite_array(name, value, (), ("worlds",))
     if (checked < low).any():
@@ -152,11 +163,19 @@ def motor_drives(kind: str, value: Motor | None) -> dict[str, Any]:
         raise InvalidInputError(f"a {kind} joint has no motor; a hinge or a slider may have one")
     if not isinstance(value, Motor):
         raise InvalidInputError(f"motor must be a Motor or None, got {type(value).__name__}")
-    free = value.position is None
+    free, effort = value.position is None, np.asarray(value.effort, dtype=float)
     damping = (math.inf if free else 0.0) if value.damping is None else value.damping
+    position, velocity = 0.0 if free else value.position, value.velocity
+    if effort.any():
+        # what the gains make of a wish so much further
+        if free:
+            damping = np.maximum(SLACK, 0.0 if value.damping is None else value.damping)
+            velocity = velocity + effort / damping
+        else:
+            position = position + effort / value.stiffness
     return {
-        "stiffness": value.stiffness, "damping": damping, "position": 0.0 if free else value.position,
-        "velocity": value.velocity, "max_effort": value.max_effort,
+        "stiffness": value.stiffness, "damping": damping, "position": position, "velocity": velocity,
+        "max_effort": value.max_effort,
     }  # fmt: skip
 
 

@@ -75,7 +75,7 @@ def merge_spec(spec: Any, other: Any, at: WorldRows, name: str, end: Callable[[G
         raise BodyStateError(f"the grip on {name!r} holds it in another way than in the snapshot")
     timed = isinstance(spec, GripSpec | HoldSpec)
     if timed:
-        spec, other = _with_equal_times(spec, other, at, name, end)
+        spec, other = _on_one_clock(spec, other, at, name, end)
     changed = {}
     for item in fields(spec):
         own, theirs = getattr(spec, item.name), getattr(other, item.name)
@@ -116,7 +116,7 @@ def merge_path(
         place, turn = (at.merged(own, theirs, 1)[..., None, :] for own, theirs in zip(pose, there, strict=True))
         return Path(path.times[-1:], place, None if path.quaternions is None else turn)
     if path is not None and other is not None and under_way and other_under_way:
-        if not _same_times(path.times, other.times) or path.interpolation != other.interpolation:
+        if not _clocks_agree(path.times, other.times) or path.interpolation != other.interpolation:
             raise BodyStateError(_under_way(f"the path of {name!r}"))
     lead: Any = path if under_way else other
     turns = any(p is not None and p.quaternions is not None for p in (path, other))
@@ -138,7 +138,7 @@ def _keys(path: Path | None, rest: tuple[np.ndarray, np.ndarray], count: int) ->
     return [path.positions, still[1] if path.quaternions is None else path.quaternions]
 
 
-def _same_times(a: np.ndarray, b: np.ndarray) -> bool:
+def _clocks_agree(a: np.ndarray, b: np.ndarray) -> bool:
     return len(a) == len(b) and bool(np.abs(a - b).max() < SOON)
 
 
@@ -149,10 +149,10 @@ def _under_way(what: str) -> str:
     )
 
 
-def _with_equal_times(
+def _on_one_clock(
     spec: Any, other: Any, at: WorldRows, name: str, end: Callable[[GripSpec], np.ndarray] | None
 ) -> tuple[Any, Any]:
-    if _same_times(spec.times, other.times) and spec.interpolation == other.interpolation:
+    if _clocks_agree(spec.times, other.times) and spec.interpolation == other.interpolation:
         return spec, other
     ended, other_ended = (s.times[-1] <= at.time + SOON for s in (spec, other))
     if other_ended:

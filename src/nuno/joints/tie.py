@@ -13,7 +13,7 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 from nuno.shapes.path import Path
 from nuno.shapes.surface import chosen_points, closest_points
-from nuno.validation import finite_array
+from nuno.validation import as_array, finite_array
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -108,7 +108,7 @@ def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
         InvalidInputError: a limit that is not positive, or of another shape.
     """
     if asked is not None:
-        if np.shape(asked) == () and asked == np.inf:
+        if as_array("max_force", asked).shape == () and asked == np.inf:
             return np.full(worlds, np.inf)
         limit = np.broadcast_to(finite_array("max_force", asked, (), (worlds,)), (worlds,)).copy()
         if (limit <= 0.0).any():

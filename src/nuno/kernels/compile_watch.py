@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import logging
-import re
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-log = logging.getLogger(__name__)
+from nuno.kernels.quiet import LOADED, LOGGED_AFTER, quiet_warp
 
-LOADED = re.compile(r"Module (\S+) .*took ([\d.]+) ms +\((compiled|cached)\)")
-LOGGED_AFTER = 2.0
-"""[s] What is quicker is not worth a word."""
+log = logging.getLogger(__name__)
 
 _here = threading.local()
 _lock = threading.Lock()
@@ -48,11 +45,11 @@ class Stages:
 def compiling_watched() -> Iterator[None]:
     """Count the seconds for which this thread loads and compiles kernels, and log a warning that names what took long.
 
-    Warp says it to its logger, which gets what it would have got without. Where Warp says it on standard output itself,
-    nothing is logged.
+    Warp says it to its logger, which gets what it would have got without. Where that logger says it, nothing is logged.
     """
     import warp as wp
 
+    quiet_warp()
     global _watch
     with _lock:
         if _watch is None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import logging
+import re
 from typing import Any
 
-from nuno.kernels.compile_watch import LOADED, LOGGED_AFTER
-
 log = logging.getLogger(__name__)
+
+LOADED = re.compile(r"Module (\S+) .*took ([\d.]+) ms +\((compiled|cached)\)")
+LOGGED_AFTER = 2.0
+"""[s] What is quicker is not worth a word."""
 
 
 def quiet_warp() -> None:

@@ -10,12 +10,13 @@ from scipy.spatial import cKDTree
 
 from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
-from nuno.mesh.lattice import CLOSE, divided_box, whole_fraction
+from nuno.mesh.lattice import CLOSE, divided_box, triangles_of, whole_fraction
 from nuno.mesh.nearest import NearestOn
 from nuno.mesh.relaxed import relaxed
 from nuno.mesh.surface_targets import surface_targets
 from nuno.mesh.tetrahedra import FACES, Tetrahedra, boundary_faces, volumes, voxel_tetrahedra
 from nuno.mesh.voxel_occupancy import inside_nodes
+from nuno.validation import checked
 
 FLAT = 0.35
 """Of its volume in the lattice: what a tetrahedron must keep that has all its corners on the surface."""
@@ -35,6 +36,7 @@ class UnresolvedMeshError(MeshError):
     """The lattice is too coarse to be fitted to a mesh."""
 
 
+@checked
 def fitted_tetrahedra(
     vertices: np.ndarray, faces: np.ndarray, cell: float, skin: tuple[np.ndarray, np.ndarray] | None = None,
     mean: tuple[float, float, float] | None = None,
@@ -63,6 +65,8 @@ def fitted_tetrahedra(
         MeshError: too many voxels, or the mesh overlaps itself.
         UnresolvedMeshError: the mesh has parts that the lattice is too coarse for.
     """
+    vertices, faces = triangles_of("vertices", vertices, faces)
+    skin = None if skin is None else triangles_of("skin", *skin)
     low, edges, cells = divided_box(vertices, cell)
     points = (vertices - low) / edges
     fraction = whole_fraction(points, faces, cells)

@@ -8,12 +8,14 @@ from nuno.errors import MeshError
 from nuno.mesh.closed import enclosed_volume
 from nuno.mesh.tetrahedra import Tetrahedra, volumes, voxel_tetrahedra
 from nuno.mesh.voxel_occupancy import filled_fraction
+from nuno.validation import checked, finite_array, index_array
 
 FLOOR = 0.1  # least fraction: a softer and lighter voxel would ask for smaller steps than all others
 MAX_VOXELS = 2_000_000  # ten million tetrahedra: more takes gigabytes, and the size was a slip
 CLOSE = 1e-6  # in edges of a voxel: what is nearer to a voxel's face is on it
 
 
+@checked
 def lattice_tetrahedra(
     vertices: np.ndarray, faces: np.ndarray, cell: float, skin: tuple[np.ndarray, np.ndarray] | None = None
 ) -> Tetrahedra:
@@ -36,6 +38,8 @@ def lattice_tetrahedra(
     Raises:
         MeshError: too many voxels, or the mesh overlaps itself.
     """
+    vertices, faces = triangles_of("vertices", vertices, faces)
+    skin = None if skin is None else triangles_of("skin", *skin)
     low, edges, cells = divided_box(vertices, cell)
     points = (vertices - low) / edges
     fraction = whole_fraction(points, faces, cells)
@@ -57,6 +61,16 @@ def lattice_tetrahedra(
     home, weights = _embedding(drawn[0], which, voxels, lattice, tets)
     triangles = np.array(drawn[1], dtype=np.int32)
     return Tetrahedra(low + lattice * edges, tets, share, triangles, home, weights)
+
+
+def triangles_of(name: str, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (n, 3) float64 and faces (m, 3) int32.
+
+    Raises:
+        MeshError: of other shapes, not finite, or faces of vertices that there are not.
+    """
+    points = finite_array(name, vertices, ("n", 3), error=MeshError)
+    return points, index_array(f"faces of {name}", faces, ("m", 3), low=0, high=len(points), error=MeshError)
 
 
 def divided_box(vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray, tuple[int, int, int]]:

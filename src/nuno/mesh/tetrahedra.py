@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.errors import MeshError
+from nuno.validation import MAX_INDEX, checked, finite_array, index_array
+
 # The corner of a voxel at (x, y, z) in {0, 1} has the number x + 2 y + 4 z. A voxel's four outer tetrahedra stand on
 # every other corner, about the fifth; in the neighbours, which have the other corners, the diagonals of the common face
 # agree.
@@ -51,6 +54,7 @@ class Tetrahedra:
         return np.einsum("kc,...kcx->...kx", self.skin_weights, corners)
 
 
+@checked
 def box_tetrahedra(size: tuple[float, float, float], cells: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return a box about the origin as five tetrahedra per voxel.
 
@@ -61,8 +65,14 @@ def box_tetrahedra(size: tuple[float, float, float], cells: tuple[int, int, int]
     Returns:
         vertices (n, 3) float64 [m], vertex (i, j, k) at (k (ny + 1) + j) (nx + 1) + i, and tets (m, 4) int32, those of
         voxel (i, j, k) from 5 ((k ny + j) nx + i).
+
+    Raises:
+        MeshError: sizes that are not positive and finite, or fewer than one voxel.
     """
-    axes = [(np.arange(n + 1) / n - 0.5) * edge for n, edge in zip(cells, size, strict=True)]
+    edges = finite_array("size", size, (3,), error=MeshError)
+    if edges.min() <= 0.0 or min(cells) < 1:
+        raise MeshError(f"a box needs positive edges and one voxel or more along each, got {size} and {cells}")
+    axes = [(np.arange(n + 1) / n - 0.5) * edge for n, edge in zip(cells, edges.tolist(), strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     vertices = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     k, j, i = (index.ravel() for index in np.indices(cells[::-1]))
@@ -78,6 +88,7 @@ def voxel_tetrahedra(voxels: np.ndarray, cells: tuple[int, int, int]) -> np.ndar
     return (first[:, None, None] + offset[FIVE[voxels.sum(axis=1) % 2]]).reshape(-1, 4)
 
 
+@checked
 def boundary_faces(tets: np.ndarray) -> np.ndarray:
     """Return the faces of the boundary: those that belong to one tetrahedron only.
 
@@ -86,8 +97,11 @@ def boundary_faces(tets: np.ndarray) -> np.ndarray:
 
     Returns:
         (f, 3) int32, counterclockwise from outside.
+
+    Raises:
+        MeshError: no tetrahedra.
     """
-    return boundary_by_element(tets)[0]
+    return boundary_by_element(index_array("tets", tets, ("m", 4), low=0, high=MAX_INDEX, error=MeshError))[0]
 
 
 def boundary_by_element(tets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

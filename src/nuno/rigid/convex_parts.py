@@ -174,10 +174,13 @@ def _faces(corners: np.ndarray, hull: Any, size: float) -> tuple[np.ndarray, tup
     """The plane faces of a hull, triangles of one plane as one: normals, and corners in a round."""
     normals: list[np.ndarray] = []
     loops: list[np.ndarray] = []
+    faces_of: list[set[int]] = [set() for _ in corners]
     for plane in hull.equations:
         on = np.flatnonzero(np.abs(corners @ plane[:3] + plane[3]) < 1e-6 * size)
-        if len(on) < 3 or any(np.isin(on, loop).all() for loop in loops):
+        if len(on) < 3 or set.intersection(*(faces_of[k] for k in on)):
             continue
+        for k in on:
+            faces_of[k].add(len(loops))
         n = plane[:3]
         arms = corners[on] - corners[on].mean(axis=0)
         u = arms[0] / np.linalg.norm(arms[0])

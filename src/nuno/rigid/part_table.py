@@ -22,9 +22,10 @@ class PartTable:
     Args:
         device: Where the table lives.
         worlds: Worlds of the batch; only meshes may differ between them.
+        capacity: Rows that there is room for at first.
     """
 
-    def __init__(self, device: str, worlds: int) -> None:
+    def __init__(self, device: str, worlds: int, capacity: int) -> None:
         self.device, self.worlds = device, worlds
         self.parts = Parts()
         self.rows: list[RigidPart | None] = []
@@ -32,7 +33,7 @@ class PartTable:
         self._ridges: dict[int, list[Any]] = {}
         self._pool_sizes = dict.fromkeys((name for name, _ in POOLS), 0)
         self.parts.capacity = 0
-        self._grow(8)
+        self._grow(capacity)
         for name, kind in POOLS:
             setattr(self.parts, name, wp.zeros(64, dtype=kind, device=device))
 

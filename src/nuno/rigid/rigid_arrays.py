@@ -21,6 +21,9 @@ log = logging.getLogger(__name__)
 ROW = 24
 """Partners a part has room for at first; a box in a heap has up to 12 within reach."""
 
+PARTS = 8
+"""Parts that a scene has room for at first."""
+
 BODY = dict(
     position=wp.vec3, rotation=wp.quat, position_before=wp.vec3, rotation_before=wp.quat, position_free=wp.vec3,
     rotation_free=wp.quat, lost=wp.vec3, left=wp.vec3, left_turn=wp.vec3, velocity=wp.vec3, spin=wp.vec3,
@@ -51,11 +54,12 @@ class RigidArrays:
     Args:
         world_count: Worlds in the batch.
         device: "cpu" or "cuda:0" ...
+        parts: Parts that there is room for at first.
     """
 
-    def __init__(self, world_count: int, device: str) -> None:
+    def __init__(self, world_count: int, device: str, parts: int = PARTS) -> None:
         self.world_count, self.device = world_count, device
-        self.table = PartTable(device, world_count)
+        self.table = PartTable(device, world_count, parts)
         self.state, self.manifolds, self.rules = RigidState(), Contacts(), Rules()
         self.part_rows: dict[int, list[int]] = {}
         self._roles = np.zeros(0, dtype=np.int32)

@@ -15,7 +15,7 @@ from nuno.robot.support import standing_place
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -47,6 +47,7 @@ class BaseInterface(CameraInterface):
             stop: Whether it rests there.
         """
 
+    @checked
     def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
         """Let the robot keep a velocity until another comes, as from a joystick, and return the goal at once.
 
@@ -71,6 +72,7 @@ class BaseInterface(CameraInterface):
         """Return where the base link is in the world, as odometry tells."""
         return self.read_base()
 
+    @checked
     def go_pos(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, wait: bool = True) -> bool:
         """Go to a place seen from where the robot is now.
 
@@ -85,6 +87,7 @@ class BaseInterface(CameraInterface):
         """
         return self._go(x, y, yaw, None, True, wait)
 
+    @checked
     def go_velocity(
         self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, sec: float = 1.0, stop: bool = True, wait: bool = False
     ) -> bool:
@@ -105,6 +108,7 @@ class BaseInterface(CameraInterface):
         x, y, yaw = (number(name, value) for name, value in (("x", x), ("y", y), ("yaw", yaw)))
         return self._go(x * span, y * span, yaw * span, span, stop, wait)
 
+    @checked
     def go_stop(self, force_stop: bool = True) -> bool:
         """Stop going, as soon as the robot safely can.
 
@@ -117,6 +121,7 @@ class BaseInterface(CameraInterface):
             self.wait_until(lambda: goal.is_done)
         return True
 
+    @checked
     def move_to(self, coords: str | Coordinates, wait: bool = True, frame_id: str | None = None) -> bool:
         """Go to a place: only its x, y and the turn about z count.
 
@@ -136,6 +141,7 @@ class BaseInterface(CameraInterface):
         forward = quat.rotate(goal[1], np.array([1.0, 0.0, 0.0]))
         return self.go_pos(float(goal[0][0]), float(goal[0][1]), float(np.arctan2(forward[1], forward[0])), wait)
 
+    @checked
     def move_to_send(
         self, coords: str | Coordinates, frame_id: str | None = None, wait_for_server_timeout: float = 5.0
     ) -> bool:
@@ -149,6 +155,7 @@ class BaseInterface(CameraInterface):
         self._place = self._in_world(coords, frame_id)
         return self._set_off_to(self._place)
 
+    @checked
     def move_to_wait(self, retry: int = 10, frame_id: str = "world") -> bool:
         """Wait until the robot is where ``move_to_send`` sent it, and return whether it is.
 
@@ -170,10 +177,12 @@ class BaseInterface(CameraInterface):
             assert goal is not None
         return goal.is_done and goal.succeeded
 
+    @checked
     def go_pos_unsafe(self, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, wait: bool = False) -> bool:
         """Go to a place seen from here; the same as ``go_pos``, but that it returns at once."""
         return self.go_pos(x, y, yaw, wait)
 
+    @checked
     def move_trajectory(
         self, x: float, y: float, yaw: float, sec: float = 1.0, stop: bool = True, start_time: float | None = None,
         send_action: bool | None = None,

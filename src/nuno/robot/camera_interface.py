@@ -10,6 +10,7 @@ from nuno.camera.camera import Camera
 from nuno.errors import RobotModelError, UnknownNameError
 from nuno.robot.joint_interface import JointInterface
 from nuno.robot.readings import ImageReading
+from nuno.validation import checked
 
 
 class CameraInterface(JointInterface):
@@ -55,6 +56,7 @@ class CameraInterface(JointInterface):
         """Return how far what a camera sees is along its axis, (h, w) float32 [m], inf where nothing is."""
         return self.read_depth(camera).image
 
+    @checked
     def camera_info(self, camera: str = "head") -> Camera:
         """Return a camera: its pixels by the description, and where it is now by the joints' readings.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nuno.errors import InvalidInputError
+
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
@@ -16,8 +18,15 @@ def controller_groups(robot: Humanoid) -> dict[str, tuple[str, ...]]:
 
     A limb's joints are those that carry its end and no other limb's; those that carry several are the torso's. What a
     limb's last joint carries besides its end, such as fingers, is that arm's hand: "lhand_controller". A robot whose
-    description names no ends has one "fullbody_controller".
+    description names no ends has one "fullbody_controller". Groups that the description lists count in place of all
+    that, and joints in none of them are the "rest_controller"'s.
+
+    Raises:
+        UnknownNameError: a group has a joint that the robot lacks.
+        InvalidInputError: a joint is in two groups.
     """
+    if robot.description.groups:
+        return _listed(robot)
     ends = {limb: role for limb, role in LIMBS.items() if role in robot.description.frames}
     if not ends:
         return {"fullbody_controller": robot.joint_names} if robot.joint_names else {}
@@ -40,3 +49,16 @@ def controller_groups(robot: Humanoid) -> dict[str, tuple[str, ...]]:
         for name in order
         if name in group.values()
     }
+
+
+def _listed(robot: Humanoid) -> dict[str, tuple[str, ...]]:
+    found, taken = {}, dict[str, str]()
+    for group, joints in robot.description.groups.items():
+        for joint in joints:
+            robot.joint_index(joint)
+            if joint in taken:
+                raise InvalidInputError(f"the joint {joint!r} is in the groups {taken[joint]!r} and {group!r}")
+            taken[joint] = group
+        found[f"{group}_controller"] = joints
+    rest = tuple(joint for joint in robot.joint_names if joint not in taken)
+    return found | ({"rest_controller": rest} if rest else {})

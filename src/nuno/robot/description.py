@@ -26,7 +26,7 @@ from nuno.shapes import quaternion as quat
 from nuno.validation import count, finite_array, number
 
 KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
-ENTRY = ("urdf", "srdf", "posture", "frames", "feet", "cameras", "hands")
+ENTRY = ("urdf", "srdf", "posture", "frames", "feet", "cameras", "hands", "groups", "velocity_limits")
 """Entries of a robot's table; ``robots.toml`` explains them."""
 FileName = str | os.PathLike[str]
 
@@ -104,6 +104,8 @@ class RobotDescription:
         feet: Of those, the soles of the feet.
         cameras: By name.
         hands: By the name of the frame of each hand that closes.
+        groups: Joints by the name of the group that a controller moves; empty where the frames tell.
+        velocity_limits: By joint [rad/s; m/s for slides], in place of the URDF's.
     """
 
     name: str
@@ -115,6 +117,8 @@ class RobotDescription:
     feet: tuple[str, ...] = ()
     cameras: Mapping[str, CameraOnFrame] = field(default_factory=dict)
     hands: Mapping[str, HandOnFrame] = field(default_factory=dict)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    velocity_limits: Mapping[str, float] = field(default_factory=dict)
 
 
 def find_description(
@@ -190,10 +194,15 @@ def _description(name: str, entry: dict[str, Any], folder: Path, package_dirs: t
     for role in feet:
         if feet[role].size is None:
             raise FileFormatError(f"the foot {role!r} of {name!r} needs the size of its sole")
+    groups = {group: _joints(group, given) for group, given in entry.get("groups", {}).items()}
+    speeds = {
+        joint: number(f"the velocity limit of {joint!r}", given, above=0.0)
+        for joint, given in entry.get("velocity_limits", {}).items()
+    }
     urdf, srdf = _placed(entry["urdf"], folder), entry.get("srdf")
     return RobotDescription(
         name, urdf, None if srdf is None else _placed(srdf, folder), package_dirs or tuple(urdf.parents[:5]),
-        entry.get("posture", {}), frames | feet, tuple(feet), cameras, hands,
+        entry.get("posture", {}), frames | feet, tuple(feet), cameras, hands, groups, speeds,
     )  # fmt: skip
 
 
@@ -212,6 +221,12 @@ def _hand(role: str, given: dict[str, Any]) -> HandOnFrame:
     joint = given.get("joint")
     opened, closed = (number(f"{role} {end}", given[end] if joint else 0.0) for end in ("open", "closed"))
     return HandOnFrame(low, high, joint, opened, closed, number(f"{role} width", given.get("width", 0.0), low=0.0))
+
+
+def _joints(group: str, given: Any) -> tuple[str, ...]:
+    if not isinstance(given, list) or not all(isinstance(joint, str) for joint in given):
+        raise InvalidInputError(f"the group {group!r} must be a list of joints, got {given!r}")
+    return tuple(given)
 
 
 def _placed(name: str, folder: Path) -> Path:
@@ -238,5 +253,6 @@ def _check_meshes(robot: RobotDescription) -> None:
 def _mesh_is_there(name: str, robot: RobotDescription) -> bool:
     for scheme in ("package://", "model://"):
         if name.startswith(scheme):
-            return any((folder / name.removeprefix(scheme)).is_file() for folder in robot.package_dirs)
+            within = name.removeprefix(scheme).lstrip("/")  # some have a slash too many, which Pinocchio passes over
+            return any((folder / within).is_file() for folder in robot.package_dirs)
     return (robot.urdf.parent / name.removeprefix("file://")).is_file()

@@ -14,7 +14,7 @@ import numpy as np
 
 from nuno.errors import InvalidInputError, WalkError
 from nuno.robot.stride import Stride
-from nuno.validation import number
+from nuno.validation import count, number
 
 LEFT, RIGHT = 0, 1
 NEAR = 1e-4
@@ -47,7 +47,7 @@ class Footstep:
     yaw: float
 
     def __post_init__(self) -> None:
-        if self.foot not in (LEFT, RIGHT):
+        if count("foot", self.foot, low=LEFT, high=RIGHT) not in (LEFT, RIGHT):
             raise InvalidInputError(f"foot must be 0 (left) or 1 (right), got {self.foot!r}")
         for name in ("x", "y", "yaw"):
             object.__setattr__(self, name, number(name, getattr(self, name)))

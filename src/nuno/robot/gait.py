@@ -247,6 +247,17 @@ class Gait:
         if goal is not None:
             goal.status, goal.text = status
 
+    def disown(self) -> None:
+        """Take copies in place of the goals."""
+        self.goal = None if self.goal is None else self.goal.copy()
+        if self._waiting is not None:
+            self._waiting = (self._waiting[0].copy(), self._waiting[1])
+
+    def give_up(self, why: str) -> None:
+        """Stop at once, wherever the feet are: the robot was put elsewhere."""
+        self._drop(why)
+        self.walk = self._before = self._drive = None
+
     def _drop(self, why: str) -> None:
         for goal in (self.goal, None if self._waiting is None else self._waiting[0]):
             if goal is not None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
-from nuno.validation import number
+from nuno.validation import check_fields, number
 
 _numbers = itertools.count(1)
 
@@ -70,6 +70,12 @@ class Goal:
     def __repr__(self) -> str:
         return f"<Goal {self.name!r}, {self.status.name.lower()}{f': {self.text}' if self.text else ''}>"
 
+    def copy(self) -> Goal:
+        """Return another goal of the same name that stands where this one stands."""
+        made = Goal(self.asked, self.name)
+        made.status, made.code, made.text, made.feedback = self.status, self.code, self.text, self.feedback
+        return made
+
     @property
     def is_done(self) -> bool:
         """Return True if it has come to an end, of whichever kind."""
@@ -105,6 +111,7 @@ class Tolerances:
     goal_time: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for what in ("path", "goal"):
             given = {name: number(f"the {what} tolerance of {name!r}", value, low=0.0)
                      for name, value in getattr(self, what).items()}  # fmt: skip

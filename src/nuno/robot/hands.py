@@ -14,7 +14,7 @@ from nuno.robot.description import HandOnFrame
 from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
 from nuno.shapes.surface import SurfacePoints
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -42,6 +42,7 @@ class Hand:
         InvalidInputError: no link of the hand has a shape in the world.
     """
 
+    @checked
     def __init__(self, links: Links, name: str) -> None:
         robot = links.robot
         if name not in robot.description.hands:
@@ -78,6 +79,7 @@ class Hand:
         angle = robot.angle_vector()[robot.joint_index(own.joint)]
         return float(own.width * np.clip((angle - own.closed) / (own.open - own.closed), 0.0, 1.0))
 
+    @checked
     def joint_angles(self, width: float) -> dict[str, float]:
         """Return the joint's position by name when the fingers are ``width`` [m] apart; empty without a joint.
 
@@ -92,6 +94,7 @@ class Hand:
             return {}
         return {own.joint: own.closed + (own.open - own.closed) * wanted / own.width}
 
+    @checked
     def volume(self, width: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners (3,) and (3,) [m] of the closing volume, in the frame of the hand.
 
@@ -103,6 +106,7 @@ class Hand:
             low[FINGERS], high[FINGERS] = max(low[FINGERS], -0.5 * width), min(high[FINGERS], 0.5 * width)
         return low, high
 
+    @checked
     def close(self, bodies: Sequence[Body | str] | None = None, *, width: float | None = None) -> tuple[Body, ...]:
         """Grip what is in the closing volume, and return the bodies that are held: none where it is empty.
 
@@ -119,7 +123,8 @@ class Hand:
         with world.lock:
             self.open()
             frame = Coordinates(*compose(self.body.pose(), self._offset))  # where the body is, not where it is sent
-            chosen = [b for b in world.bodies if b.is_dynamic] if bodies is None else [world._own(b) for b in bodies]
+            others = [b for b in world.bodies if b.is_dynamic and b not in self.links.bodies]
+            chosen = others if bodies is None else [world._own(b) for b in bodies]
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
@@ -134,6 +139,7 @@ class Hand:
             grip.release()
         self._grips = []
 
+    @checked
     def move(self, width: float) -> dict[str, float]:
         """Open to a width [m], letting go where that is wider than now, and return the joint's position as it then is.
 

@@ -16,8 +16,9 @@ from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.hands import carrier
 from nuno.robot.looks import looks_of
 from nuno.robot.sensor_model import EARLY
+from nuno.shapes.color import rgb
 from nuno.shapes.coordinates import Coordinates, compose
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -51,6 +52,7 @@ class HeadCameras:
         InvalidInputError: a value that cannot be used.
     """
 
+    @checked
     def __init__(
         self, links: Links, names: Sequence[str] = STEREO, *, size: float = 1.0, looks: str = "visual",
         lamp: Lamp | None = None, background: Any = (0.62, 0.66, 0.7), patterns: Mapping[Any, Chequer] | None = None,
@@ -58,6 +60,7 @@ class HeadCameras:
     ) -> None:  # fmt: skip
         if looks not in LOOKS:
             raise InvalidInputError(f"looks must be one of {LOOKS}, got {looks!r}")
+        rgb(background)
         cameras = links.robot.description.cameras
         for name in names:
             if name not in cameras:
@@ -75,6 +78,7 @@ class HeadCameras:
         self._coming: deque[tuple[float, dict[str, Picture]]] = deque()
         self._told: tuple[float, dict[str, Picture]] | None = None
 
+    @checked
     def camera(self, name: str) -> Camera:
         """Return a camera where its link is now.
 

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError
+from nuno.robot.assumed_limits import assume_limits
 from nuno.robot.description import FileName, find_description
 from nuno.robot.pinocchio import pin
-from nuno.robot.placement import pose_of
+from nuno.robot.placement import frame_called, pose_of
 from nuno.robot.support import convex_outline
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, compose, invert
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
@@ -49,6 +50,7 @@ class Humanoid(Coordinates):
         MeshError: the URDF names a mesh that is not there.
     """
 
+    @checked
     def __init__(
         self, name: FileName = "talos", *, srdf: FileName | None = None,
         package_dirs: Sequence[FileName] | None = None, robots: FileName | None = None,
@@ -68,6 +70,7 @@ class Humanoid(Coordinates):
         self._rows = np.array([self.model.joints[j].idx_q for j in joints], dtype=int)
         self._turns_freely = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
         self._free = np.flatnonzero(self._turns_freely)
+        assume_limits(self.model, self.name, self.is_slide, self.description.velocity_limits)
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
         self._angles = np.zeros(len(self.joint_names))
@@ -125,7 +128,7 @@ class Humanoid(Coordinates):
         Raises:
             UnknownNameError: there is no such joint.
         """
-        if joint not in self._index:
+        if not isinstance(joint, str) or joint not in self._index:
             raise UnknownNameError("joint", joint, list(self.joint_names))
         return self._index[joint]
 
@@ -163,6 +166,7 @@ class Humanoid(Coordinates):
 
     # Where everything is
 
+    @checked
     def stand(self, position: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
         """Take the description's posture, the point between the soles at ``position`` (3,) [m], facing ``yaw`` [rad].
 
@@ -183,6 +187,7 @@ class Humanoid(Coordinates):
         """All frames: the roles of the description, links and joints."""
         return (*self.description.frames, *(f.name for f in self.model.frames if f.name not in self.description.frames))
 
+    @checked
     def frame_pose(self, frame: str) -> Coordinates:
         """Return where a frame is: a role ("left_hand", "head_camera", "imu" ...), a link or a joint.
 
@@ -191,6 +196,7 @@ class Humanoid(Coordinates):
         """
         return Coordinates(*self._pose_of_frame(frame))
 
+    @checked
     def camera(self, name: str = "head") -> Camera:
         """Return a camera of the description, where it is now.
 
@@ -312,6 +318,7 @@ class Humanoid(Coordinates):
 
         return Geometry(self)
 
+    @checked
     def enter(self, world: World, meshes: str = "collision") -> Links:
         """Put the links into a world, as static bodies that can follow the robot; see ``Links``.
 
@@ -344,7 +351,7 @@ class Humanoid(Coordinates):
         """
         if not isinstance(frame, str) or not self.model.existFrame(frame):
             raise UnknownNameError("frame", frame, list(self.frame_names))
-        return int(self.model.getFrameId(frame))
+        return frame_called(self.model, frame)
 
     def posture_configuration(self) -> np.ndarray:
         """Return the configuration (nq,) of the posture, the base where it is now."""
@@ -378,7 +385,7 @@ class Humanoid(Coordinates):
         for role, own in self.description.frames.items():
             if not self.model.existFrame(own.link):
                 raise UnknownNameError("link", own.link, [frame.name for frame in self.model.frames])
-            parent = self.model.getFrameId(own.link)
+            parent = frame_called(self.model, own.link)
             carrier = self.model.frames[parent]
             w, x, y, z = own.quaternion
             offset = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), own.position)

@@ -15,7 +15,7 @@ from nuno.robot.readings import ImuReading
 from nuno.robot.support import zero_moment_point
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -68,6 +68,7 @@ class RobotInterface(BaseInterface):
 
     # Hands
 
+    @checked
     def move_gripper(
         self, arm: str, pos: float, effort: float = 25, wait: bool = True, ignore_stall: bool = False
     ) -> list[bool]:
@@ -99,16 +100,19 @@ class RobotInterface(BaseInterface):
         self.wait_until(lambda: all(goal.is_done for goal in goals))
         return [goal.succeeded or ignore_stall for goal in goals]
 
+    @checked
     def start_grasp(self, arm: str = "arms", effort: float = 25, wait: bool = True) -> list[bool]:
         """Close a hand on what is in it; see ``move_gripper``. A hand that something stops has done its work."""
         return self.move_gripper(arm, 0.0, effort, wait, ignore_stall=True)
 
+    @checked
     def stop_grasp(self, arm: str = "arms", effort: float = 25, wait: bool = True) -> list[bool]:
         """Open a hand, and let go what it holds; see ``move_gripper``."""
         return self.move_gripper(arm, 1.0, effort, wait)
 
     # Sensors
 
+    @checked
     def force_vector(self, limb: str | None = None) -> Any:
         """Return the force (3,) [N] that a hand or foot exerts on its arm or leg, in the frame of the sensor between.
 
@@ -117,6 +121,7 @@ class RobotInterface(BaseInterface):
         """
         return self._wrenches(limb, 0)
 
+    @checked
     def moment_vector(self, limb: str | None = None) -> Any:
         """Return the torque (3,) [N m] likewise, about the sensor's origin."""
         return self._wrenches(limb, 1)
@@ -133,6 +138,7 @@ class RobotInterface(BaseInterface):
         """Return the angular velocity (3,) [rad/s] in the frame of the inertial measurement unit."""
         return np.array(self.read_imu().angular_velocity)
 
+    @checked
     def zmp_vector(self, wrt: str = "local") -> np.ndarray:
         """Return the zero moment point (3,) [m] on the floor, from the wrenches at the ankles.
 

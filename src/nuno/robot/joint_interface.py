@@ -23,7 +23,7 @@ from nuno.robot.known_joints import KnownJoints
 from nuno.robot.limb_controllers import LimbControllers
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes.path import minimum_jerk
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -51,6 +51,7 @@ class JointInterface(LimbControllers, KnownJoints):
         namespace: What the names of actions and topics begin with.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, default_controller: str = "default_controller", *,
         controller_timeout: float | None = 3.0, namespace: str | None = None,
@@ -100,6 +101,7 @@ class JointInterface(LimbControllers, KnownJoints):
             for name, joints in controller_groups(self.robot).items()
         ]
 
+    @checked
     def add_controller(
         self, controller_type: str, joint_enable_check: bool = True, create_actions: bool | None = None
     ) -> list[ControllerClient]:
@@ -133,6 +135,7 @@ class JointInterface(LimbControllers, KnownJoints):
 
     # Motions
 
+    @checked
     def angle_vector(
         self, av: ArrayLike | Mapping[str, float] | None = None, time: float | None = None,
         controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
@@ -178,6 +181,7 @@ class JointInterface(LimbControllers, KnownJoints):
         self._send(clients, np.array([duration]), wanted[None], arrival[None], start)
         return wanted
 
+    @checked
     def angle_vector_sequence(
         self, avs: Sequence[ArrayLike | Mapping[str, float]], times: Sequence[float | None] | float | None = None,
         controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
@@ -225,6 +229,7 @@ class JointInterface(LimbControllers, KnownJoints):
         self._send(clients, np.cumsum(spans), np.array(wanted), velocities, start)
         return wanted
 
+    @checked
     def wait_interpolation(self, controller_type: str | None = None, timeout: float = 0) -> list[bool]:
         """Wait until the motions that were sent have ended.
 
@@ -244,6 +249,7 @@ class JointInterface(LimbControllers, KnownJoints):
             client.wait_for_result(longest)
         return [client.is_interpolating() for client in clients]
 
+    @checked
     def is_interpolating(self, controller_type: str | None = None) -> bool:
         """Return True if a motion that was sent from here is under way.
 
@@ -260,6 +266,7 @@ class JointInterface(LimbControllers, KnownJoints):
         """
         return any(self.is_busy(client.controller) for client in self._known_clients(controller_type))
 
+    @checked
     def cancel_angle_vector(self, controller_type: str | None = None) -> None:
         """Let controllers give up what they do; the joints hold where they are.
 
@@ -272,6 +279,7 @@ class JointInterface(LimbControllers, KnownJoints):
         for client in self.controller_actions if controller_type is None else self._known_clients(controller_type):
             client.cancel_all_goals()
 
+    @checked
     def stop_motion(self, stop_time: float = 0.0, wait: bool = True) -> None:
         """Bring the joints to rest within ``stop_time`` [s], at once where it is 0.
 
@@ -284,6 +292,7 @@ class JointInterface(LimbControllers, KnownJoints):
         if wait:
             self.wait_interpolation()
 
+    @checked
     def angle_vector_duration(
         self, start_av: ArrayLike, end_av: ArrayLike, controller_type: str | None = None,
         return_joint_names: bool = False,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError, RobotTimeoutError
 from nuno.robot.other_models import angles_of_model, is_model, show_on_model
 from nuno.robot.readings import JointState
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -68,6 +68,7 @@ class KnownJoints(ABC):
     def read_reference(self) -> JointState | None:
         """Return where the controllers want the joints now, None where that is not known; it may lack joints."""
 
+    @checked
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
         """Wait until a condition holds, up to ``timeout`` [s] of the robot's clock, None or 0 for ever.
 
@@ -109,6 +110,7 @@ class KnownJoints(ABC):
         self._efforts[of_robot] = state.efforts[of_state]
         return True
 
+    @checked
     def angle_vector_from_names(self, angles: Mapping[str, float]) -> np.ndarray:
         """Return the angles (n,) that were last known, with some replaced by name.
 
@@ -164,6 +166,7 @@ class KnownJoints(ABC):
         self._refresh()
         return self.sub_angle_vector(self.reference_vector(), self.robot.angle_vector())
 
+    @checked
     def sub_angle_vector(self, v0: ArrayLike, v1: ArrayLike) -> np.ndarray:
         """Return v0 - v1, (n,); of joints that turn freely the shorter way round."""
         change = self._checked_vector("v0", v0) - self._checked_vector("v1", v1)
@@ -223,7 +226,7 @@ class KnownJoints(ABC):
                 f"{upper[k]:.4f}: is the vector in another model's order? The order here is that of joint_names; a "
                 "scikit-robot model itself, or a mapping from names, is taken by names"
             )
-        if not self._order_told and "skrobot" in sys.modules:
+        if len(wanted) and not self._order_told and "skrobot" in sys.modules:
             self._order_told = True
             logger.warning(
                 "a vector without names is taken in the order of joint_names, %s first; scikit-robot's models have "

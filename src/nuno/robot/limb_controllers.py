@@ -9,7 +9,7 @@ from nuno.errors import UnknownNameError
 
 
 class LimbControllers:
-    """Parts of ``default_controller``, limb by limb; a limb that the robot lacks raises ``UnknownNameError``."""
+    """The controllers of ``default_controller`` by limb; a limb that the robot lacks raises ``UnknownNameError``."""
 
     @abstractmethod
     def default_controller(self) -> list[dict[str, Any]]:

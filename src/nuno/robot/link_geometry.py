@@ -13,12 +13,21 @@ import numpy as np
 from nuno.errors import MeshError
 from nuno.robot.pinocchio import pin
 from nuno.robot.placement import quaternion_of
-from nuno.shapes.shape import Box, Capsule, Cylinder, Shape, Sphere, TriangleMesh
+from nuno.shapes import quaternion as quat
+from nuno.shapes.compound import Compound, Part
+from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Shape, Sphere, TriangleMesh
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
 logger = logging.getLogger(__name__)
+
+SIMPLE = 2e-3
+"""[m] By how much the hulls of links that move dynamically may be smaller than the links' own."""
+SOLE = 1e-4
+"""[m] Likewise of feet, which tilt by that much over their length."""
+BARE = 0.01
+"""[m] Radius of what stands for a joint that carries no shape; it touches nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +50,11 @@ class LinkShape:
     quaternion: np.ndarray
     color: tuple[float, float, float]
 
+    @property
+    def is_bare(self) -> bool:
+        """Return True if this only stands for a joint that carries no shape."""
+        return isinstance(self.shape, Sphere) and self.shape.radius == BARE
+
 
 class Geometry:
     """Shapes of a robot's links from its URDF, read where first asked for.
@@ -56,6 +70,23 @@ class Geometry:
     def shapes(self, meshes: str) -> tuple[LinkShape, ...]:
         """Return the shapes of all links, "collision" (convex hulls) or "visual" (as they are)."""
         return self._collision_shapes if meshes == "collision" else self._visual_shapes
+
+    def of_joints(self) -> tuple[LinkShape, ...]:
+        """Return one shape for each joint, the base's first: what it carries, in its own frame.
+
+        A joint that carries no shape gets a small ball, called after the joint.
+        """
+        robot, found = self._robot, []
+        feet = {int(robot.model.frames[robot.frame_index(foot)].parentJoint) for foot in robot.description.feet}
+        for joint in range(1, robot.model.njoints):
+            own = [part for part in self._collision_shapes if part.joint == joint]
+            name = own[0].link if own else str(robot.model.names[joint])
+            smaller = SOLE if joint in feet else SIMPLE
+            parts = tuple(_simple_part(part, smaller) for part in own)
+            shape = Compound(parts) if own else Sphere(BARE)  # type: ignore[arg-type]
+            color = own[0].color if own else (0.5, 0.5, 0.5)
+            found.append(LinkShape(name, joint, shape, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), color))
+        return tuple(found)
 
     def collisions(self, q: np.ndarray, first_only: bool = False) -> list[tuple[str, str]]:
         """Return the pairs of links that overlap in a configuration (nq,)."""
@@ -143,9 +174,13 @@ def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
         return Cylinder(own.radius, 2.0 * own.halfLength), origin
     if kind == "Capsule":
         return Capsule(own.radius, 2.0 * own.halfLength), origin
+    if kind.startswith("Convex"):
+        vertices, faces = convex_hull(np.array(own.points()).reshape(-1, 3))
+        shape = TriangleMesh(vertices, faces)
+        return shape, shape.centre
     if not hasattr(own, "num_tris"):
         raise MeshError(
-            f"the geometry {part.name!r} is a {kind}; Nuno takes meshes, boxes, spheres, cylinders, capsules"
+            f"the geometry {part.name!r} is a {kind}; Nuno takes meshes, hulls, boxes, spheres, cylinders, capsules"
         )
     vertices = np.array(own.vertices())
     if as_hull:
@@ -171,3 +206,32 @@ def convex_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     number = np.zeros(len(points), dtype=np.int64)
     number[hull.vertices] = np.arange(len(hull.vertices))
     return points[hull.vertices], number[faces]
+
+
+def _simple_part(part: LinkShape, smaller: float) -> Part:
+    """Return a link's shape as a part of a compound, its hull up to ``smaller`` [m] smaller."""
+    shape, position = part.shape, part.position
+    if isinstance(shape, TriangleMesh):
+        shape = Hull.of(few_corners(np.asarray(shape.mesh()[0], dtype=float), smaller))
+        position = position + quat.rotate(part.quaternion, shape.centre)
+    return shape, tuple(position), tuple(part.quaternion)  # type: ignore[return-value]
+
+
+def few_corners(points: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return some of the points (n, 3) [m], whose hull leaves none of the others out by ``tolerance`` or more."""
+    from scipy.spatial import ConvexHull
+
+    along = points @ _directions().T
+    chosen = sorted({int(k) for k in (*along.argmax(axis=0), *along.argmin(axis=0))})
+    while True:
+        planes = ConvexHull(points[chosen]).equations
+        outside = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if outside.max() < tolerance:
+            return points[chosen]
+        chosen.append(int(outside.argmax()))
+
+
+def _directions() -> np.ndarray:
+    """The 13 directions of a cube's faces, edges and corners, (13, 3)."""
+    grid = np.stack(np.meshgrid(*[(-1.0, 0.0, 1.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    return grid[:13]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,13 +13,13 @@ from nuno.robot.spatial_arrays import placement_arrays
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
 from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.world.world import World
 
-MESHES = ("collision", "visual")
+MESHES = ("collision", "visual", "joints")
 
 
 class Links:
@@ -31,30 +31,37 @@ class Links:
     Args:
         robot: The robot.
         world: A world that is no batch.
-        meshes: "collision" or "visual".
+        meshes: "collision" or "visual", a body for each shape; "joints": one for each joint, of all its collision
+            shapes, whose frame is the joint's.
 
     Attributes:
         bodies: One for each shape; a name that the world has already gets a number.
         names: Of the links that those are the shapes of.
         joints: Pinocchio's indices of the joints that carry them.
+        are_joints: Whether there is one body for each joint.
 
     Raises:
         InvalidInputError: other meshes, or a batch.
         MeshError: a mesh that cannot be read.
     """
 
+    @checked
     def __init__(self, robot: Humanoid, world: World, meshes: str = "collision") -> None:
         if meshes not in MESHES:
             raise InvalidInputError(f"meshes must be one of {MESHES}, got {meshes!r}")
         if world.world_count != 1:
             raise InvalidInputError(f"a robot enters one world, not a batch of {world.world_count}; imagine after that")
         self.robot, self.world = robot, world
-        shapes = robot.geometry.shapes(meshes)
-        masks = {} if meshes == "collision" else {"group": 0, "collides_with": 0}
+        self.are_joints = meshes == "joints"
+        shapes = robot.geometry.of_joints() if self.are_joints else robot.geometry.shapes(meshes)
+        passes = {"group": 0, "collides_with": 0}
         self.bodies: tuple[Body, ...] = tuple(
-            Body(own.shape, name=f"{robot.name}/{own.link}", color=own.color, **masks)  # type: ignore[arg-type]
+            Body(
+                own.shape, name=f"{robot.name}/{own.link}", color=own.color,
+                **(passes if meshes == "visual" or own.is_bare else {}),  # type: ignore[arg-type]
+            )
             for own in shapes
-        )
+        )  # fmt: skip
         self.names = tuple(own.link for own in shapes)
         self._keys = tuple(body.key for body in self.bodies)
         self.joints: tuple[int, ...] = tuple(own.joint for own in shapes)
@@ -75,6 +82,7 @@ class Links:
                 body._position, body._quaternion = position, quaternion
                 world.add(body)
 
+    @checked
     def offset_of(self, k: int) -> Pose:
         """Return where the k-th body is in the frame of its joint."""
         return self._offsets[k], self._turns[k]
@@ -82,9 +90,17 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
+        return self._poses_at(self._placements, self._joint_axes, self._joint_places)
+
+    def poses_of(self, robot: Humanoid) -> tuple[np.ndarray, np.ndarray]:
+        """Return where another robot of the same model has such shapes now, as ``poses`` does."""
+        placements = robot.update().oMi.tolist()
+        return self._poses_at(placements, *placement_arrays(placements))
+
+    def _poses_at(self, placements: Any, axes: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         joints = self._rows
-        places = self._joint_places[joints] + np.einsum("kij,kj->ki", self._joint_axes[joints], self._offsets)
-        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
+        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], self._offsets)
+        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
         return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
 
     def follow(self, seconds: float) -> None:
@@ -119,13 +135,22 @@ class Links:
                 for body, place, turn in zip(self.bodies, positions, quaternions, strict=True):
                     body._position, body._quaternion = place, turn
 
+    def stop(self) -> None:
+        """Let the bodies stand still where they are, and follow the robot no more until ``follow``."""
+        self._check_inside()
+        with self.world.lock:
+            for body in self.bodies:
+                if body._path is not None:
+                    self.world.move(body, None)
+
     def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
         path_batch = self._kinematic_group.path_batch
         if path_batch is not None and path_batch.arrived is not None and path_batch.arrived[0] == self.world.time:
             if [body._path for body in self.bodies] == self._kinematic_group.paths:
                 return path_batch.arrived[1:]
-        return np.array([body._position for body in self.bodies]), np.array([b._quaternion for b in self.bodies])
+        places, turns = [body._position for body in self.bodies], [body._quaternion for body in self.bodies]
+        return np.array(places).reshape(-1, 3), np.array(turns).reshape(-1, 4)
 
     def leave(self) -> None:
         """Take the bodies out of the world.

@@ -16,9 +16,15 @@ class RobotState:
         q: (nq,) float, configuration: position [m] and quaternion (x, y, z, w) of the base, then the joints.
         v: (nv,) float, velocity: of the base in its own frame [m/s, rad/s], then the joints' [rad/s].
         a: (nv,) float, acceleration likewise, that of the base without gravity.
+        torques: (n,) float [N m; N], of the joints' motors, where the robot has dynamics; None else.
+        fallen: Why and when the robot fell, where it has dynamics and did; None else.
+        over_torque: Names of joints whose motors gave all that they can.
     """
 
     time: float
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
+    torques: np.ndarray | None = None
+    fallen: str | None = None
+    over_torque: tuple[str, ...] = ()

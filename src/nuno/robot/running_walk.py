@@ -93,7 +93,7 @@ class RunningWalk(TimedMotion):
 
     @property
     def planner(self) -> WalkPlanner:
-        """The planner that planned it."""
+        """The settings that it was planned by."""
         return self._planner
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import number
+from nuno.validation import finite_array, number
 
 EARLY = 1e-9
 """[s] By which a sample may be taken or told before its time: the rounding of times that were added up."""
@@ -39,8 +39,8 @@ class SensorModel:
 
     def __post_init__(self) -> None:
         for name in ("noise", "bias"):
-            values = np.array(getattr(self, name), dtype=float)
-            if values.ndim > 1 or not np.isfinite(values).all() or (name == "noise" and (values < 0.0).any()):
+            values = finite_array(name, getattr(self, name), (), ("components",))
+            if name == "noise" and (values < 0.0).any():
                 least = " of at least 0" if name == "noise" else ""
                 raise InvalidInputError(f"{name} must be a finite number{least} or one a component, got {values!r}")
             values.setflags(write=False)

@@ -19,7 +19,7 @@ from nuno.robot.spatial_arrays import placement_arrays, spatial_array
 from nuno.robot.support import zero_moment_point
 from nuno.robot.wrenches import WrenchSensor
 from nuno.shapes import quaternion as quat
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -85,6 +85,7 @@ class Sensors:
         InvalidInputError: a model that does not fit its channel, or links of another robot.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, links: Links | None = None, *, models: Mapping[str, SensorModel] | None = None,
         ground: float = 0.0, seed: int = 0,
@@ -116,7 +117,7 @@ class Sensors:
         self._soles = np.zeros((len(self._feet), 4, 3))  # corners in the frames of the joints
         for k, (foot, frame) in enumerate(zip(self._feet, carried, strict=True)):
             placement = frame.placement
-            self._soles[k] = _corners(frames[foot]) @ placement.rotation.T + placement.translation
+            self._soles[k] = sole_corners(frames[foot]) @ placement.rotation.T + placement.translation
         # forces and torques about the soles' middles, as they are about the origins of the joints
         middles = [pin.SE3(np.eye(3), sole.mean(axis=0)) for sole in self._soles]
         self._from_middles = np.array([own.toDualActionMatrix() for own in middles]).reshape(-1, 6, 6)
@@ -129,6 +130,7 @@ class Sensors:
         """The names that ``models`` may have."""
         return tuple(self._channels)
 
+    @checked
     def read(self, state: RobotState | None = None, stance: Sequence[str] | None = None) -> Readings:
         """Return what all sensors tell.
 
@@ -163,7 +165,7 @@ class Sensors:
             torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
         read = {
             "positions": self.robot.angles_of(state.q), "velocities": state.v[6:].copy(),
-            "torques": torques[6:].copy(), "contacts": pressed,
+            "torques": (torques[6:] if state.torques is None else state.torques).copy(), "contacts": pressed,
             "zero_moment_point": np.full(2, np.nan) if point is None else point,
         }  # fmt: skip
         if self._imu is not None:
@@ -314,7 +316,7 @@ class _Turned:
         return quat.multiply(self.turn, quat.from_axis_angle(self.error / angle, np.array(angle)))
 
 
-def _corners(sole: Any) -> np.ndarray:
+def sole_corners(sole: Any) -> np.ndarray:
     """Return the corners (4, 3) [m] of a sole in its own frame."""
     half = np.zeros(2) if sole.size is None else 0.5 * sole.size
     return np.array([(sx * half[0], sy * half[1], 0.0) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)])

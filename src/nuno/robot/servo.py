@@ -14,6 +14,7 @@ from scipy.linalg.lapack import dgesv
 from nuno.errors import InvalidInputError
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
+from nuno.robot.trajectory import joint_names
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class ServoCommand:
     kd: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        names = (self.names,) if isinstance(self.names, str) else tuple(self.names)
+        names = joint_names(self.names)
         if not names or len(set(names)) < len(names) or not all(isinstance(name, str) for name in names):
             raise InvalidInputError(f"a servo command needs names of joints, each once, got {self.names!r}")
         object.__setattr__(self, "names", names)

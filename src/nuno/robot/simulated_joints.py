@@ -96,12 +96,24 @@ class SimulatedJoints:
         self._pending = (time, desired, actual)
         return self._pending[2]
 
-    def take_step(self) -> None:
-        """Take the step that was worked out last, and tell the goals of it."""
+    def put(self, positions: np.ndarray) -> None:
+        """Be at rest at positions (n,); controllers give up what they do, and hold."""
+        self.positions, nothing = positions, np.zeros(len(positions))
+        self.velocities, self.accelerations = nothing, nothing
+        self.desired = (positions, nothing, nothing)
+        for name in self.controllers:
+            self.cancel(name)
+
+    def take_step(self, actual: Motion | None = None) -> None:
+        """Take the step that was worked out last, and tell the goals of it.
+
+        Args:
+            actual: Positions, velocities and accelerations (n,) that the joints have now, where motors move them.
+        """
         assert self._pending is not None
         self.clock, self.desired, (self.positions, self.velocities, self.accelerations) = self._pending
         self._pending = None
-        actual = (self.positions, self.velocities, self.accelerations)
+        actual = actual or (self.positions, self.velocities, self.accelerations)
         for name, controller in self.controllers.items():
             if controller.is_busy and controller.check(self.clock, self.desired, actual, self.rows[name]):
                 self._follow(name)

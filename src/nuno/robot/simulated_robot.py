@@ -3,41 +3,40 @@
 from __future__ import annotations
 
 import time as wall_clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.errors import BodyStateError, InvalidInputError, RobotModelError, UnknownNameError
-from nuno.robot.gait import Gait
+from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
+from nuno.robot.balance import Balance
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.hands import hands_of
-from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
-from nuno.robot.readings import ImageReading, ImuReading, JointState
+from nuno.robot.readings import JointState
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
 from nuno.robot.sensors import Readings, Sensors
 from nuno.robot.servo import Servo, ServoCommand, external_forces
+from nuno.robot.simulated_body import SimulatedBody
 from nuno.robot.simulated_cameras import SimulatedCameras
 from nuno.robot.simulated_gripper import SimulatedGripper
-from nuno.robot.simulated_joints import SimulatedJoints, joined
-from nuno.robot.stance import Stance
 from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.coordinates import Coordinates
-from nuno.validation import number
+from nuno.validation import checked, number
 from nuno.world.background import LATE
 
 if TYPE_CHECKING:
-    from nuno.camera.camera import Camera
     from nuno.robot.head_cameras import HeadCameras
     from nuno.robot.humanoid import Humanoid
+    from nuno.robot.imagined_robot import ImaginedRobot
     from nuno.robot.links import Links
     from nuno.world.world import World
 
 
-class SimulatedRobot(RobotInterface):
+class SimulatedRobot(SimulatedBody):
     """A robot whose links stand in a world and move there in every frame, as its controllers want.
 
     All waiting steps the world: at full speed, or paced by ``real_time_factor``; where the world runs in the background
@@ -54,6 +53,9 @@ class SimulatedRobot(RobotInterface):
         seed: Of the sensors' noise.
         default_controller: The name of all controllers together.
         namespace: What the names of actions and topics begin with.
+        dynamics: Whether its links have dynamics from the start: masses, motors with limits, contact, balance; they
+            are one body for each joint then. Without, its joints and its walk go exactly where they are sent, and
+            nothing pushes them. ``attach`` and ``detach`` change it at any time.
 
     Raises:
         InvalidInputError: the links are in another world, or the world is a batch.
@@ -61,15 +63,17 @@ class SimulatedRobot(RobotInterface):
 
     Attributes:
         actual: The robot that is simulated, as it truly is.
+        wanted: The robot as its controllers want it; without dynamics, ``actual``.
         robot: What the program knows of it; as of a real one, it is brought up to date by ``update_robot_state``.
         joints: Its joints and controllers.
         hands: Its hands, by name.
     """
 
+    @checked
     def __init__(
         self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
         sensors: Mapping[str, SensorModel] | None = None, cameras: HeadCameras | None = None, seed: int = 0,
-        default_controller: str = "default_controller", namespace: str | None = None,
+        default_controller: str = "default_controller", namespace: str | None = None, dynamics: bool = False,
     ) -> None:  # fmt: skip
         if links is not None and links.world is not world:
             raise InvalidInputError("the links are in another world than the robot is to be in")
@@ -80,24 +84,28 @@ class SimulatedRobot(RobotInterface):
         self.pace = None if real_time_factor is None else number("real_time_factor", real_time_factor, above=0.0)
         self.world = world
         self._entered = links is None
-        self.links: Links = robot.copy().enter(world) if links is None else links
+        meshes = "joints" if dynamics else "collision"
+        self.links: Links = robot.copy().enter(world, meshes) if links is None else links
         self.actual = self.links.robot
+        self.balance = Balance(self.links) if self.links.are_joints else None
+        # with dynamics, the robot as its controllers want it, else the actual one
+        self.wanted = self.actual if self.balance is None else self.actual.copy()
         super().__init__(self.actual, default_controller, namespace=namespace)
         groups = {own["controller_type"]: own["joint_names"] for own in self.default_controller()}
-        self.joints = SimulatedJoints(self.actual, groups)
+        self._motion = WantedMotion(self.wanted, groups, world.time)
+        self.joints, self.gait = self._motion.joints, self._motion.gait
         self.hands = hands_of(self.links)
         self.grippers = {name: SimulatedGripper(hand, self.joints) for name, hand in self.hands.items()}
-        self.gait, self.stance = Gait(self.actual, self.joints), Stance(self.actual)
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
         self._servo: Servo | None = None
-        self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
+        self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
-        self._state = RobotState(
-            world.time, self.actual.configuration(), np.zeros(self.actual.model.nv), np.zeros(self.actual.model.nv)
-        )
+        self._state = self._motion.aim
+        if dynamics:
+            self.attach()
         with world.lock:
             world.drivers.append(self)
 
@@ -116,23 +124,17 @@ class SimulatedRobot(RobotInterface):
             self.cancel_angle_vector()
             self.cancel_base()
             self.world.drivers.remove(self)
+            if self.is_dynamic:
+                self.detach()
             if self._entered:
                 self.links.leave()
 
-    # What is true, and what the sensors tell
+    # What is true
 
     def state(self) -> RobotState:
         """Return where the robot truly is and how it moves, at the world's time."""
         with self.world.lock:
             return self._state
-
-    def read(self) -> Readings:
-        """Return what all sensors tell, read once a frame."""
-        with self.world.lock:
-            state = self._state
-            if self._readings is None or self._readings[0] != state.time:
-                self._readings = (state.time, self.sensors.read(state))
-            return self._readings[1]
 
     # Time
 
@@ -140,10 +142,12 @@ class SimulatedRobot(RobotInterface):
         """Return the world's time [s]."""
         return float(self.world.time)
 
+    @checked
     def sleep(self, seconds: float) -> None:
         """Let the world's clock go on by ``seconds`` [s]."""
         self._let_pass(number("seconds", seconds, low=0.0))
 
+    @checked
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
         """Step the world until a condition holds, up to ``timeout`` [s], None or 0 for ever; return whether it does."""
         end = None if not timeout else self.now() + timeout - 1e-9
@@ -204,6 +208,7 @@ class SimulatedRobot(RobotInterface):
         with self.world.lock:
             return self.joints.controllers[self._known(controller)].is_busy
 
+    @checked
     def servo(self, command: ServoCommand | None) -> None:
         """Put joints under a torque law, at once and until another command; see ``Servo``.
 
@@ -253,7 +258,7 @@ class SimulatedRobot(RobotInterface):
             if self.gait.is_walking:
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
-            standing = self.actual.copy()
+            standing = self.wanted.copy()
         walk = self.gait.plan(standing, x, y, yaw, seconds)  # the world goes on meanwhile
         with self.world.lock:
             if self.gait.is_walking:
@@ -284,116 +289,86 @@ class SimulatedRobot(RobotInterface):
                 raise UnknownNameError("hand", hand, list(self.grippers))
             return self.grippers[hand].send(position)
 
-    def read_wrench(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return force (3,) [N] and torque (3,) [N m] of what lies beyond a sensor; see ``RobotInterface``.
-
-        Raises:
-            RobotModelError: the robot has no such sensor.
-        """
-        found = self.read().wrenches.get(frame)
-        if found is None:
-            raise RobotModelError(f"{self.actual.name!r} has no force sensor in {frame!r}")
-        return found[:3].copy(), found[3:].copy()
-
-    def read_imu(self) -> ImuReading:
-        """Return what the inertial measurement unit tells.
-
-        Raises:
-            RobotModelError: the robot has none.
-        """
-        if "imu" not in self.actual.description.frames:
-            raise RobotModelError(f"{self.actual.name!r} has no inertial measurement unit")
-        told = self.read()
-        return ImuReading(told.sampled["orientation"], told.orientation, told.angular_velocity, told.specific_force)
-
-    @property
-    def shown_cameras(self) -> tuple[str, ...]:
-        """The cameras that images come of: all."""
-        return self.camera_names
-
-    def read_image(self, camera: str) -> ImageReading:
-        """Return what a camera sees now, or saw last where its cameras have a rate; see ``CameraInterface``."""
-        return self.read_images((camera,))[camera]
-
-    def read_images(self, cameras: Sequence[str]) -> dict[str, ImageReading]:
-        """Return what several cameras see at one time."""
-        pictures = self._cameras.look([self._known_camera(name) for name in cameras])
-        return {name: ImageReading(own.time, own.camera, own.color.numpy()) for name, own in pictures.items()}
-
-    def read_depth(self, camera: str) -> ImageReading:
-        """Return how far what a camera sees is; see ``CameraInterface``."""
-        picture = self._cameras.look((self._known_camera(camera),))[camera]
-        return ImageReading(picture.time, picture.camera, picture.depth.numpy())
-
-    def camera_info(self, camera: str = "head") -> Camera:
-        """Return a camera, with the pixels that its images have; see ``CameraInterface``."""
-        return self._cameras.pixels(super().camera_info(camera), camera)
-
     # What the world asks of it
 
     def begin_frame(self, start: float, end: float) -> None:
-        """Send the links to where the robot is at the end of the frame."""
-        span, before = end - start, self._state
-        robot, rows, given = self.actual, None, None
-        self._kept = (before, robot._angles, robot._position, robot._quaternion)
+        """Send the links to where the robot is at the end of the frame, or, with dynamics, set their motors."""
+        span, self._before = end - start, self._state
+        before = self._motion.aim
+        servo = None if self._servo is None or self.is_dynamic else self._serve
+        aim = self._motion.begin(end, span, servo)
         if span <= 0.0:
-            self.joints.step(0.0)
             return
-        base = base_motion = None
-        if self.gait.is_walking:
-            walk = self.gait.at(self.joints.clock + span)
-            rows = self.gait.rows
-            given = (robot.angles_of(walk.q)[rows], walk.v[6:][rows], walk.a[6:][rows])
-            base, base_motion = walk.q[:7], (walk.v[:6], walk.a[:6])
-        if self._servo is not None:
-            others = self.joints.step(span, rows, given)
-            own = self._servo.step(before, others, base, span, self._external())
-            rows, given = joined(rows, given, self._servo.rows, own)
-        positions, velocities, accelerations = self.joints.step(span, rows, given)
-        if positions is robot._angles and base is None:
-            self._state = RobotState(end, before.q, before.v, before.a)
+        if self.balance is not None and self.is_dynamic:
+            loads = self.balance.dynamics.loads()[0]
+            command = self.balance.command(self._state, aim, span, self._servo, loads)
+            self.balance.dynamics.drive(*command)
             return
-        if base is None and (stood := self.stance.base(robot._angles, (positions, velocities, accelerations))):
-            base, base_motion = stood
-        v, a = np.zeros_like(before.v), np.zeros_like(before.a)
-        v[6:], a[6:] = velocities, accelerations
-        if base is not None and base_motion is not None:
-            v[:6], a[:6] = base_motion
-        robot.move_to(positions, base)
-        self._state = RobotState(end, robot.configuration(), v, a)
-        if not (self._state.q == before.q).all():
+        self._state = aim
+        if not (aim.q == before.q).all():
+            if self.actual is not self.wanted:
+                self.actual.move_to(self.wanted._angles, aim.q[:7])
             self.links.follow(span)
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
-        self.joints.take_step()
+        actual = None
+        if self.balance is not None and self.is_dynamic:
+            q, v = (values[0] for values in self.balance.dynamics.read())
+            torques = self.balance.dynamics.efforts_now()[0]
+            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time)
+            angles = self.actual.angles_of(q)
+            self.actual.move_to(angles, q[:7])
+            actual = (angles, self._state.v[6:], self._state.a[6:])
+        self.joints.take_step(actual)
         for gripper in self.grippers.values():
             gripper.end_frame()
         self.gait.end_frame()
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
-        assert self._kept is not None
-        self._state, *pose = self._kept
-        self._put(*pose)
+        assert self._before is not None
+        self._state = self._before
+        self._motion.cancel()
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-        robot = self.actual
-        pose = (robot._angles, robot._position, robot._quaternion)
-        return self._state, pose, self.joints.save(), self.gait.save(), grippers, self._servo
+        joints = () if self.balance is None else self.balance.dynamics.joints
+        return self._state, self._motion.save(), joints, grippers, self._servo
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, pose, joints, gait, grippers, self._servo = saved
-        self._put(*pose)
-        self.joints.load(joints)
-        self.gait.load(gait)
+        self._state, motion, joints, grippers, self._servo = saved
+        self._motion.load(motion)
+        if self.balance is not None:
+            self.balance.dynamics.joints = joints
+        if self.actual is not self.wanted:
+            self.actual.move_to(self.actual.angles_of(self._state.q), self._state.q[:7])
         for name, gripper in self.grippers.items():
             gripper.load(grippers[name])
         self._readings = None
 
-    def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
-        self.actual._angles = angles
-        self.actual._place(position, quaternion)
+    def saved(self) -> tuple[RobotState, Any, Any]:
+        """Return its state, what is wanted of it, and its servo command, for its copies in imagined worlds."""
+        return self._state, self._motion.save(), self._servo
+
+    def imagined(self, futures: World, world: int) -> ImaginedRobot:
+        """Return the driver of this robot's copies in a batch that was imagined from its world."""
+        from nuno.robot.imagined_robot import ImaginedRobot
+
+        return ImaginedRobot(self, futures)
+
+    def take_future(self, futures: World, k: int) -> None:
+        """Go on as the copy in one world of a batch does, which the robot's world has just become."""
+        for other in futures.drivers:
+            if getattr(other, "original", None) is self:
+                joints = () if self.balance is None else self.balance.dynamics.joints
+                state, motion, servo = other.saved_of(k)  # type: ignore[attr-defined]
+                grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
+                self.load((state, motion, joints, grippers, servo))
+                self._motion.disown()
+
+    def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
+        assert self._servo is not None
+        return self._servo.rows, self._servo.step(before, others, base, span, self._external())

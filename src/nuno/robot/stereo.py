@@ -17,7 +17,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hand_sight import CORE, disc
 from nuno.estimate.hand_tracking import NOISE, SEARCH_RADIUS, find_disc, gaps_without
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 log = logging.getLogger(__name__)
 
@@ -54,6 +54,7 @@ class StereoPoints:
         return np.sqrt(np.linalg.eigvalsh(self.covariances)[:, -1])
 
 
+@checked
 def triangulate(
     left: Camera, right: Camera, left_pixels: ArrayLike, right_pixels: ArrayLike, *, noise: float = NOISE
 ) -> StereoPoints:
@@ -118,6 +119,7 @@ class StereoTrack:
         """(k,) float [m], standard deviation along the most uncertain direction."""
         return np.sqrt(np.linalg.eigvalsh(self.covariances)[:, -1])
 
+    @checked
     def path(self, held: ArrayLike) -> HandPath:
         """Return the path for a replay; ``held`` (k,) bool says when the hand held."""
         return HandPath(self.times, self.positions, np.asarray(held))
@@ -177,6 +179,7 @@ def track_hands_in_stereo(
     return tuple(tracks)
 
 
+@checked
 def locate_marker(
     left_image: np.ndarray, right_image: np.ndarray, left: Camera, right: Camera, marker: int,
     *, dictionary: int = cv2.aruco.DICT_4X4_50, noise: float = 0.2,

@@ -9,7 +9,7 @@ import numpy as np
 
 from nuno.errors import RobotModelError
 from nuno.robot.pinocchio import pin
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -60,6 +60,7 @@ class Stride:
         return self.single_support + self.double_support
 
     @classmethod
+    @checked
     def of(cls, robot: Humanoid) -> Stride:
         """Return a stride that suits the size of a robot, its stance as in its posture.
 

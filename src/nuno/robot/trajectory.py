@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 LONGEST = 1e9
 """[s] That a trajectory may take: the wire has 32 bits for it."""
@@ -39,8 +41,15 @@ class JointTrajectory:
     velocities: np.ndarray | None = None
     accelerations: np.ndarray | None = None
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, names: Sequence[str], times: ArrayLike, positions: ArrayLike,
+            velocities: ArrayLike | None = None, accelerations: ArrayLike | None = None,
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
-        names = (self.names,) if isinstance(self.names, str) else tuple(self.names)
+        names = joint_names(self.names)
         if not names or not all(isinstance(name, str) for name in names):
             raise InvalidInputError(f"a trajectory needs the names of its joints, got {self.names!r}")
         if len(set(names)) < len(names):
@@ -61,7 +70,7 @@ class JointTrajectory:
         object.__setattr__(self, "times", times)
         for what in ("positions", "velocities", "accelerations"):
             value = getattr(self, what)
-            if value is not None:
+            if value is not None or what == "positions":
                 value = finite_array(what, value, (len(times), len(names)))
                 value.setflags(write=False)
                 object.__setattr__(self, what, value)
@@ -72,6 +81,7 @@ class JointTrajectory:
         """Return when the last point is due [s]."""
         return float(self.times[-1])
 
+    @checked
     def of(self, names: Sequence[str]) -> JointTrajectory:
         """Return the part of some joints, in their order.
 
@@ -215,3 +225,16 @@ def evaluate(polynomials: np.ndarray, t: float | np.ndarray) -> Motion:
         motion *= t
         motion += coefficients
     return motion[0], motion[1], motion[2]
+
+
+def joint_names(names: Any) -> tuple[str, ...]:
+    """Return names of joints, of one or several.
+
+    Raises:
+        InvalidInputError: neither text nor a sequence.
+    """
+    if isinstance(names, str):
+        return (names,)
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise InvalidInputError(f"names must be those of joints, got {names!r}")
+    return tuple(names)

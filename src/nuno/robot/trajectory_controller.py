@@ -68,6 +68,7 @@ class TrajectoryController:
     Attributes:
         goal: The last one, which may have ended.
         piece: The polynomial that the joints follow.
+        near: How far joints may be from the end of a goal without tolerances when it succeeds [rad; m for slides].
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class TrajectoryController:
     ) -> None:
         self.names = tuple(names)
         self.limits = limits
+        self.near = ARRIVED
         self.goal: Goal | None = None
         self.tolerances = Tolerances()
         self._spline: Spline | None = None
@@ -176,7 +178,7 @@ class TrajectoryController:
                 self.hold(positions, GoalStatus.ABORTED, code, text)
                 logger.warning("a goal was aborted: %s", text)
             return bool(beyond)
-        beyond = self._beyond({name: ARRIVED for name in self.names} | dict(self.tolerances.goal), error)
+        beyond = self._beyond({name: self.near for name in self.names} | dict(self.tolerances.goal), error)
         if not beyond:
             goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
         elif self.tolerances.goal_time > 0.0 and late > self.tolerances.goal_time:

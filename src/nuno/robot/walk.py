@@ -40,7 +40,7 @@ class TimedMotion(ABC):
     @property
     @abstractmethod
     def planner(self) -> WalkPlanner:
-        """The planner that planned it."""
+        """The settings that it was planned by."""
 
     @property
     @abstractmethod
@@ -134,7 +134,7 @@ class Walk(TimedMotion):
 
     @property
     def planner(self) -> WalkPlanner:
-        """The planner that planned it."""
+        """The settings that it was planned by."""
         planner: WalkPlanner = self.plan.planner
         return planner
 

@@ -226,6 +226,8 @@ class WalkPlanner:
     def _take_arms(self, arms: Arms) -> None:
         self._spline: Spline | None = None
         own = self.robot
+        if not isinstance(arms, JointTrajectory | Mapping | None):
+            raise InvalidInputError(f"arms must be angles by joint, a JointTrajectory or None, got {arms!r}")
         if arms is None:
             return
         names = arms.names if isinstance(arms, JointTrajectory) else arms

@@ -19,12 +19,13 @@ from nuno.robot.preview_control import TICK
 from nuno.robot.stride import Stride
 from nuno.robot.walk import Walk
 from nuno.robot.walk_planner import MARGIN, Arms, WalkPlanner, rest_of
-from nuno.validation import number
+from nuno.validation import checked, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
 
+@checked
 def plan_walk(
     robot: Humanoid, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, *, stride: Stride | None = None,
     arms: Arms = None, load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN,
@@ -57,6 +58,7 @@ def plan_walk(
     return planner.first(footsteps_to(moved(middle_of(feet), ahead), feet, planner.stride, planner.soles))
 
 
+@checked
 def plan_walk_velocity(
     robot: Humanoid, vx: float = 0.0, vy: float = 0.0, vyaw: float = 0.0, seconds: float = 1.0, *,
     stride: Stride | None = None, arms: Arms = None, load: tuple[float, ArrayLike] | None = None,
@@ -89,6 +91,7 @@ def plan_walk_velocity(
     return planner.first(tuple(steps))
 
 
+@checked
 def plan_walk_footsteps(
     robot: Humanoid, footsteps: Sequence[Footstep], *, stride: Stride | None = None, arms: Arms = None,
     load: tuple[float, ArrayLike] | None = None, margin: float = MARGIN, check_collisions: bool = True,
@@ -116,6 +119,7 @@ def plan_walk_footsteps(
     return WalkPlanner(robot, stride, arms, load, margin, check_collisions).first(steps)
 
 
+@checked
 def continue_walk(
     walk: Walk, time: float, vx: float = 0.0, vy: float = 0.0, vyaw: float = 0.0, seconds: float = 1.0
 ) -> Walk:
@@ -147,6 +151,7 @@ def continue_walk(
     return planner.changed(walk, time, steps, True)
 
 
+@checked
 def stop_walk(walk: Walk, time: float) -> Walk:
     """Plan how a walk that is under way ends as soon as it safely can.
 

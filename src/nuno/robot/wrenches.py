@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.robot.pinocchio import pin
+from nuno.robot.placement import frame_called
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -34,7 +35,7 @@ class WrenchSensor:
         own = model.frames[robot.frame_index(frame)]
         self.joint = int(own.parentJoint)
         role = robot.description.frames.get(frame)
-        link = model.getFrameId(frame if role is None else role.link)
+        link = frame_called(model, frame if role is None else role.link)
         first = model.frames[link].parentFrame  # the joint that holds the link, fixed or not
         beyond = _beyond(model, first)
         # The first link of a joint has everything that the joint moves; of others only what is fixed behind them

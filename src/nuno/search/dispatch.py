@@ -26,7 +26,7 @@ import numpy as np
 from nuno.errors import InvalidInputError, WorkerLostError
 from nuno.search.parameters import Parameters
 from nuno.search.rows import run_rows
-from nuno.search.trial import Trial
+from nuno.search.trial import Trial, find, named_of
 from nuno.search.world_source import WorldSource, worlds_in_worker
 
 log = logging.getLogger(__name__)
@@ -106,9 +106,10 @@ def run_on_executor(
         repeats: How often a trial is run again whose worker died.
 
     Raises:
-        InvalidInputError: the trial or the world's function cannot be used.
+        InvalidInputError: the trial or the world's function cannot be used, or workers do not find it.
         WorkerLostError: the executor is broken, and is none that can be made anew.
     """
+    check_pool(executor, trial, source)
     search = uuid.uuid4().hex
     parts = [tuple(indices[k : k + together]) for k in range(0, len(indices), together)]
     waiting = deque(Task(trial, source, part, parameters.rows(part), search, os.getpid()) for part in parts)
@@ -149,6 +150,45 @@ def run_on_executor(
             future.cancel()
         if own is not None:
             own.shutdown(wait=False, cancel_futures=True)
+
+
+def check_pool(executor: Executor, *needed: Any) -> None:
+    """Check that a process pool's workers find what is defined in the program itself, before anything is handed out.
+
+    They do not where they were started before it was defined, or where the program is a notebook, a prompt or standard
+    input and workers are not forked.
+
+    Args:
+        executor: The executor; only process pools are asked.
+        needed: The trial, and the source of its worlds.
+
+    Raises:
+        InvalidInputError: they do not.
+    """
+    functions = [part.function if isinstance(part, WorldSource) else part for part in needed]
+    own = [named_of(each) for each in functions if each is not None and named_of(each).__module__ == "__main__"]
+    if not isinstance(executor, ProcessPoolExecutor) or not own:
+        return
+    for each in own:
+        try:
+            asked = executor.submit(is_found, each.__module__, each.__qualname__)
+        except BrokenExecutor:
+            return  # as it came; it is made anew
+        try:
+            there = asked.result()
+        except BrokenExecutor:
+            there = False
+        if not there:
+            raise InvalidInputError(
+                f"{each.__qualname__} is defined in __main__, where the pool's workers do not find it; define it in a "
+                "module of its own and import it, or, in a script, put what makes the pool after it and under "
+                "if __name__ == '__main__':"
+            )
+
+
+def is_found(module: str, name: str) -> bool:
+    """Return True if this process has something by that name."""
+    return find(module, name) is not None
 
 
 def _hand_out(executor: Executor, queue: deque[Task], flying: dict[Future[list[Trial]], Task], room: int) -> bool:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import EstimationError, InvalidInputError, MissingPackageError, UnknownNameError
+from nuno.files.html_table import html_table
 from nuno.search.parameters import from_rows
 from nuno.search.sampler import check_bounds, scaled, share_of
 from nuno.search.sweep import check_trial, outcomes
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, make_source
-from nuno.validation import count, number
+from nuno.validation import checked, count, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -65,12 +66,19 @@ class Minimum:
     reason: str
     errors: tuple[str, ...]
 
+    def _repr_html_(self) -> str:
+        rows = [(name, f"{value:.4g}") for name, value in self.params.items()]
+        title = f"Minimum: {self.value:.4g} after {len(self.tried_values)} trials"
+        return html_table(title, rows, columns=("parameter", "value"), notes=(self.reason, *self.errors))
+
+    @checked
     def near(self, excess: float) -> dict[str, tuple[float, float]]:
         """Return the range, by name, of the parameters whose value is at most ``excess`` above the lowest."""
         close = self.tried_values <= self.value + excess
         return {name: (float(column[close].min()), float(column[close].max())) for name, column in self.tried.items()}
 
 
+@checked
 def minimise(
     trial: Callable[[Any, Any], Any] | Each,
     bounds: Bounds,

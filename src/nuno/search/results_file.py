@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, ResultsInUseError, ResultsMismatchError
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, made_folder, naming, replacing
 from nuno.search.parameters import Parameters
 from nuno.search.trial import Trial
 from nuno.search.values import as_json, from_json
@@ -40,18 +40,20 @@ class ResultsFile:
 
     Raises:
         InvalidInputError: no folder for the file, or a folder in its place.
+        FileWriteError: a read-only folder, a full disk; also ``append``, after which the file is as it was before.
         ResultsInUseError: another sweep writes to the file.
         ResultsMismatchError: it holds another sweep's results.
         FileFormatError: it is no results file, of a newer format, or damaged.
     """
 
     def __init__(self, path: str | os.PathLike[str], header: dict[str, Any]) -> None:
-        self.path = FilePath(path)
-        if not self.path.parent.is_dir():
-            raise InvalidInputError(f"there is no folder {self.path.parent} for the results")
-        if self.path.is_dir():
-            raise InvalidInputError(f"{self.path} is a folder; results need a file")
-        self._file: BinaryIO | None = open(self.path, "a+b", buffering=0)  # close() closes it
+        self.path = file_path(path, "results")
+        with naming(self.path):
+            if not self.path.parent.is_dir():
+                raise InvalidInputError(f"there is no folder {self.path.parent} for the results")
+            if self.path.is_dir():
+                raise InvalidInputError(f"{self.path} is a folder; results need a file")
+            self._file: BinaryIO | None = open(self.path, "a+b", buffering=0)  # close() closes it
         try:
             _lock(self._file, self.path)
             _open.add(self)
@@ -81,13 +83,14 @@ class ResultsFile:
     def _write(self, data: bytes) -> None:
         assert self._file is not None
         before = os.fstat(self._file.fileno()).st_size
-        try:
-            if self._file.write(data) != len(data):
-                raise OSError(f"{self.path} could not be written in one piece; is the disk full?")
-            os.fsync(self._file.fileno())
-        except OSError:
-            os.ftruncate(self._file.fileno(), before)
-            raise
+        with naming(self.path):
+            try:
+                if self._file.write(data) != len(data):
+                    raise OSError("it could not be written in one piece")
+                os.fsync(self._file.fileno())
+            except OSError:
+                os.ftruncate(self._file.fileno(), before)
+                raise
 
     def _line(self, trial: Trial, row: dict[str, Any]) -> bytes:
         entry: dict[str, Any] = {"trial": trial.index, "params": row}
@@ -101,8 +104,7 @@ class ResultsFile:
         return json.dumps(entry, allow_nan=False).encode() + b"\n"
 
     def _save_arrays(self, index: int, arrays: dict[str, np.ndarray]) -> str:
-        folder = arrays_folder(self.path)
-        folder.mkdir(exist_ok=True)
+        folder = made_folder(arrays_folder(self.path))
         name = f"{index:06d}.npz"
         with replacing(folder / name) as partial:
             with open(partial, "wb") as file:

@@ -45,10 +45,10 @@ def check_bounds(bounds: Mapping[str, tuple[float, float]], log: Sequence[str]) 
     """
     if not isinstance(bounds, Mapping) or not bounds:
         raise InvalidInputError(f"bounds must be (low, high) by name, got {bounds!r}")
-    if isinstance(log, str):
+    if isinstance(log, str) or not isinstance(log, Sequence | set | frozenset):
         raise InvalidInputError(f"log must be a sequence of names, got {log!r}")
     for name in log:
-        if name not in bounds:
+        if not isinstance(name, str) or name not in bounds:
             raise UnknownNameError("bound", name, list(bounds))
     for name, pair in bounds.items():
         low, high = finite_array(f"the bounds of {name!r}", pair, (2,))

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from nuno.errors import FileFormatError, InvalidInputError, UnknownNameError
+from nuno.files.html_table import html_table
+from nuno.files.whole_file import replacing
 from nuno.search.chunk_size import LANES, ChunkSize
 from nuno.search.dispatch import run_on_executor
 from nuno.search.parameters import Parameters, from_rows, make_parameters
@@ -22,7 +24,7 @@ from nuno.search.results_file import ResultsFile, make_header, read_entries, rea
 from nuno.search.rows import run_rows
 from nuno.search.trial import Each, Trial, check_importable, name_of
 from nuno.search.world_source import Worlds, WorldSource, make_source
-from nuno.validation import count
+from nuno.validation import checked, count
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -36,16 +38,34 @@ class SweepResult:
         params: Parameters by name, (n, ...), one row for each trial; of a file that is read, for each in the file.
         trials: (n,) the finished trials by index; None for those that were not run.
         stopped: Whether the sweep was stopped early.
+        planned: How many trials the sweep has, where that is more than ``trials`` holds: those of a file that is read
+            before its sweep has ended. None: as many as ``trials``.
     """
 
     params: dict[str, np.ndarray]
     trials: list[Trial | None]
     stopped: bool = False
+    planned: int | None = None
 
     def __repr__(self) -> str:
         finished = sum(trial is not None for trial in self.trials)
-        finished_text = f"{finished} of {len(self)} trials, {len(self.failures)} failed"
+        finished_text = f"{finished} of {self.planned or len(self)} trials, {len(self.failures)} failed"
         return f"<SweepResult: {finished_text}; {', '.join(self.params)} -> {', '.join(self.names) or 'nothing'}>"
+
+    def _repr_html_(self) -> str:
+        names = [name for name in self.names if np.ndim(self._first(name)) == 0]
+        done = [(k, trial) for k, trial in enumerate(self.trials) if trial is not None]
+        rows = [
+            [k, *(_short(value) for value in self.row(k).values()),
+             *(_short(trial.values[name].item()) if name in trial.values else trial.error or "" for name in names)]
+            for k, trial in done
+        ]  # fmt: skip
+        failed = f"{len(self.failures)} failed" if self.failures else "none failed"
+        title = f"SweepResult: {len(done)} of {len(self)} trials, {failed}"
+        return html_table(title, rows, columns=("trial", *self.params, *names) if rows else ())
+
+    def _first(self, name: str) -> np.ndarray:
+        return next(trial.values[name] for trial in self.trials if trial is not None and name in trial.values)
 
     def __len__(self) -> int:
         return len(self.trials)
@@ -53,7 +73,7 @@ class SweepResult:
     @property
     def is_complete(self) -> bool:
         """Return True if every trial has finished, or failed."""
-        return all(trial is not None for trial in self.trials)
+        return (self.planned or len(self)) == len(self) and all(trial is not None for trial in self.trials)
 
     @property
     def failures(self) -> dict[int, str]:
@@ -65,6 +85,7 @@ class SweepResult:
         """The names of what trials returned."""
         return sorted({name for trial in self.trials if trial is not None for name in trial.values})
 
+    @checked
     def values(self, name: str) -> np.ndarray:
         """Return one value of all trials, (n, ...).
 
@@ -85,6 +106,7 @@ class SweepResult:
         missing: Any = np.full(first.shape, "" if first.dtype.kind == "U" else np.nan)
         return np.array([missing if row is None else row for row in rows])
 
+    @checked
     def best(self, name: str, *, highest: bool = False) -> int:
         """Return the index of the trial whose value is lowest, or highest; failed ones do not count.
 
@@ -97,15 +119,21 @@ class SweepResult:
             raise InvalidInputError(f"{name!r} is no single number for each trial, so none is best")
         return int(np.nanargmax(values) if highest else np.nanargmin(values))
 
+    @checked
     def row(self, index: int) -> dict[str, Any]:
         """Return the parameters of one trial, as numbers, strings and lists."""
         return {name: column[index].tolist() for name, column in self.params.items()}
 
+    @checked
     def save_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write a table: a line for each finished trial, with its parameters, its single values, and its error."""
+        """Write a table: a line for each finished trial, with its parameters, its single values, and its error.
+
+        Raises:
+            FileWriteError: the file cannot be written.
+        """
         done = [trial for trial in self.trials if trial is not None]
         single = [name for name in self.names if all(t.values[name].ndim == 0 for t in done if name in t.values)]
-        with open(path, "w", newline="", encoding="utf-8") as file:
+        with replacing(path) as partial, open(partial, "w", newline="", encoding="utf-8") as file:
             table = csv.writer(file)
             table.writerow(["trial", *self.params, *single, "error"])
             for trial in done:
@@ -113,6 +141,7 @@ class SweepResult:
                 table.writerow([trial.index, *self.row(trial.index).values(), *values, trial.error or ""])
 
 
+@checked
 def sweep(
     trial: Callable[[Any, Any], Any] | Each,
     params: Any,
@@ -158,6 +187,7 @@ def sweep(
         ResultsInUseError: another sweep writes to the results file.
         ResultsMismatchError: the results file is of another trial or of other parameters.
         FileFormatError: the results file is none, or damaged.
+        FileWriteError: it cannot be written: a read-only folder, a full disk. What it holds stays whole.
         WorkerLostError: the executor is broken for good.
     """
     parameters = make_parameters(params, samples, seed)
@@ -174,13 +204,15 @@ def sweep(
         return _run(trial, parameters, source, world, executor, file, together, stop, repeats, progress)
 
 
+@checked
 def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
     """Read a results file, also one that a sweep is writing to: the trials that it holds, in their order.
 
-    A torn last line is left out. Where trials are missing, the others have other places than in the sweep.
+    A torn last line is left out. Where trials are missing, the others have other places than in the sweep; how many
+    the sweep has is ``planned``.
 
     Args:
-        path: Of the file that ``sweep`` or ``minimise`` was given as ``results``.
+        path: Of the file that ``sweep`` was given as ``results``.
 
     Raises:
         FileFormatError: it is no results file, or damaged.
@@ -188,15 +220,20 @@ def read_sweep(path: str | os.PathLike[str]) -> SweepResult:
     file = FilePath(path)
     try:
         data = file.read_bytes()
-    except OSError as problem:
+    except (OSError, ValueError) as problem:
         raise FileFormatError(f"{file} cannot be read: {problem}") from problem
     data = data[: data.rfind(b"\n") + 1]
-    read_header(data, file)
+    planned = read_header(data, file).get("trials")
+    if not isinstance(planned, int) or planned < 0:
+        raise FileFormatError(f"{file} is damaged: its header says that the sweep has {planned!r} trials")
     entries = sorted(read_entries(data, file), key=lambda entry: entry[0].index)
     if not entries:
-        return SweepResult({}, [])
+        return SweepResult({}, [], planned=planned)
+    if not 0 <= entries[0][0].index <= entries[-1][0].index < planned:
+        found = f"{entries[0][0].index} to {entries[-1][0].index}"
+        raise FileFormatError(f"{file} holds trials {found}, and its sweep has {planned}, from 0 on")
     trials: list[Trial | None] = [Trial(k, trial.values, trial.error) for k, (trial, _) in enumerate(entries)]
-    return SweepResult(from_rows([row for _, row in entries]).columns, trials)
+    return SweepResult(from_rows([row for _, row in entries]).columns, trials, planned=planned)
 
 
 def check_trial(trial: Any, executor: Executor | None) -> None:
@@ -283,3 +320,7 @@ def _checked_batch(batch: Any) -> int | None:
     if isinstance(batch, bool | np.bool_):
         return None if batch else 1
     return count("batch", batch)
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

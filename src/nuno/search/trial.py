@@ -67,23 +67,32 @@ def name_of(function: Any) -> str:
     return f"{module}:{named.__qualname__}"
 
 
+def named_of(function: Any) -> Any:
+    """Return what has a trial's name: its function, or the class of a callable object."""
+    if isinstance(function, Each):
+        function = function.function
+    return function if hasattr(function, "__qualname__") else type(function)
+
+
+def find(module: str, name: str) -> Any:
+    """Return what a module has by a name with dots, None where there is none."""
+    try:
+        found: Any = import_module(module)
+        for part in name.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError):
+        return None
+    return found
+
+
 def check_importable(function: Any, what: str) -> None:
     """Raise unless another process can import a function by its name.
 
     Raises:
         InvalidInputError: a lambda, a function within a function, or one that is hidden by another.
     """
-    if isinstance(function, Each):
-        function = function.function
-    named = function if hasattr(function, "__qualname__") else type(function)
-    found: Any = None
-    try:
-        found = import_module(named.__module__)
-        for part in named.__qualname__.split("."):
-            found = getattr(found, part)
-    except (ImportError, AttributeError):
-        found = None
-    if found is not named:
+    named = named_of(function)
+    if find(named.__module__, named.__qualname__) is not named:
         raise InvalidInputError(
             f"{what} {name_of(function)} cannot be imported by another process; define it at the top of a module"
         )

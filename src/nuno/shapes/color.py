@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 
 from nuno.errors import InvalidInputError
 from nuno.validation import finite_array
+
+COMMON = frozenset(("black", "white", "gray", "red", "green", "blue", "yellow", "orange", "brown", "cyan", "magenta"))
+"""Names that are known without Matplotlib, which takes half a second to load."""
+_HEX = re.compile("#(?:[0-9a-fA-F]{3}){1,2}")
+
+
+def checked_color(color: Any) -> str | tuple[float, float, float]:
+    """Return a colour as it was given, numbers as a tuple.
+
+    Raises:
+        InvalidInputError: no such colour.
+    """
+    if isinstance(color, str) and (color in COMMON or _HEX.fullmatch(color)):
+        return color
+    values = rgb(color)
+    return color if isinstance(color, str) else (float(values[0]), float(values[1]), float(values[2]))
 
 
 def rgb(color: Any) -> np.ndarray:

@@ -53,7 +53,7 @@ class Compound(Shape):
 
 
 def _checked(k: int, part: Any) -> Part:
-    pieces = (part,) if isinstance(part, Shape) else tuple(part)
+    pieces = tuple(part) if isinstance(part, tuple | list) else (part,)
     shape = pieces[0] if pieces else None
     if not isinstance(shape, Shape) or isinstance(shape, Plane) or shape.is_cloth or len(pieces) > 3:
         raise InvalidInputError(

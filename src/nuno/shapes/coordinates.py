@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.shapes import quaternion as quat
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 Self = TypeVar("Self", bound="Coordinates")
@@ -78,6 +78,7 @@ class Coordinates:
         self._place(goal, self.pose()[1])
         return self
 
+    @checked
     def translate(self: Self, offset: ArrayLike, wrt: Frame = "local") -> Self:
         """Move by ``offset``, (3,) or (worlds, 3) [m], along this frame's axes or the world's."""
         step = finite_array("offset", offset, (3,), ("worlds", 3))
@@ -87,6 +88,7 @@ class Coordinates:
         self._place(position + step, quaternion)
         return self
 
+    @checked
     def rotate(self: Self, angle: ArrayLike, axis: ArrayLike | str, wrt: Frame = "local") -> Self:
         """Turn about the origin of this frame, which stays where it is.
 
@@ -113,6 +115,7 @@ class Coordinates:
         self._place(position, turned / np.linalg.norm(turned, axis=-1, keepdims=True))
         return self
 
+    @checked
     def transform(self: Self, other: Coordinates, wrt: Frame = "local") -> Self:
         """Move by another frame's pose, given in this frame ("local") or in the world.
 
@@ -221,6 +224,6 @@ def apply(pose: Pose, points: np.ndarray) -> np.ndarray:
 
 
 def _checked_frame(wrt: Any) -> str:
-    if wrt not in ("local", "world"):
+    if not isinstance(wrt, str) or wrt not in ("local", "world"):
         raise InvalidInputError(f"wrt must be 'local' or 'world', got {wrt!r}")
     return str(wrt)

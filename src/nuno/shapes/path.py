@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,13 +34,20 @@ class Path:
     quaternions: np.ndarray | None = None
     interpolation: Literal["linear", "minimum_jerk"] = "linear"
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, times: ArrayLike, positions: ArrayLike, quaternions: ArrayLike | None = None,
+            interpolation: Literal["linear", "minimum_jerk"] = "linear",
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
         times = finite_array("times", self.times, ("k",))
         if (np.diff(times) <= 0.0).any():
             raise InvalidInputError("times must increase from key to key")
         k = len(times)
         positions = finite_array("positions", self.positions, (k, 3), ("worlds", k, 3))
-        if self.interpolation not in INTERPOLATIONS:
+        if not isinstance(self.interpolation, str) or self.interpolation not in INTERPOLATIONS:
             raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {self.interpolation!r}")
         turns = self.quaternions
         if turns is not None:

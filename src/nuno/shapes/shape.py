@@ -17,10 +17,13 @@ from nuno.mesh import primitives
 from nuno.mesh.closed import enclosed_volume
 from nuno.mesh.memory_limit import SHEET_BYTES, check_host_memory
 from nuno.mesh.primitives import MeshArrays
+from nuno.topology.cloth_mesh_checks import check_cloth_mesh
 from nuno.validation import count, finite_array, index_array, number
 
 LARGE = 1_000_000
 """Vertices from which on it is asked whether there is memory for them."""
+SHORTEST, LONGEST = 1e-6, 1e6
+"""Lengths of shapes [m]."""
 FLAT = 1e-6
 """Of its convex hull's volume, what a hull may lack by rounding."""
 
@@ -67,7 +70,7 @@ class Sphere(Shape):
     kind: ClassVar[str] = "sphere"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0))
+        object.__setattr__(self, "radius", length("radius", self.radius))
 
 
 @dataclass(frozen=True)
@@ -79,8 +82,8 @@ class Cylinder(Shape):
     kind: ClassVar[str] = "cylinder"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0))
-        object.__setattr__(self, "height", number("height", self.height, above=0.0))
+        object.__setattr__(self, "radius", length("radius", self.radius))
+        object.__setattr__(self, "height", length("height", self.height))
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,8 @@ class Capsule(Shape):
     kind: ClassVar[str] = "capsule"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", number("radius", self.radius, above=0.0))
-        object.__setattr__(self, "height", number("height", self.height, above=0.0))
+        object.__setattr__(self, "radius", length("radius", self.radius))
+        object.__setattr__(self, "height", length("height", self.height))
 
 
 @dataclass(frozen=True)
@@ -228,10 +231,7 @@ class ClothMesh(TriangleMesh):
         n = len(self.vertices)
         rest = self.vertices if self.rest is None else self.rest
         rest = finite_array("rest", rest, (n, 2), (n, 3), error=MeshError)
-        corners = np.pad(rest, ((0, 0), (0, 3 - rest.shape[1])))[self.faces]
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        if (flat := np.flatnonzero(area <= 0.0)).size:
-            raise MeshError(f"{flat.size} faces have no area in the rest shape, the first is {flat[0]}; remove them")
+        check_cloth_mesh(np.pad(rest, ((0, 0), (0, 3 - rest.shape[1]))), self.faces, self.vertices)
         object.__setattr__(self, "rest", frozen(rest))
 
 
@@ -268,9 +268,18 @@ def frozen(array: np.ndarray) -> np.ndarray:
     return array
 
 
+def length(name: str, value: Any) -> float:
+    """Return ``value`` [m], of which squares and cubes are still numbers for a solver.
+
+    Raises:
+        InvalidInputError: no number, shorter than 1 um or longer than 1,000 km.
+    """
+    return number(name, value, low=SHORTEST, high=LONGEST)
+
+
 def lengths(name: str, value: Any, n: int) -> tuple[float, ...]:
-    """Return ``value`` as n positive floats [m]."""
-    return tuple(number(f"{name}[{i}]", x, above=0.0) for i, x in enumerate(finite_array(name, value, (n,))))
+    """Return ``value`` as n floats, each as ``length`` returns it [m]."""
+    return tuple(length(f"{name}[{i}]", x) for i, x in enumerate(finite_array(name, value, (n,))))
 
 
 def checked_mesh(vertices: Any, faces: Any) -> MeshArrays:

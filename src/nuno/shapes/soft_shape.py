@@ -24,8 +24,8 @@ from nuno.mesh.closed import check_closed
 from nuno.mesh.lattice import MAX_VOXELS, lattice_tetrahedra
 from nuno.mesh.primitives import MeshArrays
 from nuno.mesh.tetrahedra import Tetrahedra, boundary_faces, box_tetrahedra, volumes
-from nuno.shapes.shape import Shape, checked_mesh, frozen, lengths
-from nuno.validation import count, finite_array, index_array, number
+from nuno.shapes.shape import Shape, checked_mesh, frozen, length, lengths
+from nuno.validation import count, finite_array, flag, index_array
 
 logger = logging.getLogger(__name__)
 FITTED, LATTICE = "fitted", "lattice"
@@ -60,7 +60,7 @@ class SoftBox(SoftShape):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", lengths("size", self.size, 3))
-        object.__setattr__(self, "mean_strain", bool(self.mean_strain))
+        object.__setattr__(self, "mean_strain", flag("mean_strain", self.mean_strain))
         try:
             nx, ny, nz = self.cells
         except (TypeError, ValueError) as error:
@@ -180,6 +180,7 @@ class SoftTetrahedra(SoftShape):
             raise MeshError(f"{flat.size} tetrahedra are flat, the first is {flat[0]}; remove them")
         if loose := len(vertices) - len(np.unique(tets)):
             raise MeshError(f"{loose} of {len(vertices)} vertices belong to no tetrahedron; leave them out")
+        _check_sides(tets)
         object.__setattr__(self, "vertices", frozen(vertices))
         object.__setattr__(self, "tets", frozen(tets))
 
@@ -202,12 +203,28 @@ def closed_mesh(vertices: Any, faces: Any) -> MeshArrays:
     return frozen(points), frozen(triangles)
 
 
+def _check_sides(tets: np.ndarray) -> None:
+    """Check that no side is that of three tetrahedra, as it is where one is there twice.
+
+    Raises:
+        MeshError: one is.
+    """
+    sides = np.sort(np.concatenate([np.delete(tets, k, axis=1) for k in range(4)]), axis=1)
+    _, first, numbers = np.unique(sides, axis=0, return_index=True, return_counts=True)
+    if (crowded := np.flatnonzero(numbers > 2)).size or len(np.unique(np.sort(tets, axis=1), axis=0)) < len(tets):
+        at = int(first[crowded[0]]) % len(tets) if crowded.size else 0
+        raise MeshError(
+            f"tetrahedra overlap: one is there twice, or {crowded.size} sides belong to three or more, the first to "
+            f"element {at}; remove them"
+        )
+
+
 def _set_lengths(shape: SoftShape, *names: str) -> None:
     for name in names:
-        object.__setattr__(shape, name, number(name, getattr(shape, name), above=0.0))
-    object.__setattr__(shape, "mean_strain", bool(getattr(shape, "mean_strain", False)))
+        object.__setattr__(shape, name, length(name, getattr(shape, name)))
+    object.__setattr__(shape, "mean_strain", flag("mean_strain", getattr(shape, "mean_strain", False)))
     kind = getattr(shape, "tetrahedraliser", LATTICE)
-    if kind not in (FITTED, LATTICE):
+    if not isinstance(kind, str) or kind not in (FITTED, LATTICE):
         raise InvalidInputError(f'tetrahedraliser must be "fitted" or "lattice", got {kind!r}')
 
 

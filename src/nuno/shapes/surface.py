@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError
-from nuno.validation import finite_array, index_array
+from nuno.validation import as_array, finite_array, index_array
 
 NEGATIVE = -1e-6  # weights may be this far outside [0, 1] by rounding
 
@@ -29,11 +30,18 @@ class SurfacePoints:
     faces: np.ndarray
     barycentric: np.ndarray
 
+    if TYPE_CHECKING:  # arrays may be given as lists
+
+        def __init__(
+            self, faces: ArrayLike, barycentric: ArrayLike,
+        ) -> None: ...  # fmt: skip
+
     def __post_init__(self) -> None:
-        faces = np.atleast_1d(np.array(self.faces))
+        faces = np.atleast_1d(as_array("faces", self.faces))
         if faces.dtype.kind not in "iu" or faces.ndim > 2 or faces.size == 0:
             raise InvalidInputError(f"faces must be whole numbers of shape (k,) or (worlds, k), got {self.faces!r}")
-        weights = finite_array("barycentric", np.atleast_2d(self.barycentric), (*faces.shape, 3))
+        weights = np.atleast_2d(as_array("barycentric", self.barycentric))
+        weights = finite_array("barycentric", weights, (*faces.shape, 3))
         if weights.min() < NEGATIVE or np.abs(weights.sum(axis=-1) - 1.0).max() > 1e-5:
             raise InvalidInputError("barycentric weights must be at least 0 and add up to 1")
         object.__setattr__(self, "faces", faces.astype(np.int32))
@@ -54,6 +62,11 @@ class SurfacePoints:
 
     def positions(self, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """Return where the points are on a mesh: (k, 3), or (worlds, k, 3) where either is by world [m]."""
+        for name, given in (("vertices", vertices), ("faces", faces)):
+            if not isinstance(given, np.ndarray) or given.ndim not in ((2, 3) if name == "vertices" else (2,)):
+                raise InvalidInputError(f"{name} must be an array of rows of three, got {type(given).__name__}")
+            if given.shape[-1] != 3 or not given.shape[-2]:
+                raise InvalidInputError(f"{name} must be rows of three, got {given.shape}")
         corners = faces[self.faces]
         if vertices.ndim == 3:
             corners = np.broadcast_to(corners, (len(vertices), *corners.shape[-2:]))
@@ -115,12 +128,26 @@ def chosen_points(
         InvalidInputError: an index out of range, or of another shape.
     """
     if not isinstance(where, SurfacePoints):
-        indices = index_array("where", np.atleast_1d(where), ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        given = [where] if isinstance(where, int | np.integer) else where
+        indices = index_array("where", given, ("k",), (worlds, "k"), low=-1, high=vertex_count)
+        _check_once(indices)
         return np.array(np.broadcast_to(indices, (worlds, indices.shape[-1]))), None, None
     chosen = index_array("where.faces", where.faces, ("k",), (worlds, "k"), low=-1, high=len(faces))
     corners = np.where((chosen >= 0)[..., None], faces[chosen], -1)
     shape = (worlds, *corners.shape[-2:])
     return None, np.array(np.broadcast_to(corners, shape)), np.array(np.broadcast_to(where.barycentric, shape))
+
+
+def _check_once(indices: np.ndarray) -> None:
+    """Check that no row of vertices (k,) or (worlds, k), -1 for none, names one twice.
+
+    Raises:
+        InvalidInputError: one does.
+    """
+    ordered = np.sort(np.atleast_2d(indices), axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
+    if twice.any():
+        raise InvalidInputError(f"where names vertex {ordered[:, 1:][twice][0]} twice; each can be held once")
 
 
 def _closest_weights(p: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from nuno.plans.group_plan import cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.rigid.convex_parts import RigidPart
 from nuno.rigid.persistent_manifolds import COUNTS, LEFT, OVERFLOW
-from nuno.rigid.rigid_arrays import SAVED
+from nuno.rigid.rigid_arrays import PARTS, SAVED
 from nuno.rigid.rigid_substep import RigidSettings, run_rigid, run_rigid_group
 from nuno.rigid.saved_contacts import load_contacts, load_listing, save_contacts, save_listing
 from nuno.solvers.rigid_contacts import RigidContacts
@@ -52,6 +52,7 @@ class RigidSolver(RigidContacts):
         substeps: Substeps a frame; None takes `SUBSTEPS`.
         origin: (3,) or (worlds, 3) [m], float64: what positions on the device are relative to, for a float's digits are
             scarce: at 1 m from it a coordinate's step is 0.1 um, at 10 m 1 um.
+        parts: Parts that there is room for at first: each takes 12 kB in every world.
 
     Limitations: contact has no compliance; a mesh that moves counts as its convex hull; a hull's face with more than 12
     corners touches with 12 of them; friction is that of points, so that nothing brakes a spin on one point or a roll.
@@ -66,8 +67,9 @@ class RigidSolver(RigidContacts):
         frame_rate: float = 60.0,
         substeps: int | None = None,
         origin: ArrayLike = (0.0, 0.0, 0.0),
+        parts: int = PARTS,
     ) -> None:
-        super().__init__(int(world_count), str(device))
+        super().__init__(int(world_count), str(device), parts)
         self.frame_rate = float(frame_rate)
         self.gravity = np.asarray(gravity, dtype=float)
         self.substeps = int(substeps) if substeps else SUBSTEPS

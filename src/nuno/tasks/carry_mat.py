@@ -25,7 +25,8 @@ from nuno.tasks.arm_tracks import ArmTracks
 from nuno.tasks.carry_plan import key_times, make_plan, motion_along, plan_motions, track_arms
 from nuno.tasks.carry_result import CarryResult, CarryTrial
 from nuno.tasks.carry_trials import CarryTrials, check_trunk, make_room, mat_size
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
+from nuno.world.device import checked_device, found_device
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -48,6 +49,7 @@ FOAM = Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=0.5, 
 FABRIC = Cloth(area_density=0.6, bending_rigidity=1e-3, thickness=0.004, friction=0.5)
 
 
+@checked
 def carry_mat(
     robot: Humanoid | str | ArmTracks = "talos", mat: Body | str = "soft", material: Material | None = None, *,
     hold: str = "support", arm_distances: ArrayLike = DISTANCES, offsets_x: ArrayLike = OFFSETS_X,
@@ -103,6 +105,9 @@ def carry_mat(
         finite_array(name, value, ("n",)) for name, value in (("offsets_x", offsets_x), ("offsets_y", offsets_y))
     )
     rubbing = number("arm_friction", arm_friction, low=0.0)
+    found_device(checked_device(device))
+    if arms not in ("boxes", "hulls") or (walks is not None and not isinstance(walks, Sequence)):
+        raise InvalidInputError(f"arms must be hulls or boxes, and walks a sequence, got {arms!r} and {walks!r}")
     if isinstance(robot, ArmTracks):
         carrier, tracks = None, robot
         _check_distances(carried, tracks.distances)

@@ -7,13 +7,13 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.files.whole_file import replacing
+from nuno.files.html_table import html_table
+from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.tasks.arm_tracks import FRAME_RATE
 from nuno.tasks.carry_trials import CarryPlan, carry, make_room
 
@@ -68,6 +68,16 @@ class CarryResult:
 
     def __repr__(self) -> str:
         return f"<CarryResult: {len(self.trials)} trials, the mat fell in {int(self.failed.sum())}>"
+
+    def _repr_html_(self) -> str:
+        held = [k for k in np.argsort(self.values) if not self.failed[k]]
+        rows = [
+            (f"{trial.arm_distance:.3f}", f"{trial.offset_x:+.3f}", f"{trial.offset_y:+.3f}", f"{1000 * value:.1f}")
+            for trial, value in ((self.trials[k], self.values[k]) for k in held[:5])
+        ]
+        title = f"CarryResult: {len(self.trials)} trials, the mat fell in {int(self.failed.sum())}"
+        columns = ("arms apart [m]", "hands ahead [m]", "aside [m]", "F [mm s]")
+        return html_table(title, rows, columns=columns if rows else ())
 
     @property
     def values(self) -> np.ndarray:
@@ -186,27 +196,27 @@ class CarryResult:
         Args:
             folder: Where.
             pictures: Whether to draw pictures, which runs two trials once more; without a robot only the plot.
+
+        Raises:
+            FileWriteError: the folder or a file in it cannot be written.
         """
-        folder = FilePath(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = made_folder(folder)
         text = json.dumps(self.to_dict(), indent=1, allow_nan=False)
-        with replacing(folder / "result.json") as partial:
-            partial.write_text(text + "\n", encoding="utf-8")
+        write_whole(folder / "result.json", text + "\n")
         with replacing(folder / "trials.csv") as partial, open(partial, "w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, list(asdict(self.trials[0])))
             writer.writeheader()
             writer.writerows(asdict(trial) for trial in self.trials)
-        with replacing(folder / "table.txt") as partial:
-            partial.write_text(self.table() + "\n", encoding="utf-8")
+        write_whole(folder / "table.txt", self.table() + "\n")
         if not pictures:
             return
-        self.figure().savefig(folder / "plot.png", dpi=110)
+        write_figure(folder / "plot.png", self.figure())
         if self.robot is None:
             return
         if not self.failed.all():
-            self.strip(self.best).savefig(folder / "best.png", dpi=110)
+            write_figure(folder / "best.png", self.strip(self.best))
         if self.failed.any():
-            self.strip(self.telling_failure).savefig(folder / "failed.png", dpi=110)
+            write_figure(folder / "failed.png", self.strip(self.telling_failure))
 
     @property
     def telling_failure(self) -> int:

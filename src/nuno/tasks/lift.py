@@ -14,10 +14,11 @@ import numpy as np
 
 from nuno.bodies.make_bodies import box, plane, soft_box
 from nuno.errors import EstimationError, InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.materials import Soft
 from nuno.search.sweep import sweep
 from nuno.shapes.path import Path
-from nuno.validation import count, number
+from nuno.validation import checked, count, number
 from nuno.world.world import World
 
 RUBBER = Soft(density=200.0, youngs_modulus=2e4, poisson_ratio=0.3, friction=0.5, damping=0.01)
@@ -59,6 +60,14 @@ class LiftResult:
     mass: float
     friction: float
     gravity: float
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (f"{1000 * squeeze:.2f}", f"{force:.3f}" if held else "", "held" if held else "dropped")
+            for squeeze, force, held in zip(self.squeezes, self.forces, self.held, strict=True)
+        ]
+        title = f"LiftResult: least force by Coulomb {self.closed_form:.3f} N"
+        return html_table(title, rows, columns=("squeeze [mm]", "force [N]", "the cube was"))
 
     @property
     def closed_form(self) -> float:
@@ -118,6 +127,7 @@ class LiftTrials:
         }  # fmt: skip
 
 
+@checked
 def lift_soft_cube(
     edge: float = 0.1, cells: int = 5, material: Soft | None = None, *, most: float | None = None, tries: int = 16,
     rounds: int = 2, device: str = "auto", substeps: int | None = None,

@@ -31,6 +31,7 @@ from nuno.robot.stereo import triangulate
 from nuno.shapes.coordinates import Coordinates
 from nuno.shapes.path import Path, minimum_jerk
 from nuno.tasks.hand_beads import BEAD_AT, find_bead, put_beads
+from nuno.validation import checked
 from nuno.world.world import World
 
 LEAN = {"torso_1_joint": 0.0, "torso_2_joint": 0.45, "head_1_joint": 0.785, "head_2_joint": 0.0}
@@ -118,6 +119,7 @@ class TowelPicker:
         towel: The towel in it; None before it was found.
     """
 
+    @checked
     def __init__(
         self, driver: RobotInterface, *, table: Table, rest_height: float = 0.0025, device: str = "auto",
     ) -> None:  # fmt: skip

@@ -14,6 +14,7 @@ from nuno.robot.simulated_robot import SimulatedRobot
 from nuno.tasks.arm_plan import ArmPlan, plan_arms
 from nuno.tasks.fold_comparison import FoldComparison, compare_fold
 from nuno.tasks.fold_motion import SETTLE, FoldMotion
+from nuno.validation import checked
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +56,7 @@ class PlayedFold:
         return self.motion.corner_errors(self.vertices)
 
 
+@checked
 def play_fold(
     robot: SimulatedRobot, cloth: Body, motion: FoldMotion, *, obstacles: Sequence[Body] | None = None,
     settle: float = SETTLE, watch: Callable[[str], None] | None = None,

@@ -15,7 +15,7 @@ from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.materials import Cloth
 from nuno.tasks.cloth_frame import CORNERS, ClothFrame
 from nuno.tasks.fold_motion import FoldMotion, bent
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -67,6 +67,7 @@ class TaughtFold:
         return cls.of(result.fold, result.hands, ClothFrame(result.rectangle.corners), result.best_index)
 
     @classmethod
+    @checked
     def from_hands(
         cls, world: World, cloth: Body, hands: Sequence[HandPath], material: Cloth, *, settle: float = 1.0,
         reach: float = 0.03,

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import InvalidInputError, MeshError
+from nuno.errors import InvalidInputError
+from nuno.topology.cloth_mesh_checks import check_areas
 from nuno.topology.colouring import by_colour, colour
 from nuno.topology.leaves import Leaves, make_leaves
 from nuno.topology.patches import bend_rate, curvature_weights, neighbours
@@ -186,19 +187,7 @@ class ClothTopology:
         e1, e2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
         normal = np.cross(e1, e2)
         double = np.linalg.norm(normal, axis=1)
-        longest = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
-        bad = np.nonzero(double <= 1e-6 * longest**2)[0]
-        if len(bad):
-            raise MeshError(
-                f"{len(bad)} triangles have no area (the first is face {bad[0]}); trimesh's "
-                "mesh.update_faces(mesh.nondegenerate_faces()) takes them out"
-            )
-        unused = np.setdiff1d(np.arange(count), faces)
-        if len(unused):
-            raise MeshError(
-                f"{len(unused)} vertices belong to no face (the first is {unused[0]}); trimesh's "
-                "mesh.remove_unreferenced_vertices() takes them out"
-            )
+        check_areas(rest3, faces)
         normal /= double[:, None]
         warp = np.where(np.abs(normal[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
         warp = warp - (warp * normal).sum(axis=1, keepdims=True) * normal

@@ -10,7 +10,7 @@ from typing import Any
 
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
-from nuno.validation import count, number
+from nuno.validation import checked, count, number
 from nuno.viewer.following import Following
 from nuno.viewer.picked import PLOTTED, Plot, state_rows
 from nuno.viewer.scene import Scene, checked_places
@@ -102,6 +102,7 @@ class Controls(Following):
             self.world.start(1.0 if pace.factor is None else pace.factor)
             self._runs_it = True
 
+    @checked
     def step(self, frames: int = 1) -> None:
         """Let a paused or still world advance by some frames; a running one is paused first.
 
@@ -140,6 +141,7 @@ class Controls(Following):
 
     # Bodies, plots, worlds
 
+    @checked
     def pick(self, body: Body | str | None, *, world: int = 0) -> None:
         """Show a body's name and state in the page, and mark it; None shows no body's.
 
@@ -159,6 +161,7 @@ class Controls(Following):
             self._picked = None if body is None else (self.world._own(body).key, index)
         self._samples_due = 0.0
 
+    @checked
     def plot(self, name: str, read: Callable[[], Any], unit: str = "") -> None:
         """Plot a value over the world's time in the page, as often as the world is looked at.
 
@@ -178,6 +181,7 @@ class Controls(Following):
         self._plots = {**self._plots, str(name): Plot(str(name), unit, read)}
         self._samples_due, self._plots_changed = 0.0, True
 
+    @checked
     def remove_plot(self, name: str) -> None:
         """Plot a value no longer.
 

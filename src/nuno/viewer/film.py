@@ -7,7 +7,6 @@ import logging
 import math
 import os
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +14,10 @@ import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.export import check_extension, one_world
-from nuno.files.whole_file import replacing
+from nuno.files.whole_file import file_path, write_whole
 from nuno.mesh.primitives import PLANE_HALF
 from nuno.shapes.color import rgb
+from nuno.validation import checked
 from nuno.viewer.message import pack
 from nuno.viewer.outline import CREASE, outline
 from nuno.viewer.page import film_page
@@ -104,7 +104,7 @@ class Film:
 
     def __init__(self, scene: Scene | None, rate: float = 30.0, path: str | os.PathLike[str] | None = None) -> None:
         if path is not None:
-            check_extension(FilePath(path), ".html")  # now, not when all is done
+            check_extension(file_path(path), ".html")  # now, not when all is done
         self._scene, self._rate, self._path = scene, rate, path
         self._tracks: dict[int, Track] = {}
         self._times: list[float] = []
@@ -117,6 +117,7 @@ class Film:
                 scene.world._watchers.append(self)
 
     @classmethod
+    @checked
     def of(cls, recording: Recording, *, world: int | None = None) -> Film:
         """Return a film of a recording.
 
@@ -227,6 +228,7 @@ class Film:
             logger.exception("the recording ended at t = %.3f s", now)
             self._failed = error
 
+    @checked
     def save(self, path: str | os.PathLike[str], title: str = "Nuno") -> None:
         """Write one .html file with all that it needs; a file that is there is replaced.
 
@@ -236,12 +238,12 @@ class Film:
 
         Raises:
             InvalidInputError: the path does not end with .html.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
         """
-        goal = FilePath(path)
+        goal = file_path(path)
         check_extension(goal, ".html")
         written = film_page(self.message(), title).encode()
-        with replacing(goal) as partial:
-            partial.write_bytes(written)
+        write_whole(goal, written)
 
     def message(self) -> bytes:
         """Return the film as the page takes it.

@@ -193,7 +193,7 @@ class _Socket(_Local, tornado.websocket.WebSocketHandler):
 
 
 def _bound(host: str, port: int | None) -> tuple[list[Any], int]:
-    tried = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else [port]
+    tried = [*range(FIRST_PORT, FIRST_PORT + PORTS), 0] if port is None else [port]  # 0: any that is free
     for number in tried:
         try:
             sockets = tornado.netutil.bind_sockets(number, address=host)
@@ -206,7 +206,7 @@ def _bound(host: str, port: int | None) -> tuple[list[Any], int]:
                 "one that is free"
             ) from error
         return sockets, int(sockets[0].getsockname()[1])
-    raise ViewerError(f"all ports of {host} from {FIRST_PORT} to {FIRST_PORT + PORTS - 1} are taken; name another")
+    raise ViewerError(f"no port of {host} is free")
 
 
 def _log(handler: Any) -> None:

@@ -25,7 +25,7 @@ def check_quantity(body: Body, quantity: str) -> None:
     Raises:
         InvalidInputError: there is no such quantity, or the body has none.
     """
-    if quantity not in QUANTITIES:
+    if not isinstance(quantity, str) or quantity not in QUANTITIES:
         raise InvalidInputError(f'color_by must be "strain", "layer", "contact" or None, got {quantity!r}')
     if quantity == "layer" and not body.shape.is_cloth:
         raise InvalidInputError(f"only cloths have layers; {body.name!r} is a {body.shape.kind}")

@@ -19,7 +19,7 @@ from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.files.recording import Recording
 from nuno.shapes.coordinates import compose, invert
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 from nuno.viewer.film import Film
 from nuno.viewer.following import weakly
 from nuno.viewer.marks import DrawnCamera, camera_pose
@@ -64,7 +64,7 @@ class Viewer(Orders):
         robots: Links whose bodies came into the world as copies, as in an imagined one.
         frame_rate: Looks per second of real time [1/s], at most: fewer where they would take over 2 % of it.
         host: Which of this machine's addresses the page is served at; by default, nothing outside it gets it.
-        port: The page's port; None is the first that is free from 7000 on.
+        port: The page's port; None is the first that is free from 7000 to 7099, or any other.
 
     Raises:
         InvalidInputError: no such mode or world, or a value out of range.
@@ -74,6 +74,7 @@ class Viewer(Orders):
         Somebody who reaches ``host`` sees everything; there are no passwords.
     """
 
+    @checked
     def __init__(
         self, world: World, *, mode: Mode = "surface", grips: bool = True, contacts: bool = False,
         grip_forces: bool = False, edges: bool = True, control: bool | None = None, force_scale: float = 0.02,
@@ -117,6 +118,7 @@ class Viewer(Orders):
         bundle: dict[str, Any] = found[0] if isinstance(found, tuple) else found or {}
         return bundle
 
+    @checked
     def show(self, *, open: bool = True) -> Viewer:
         """Open the page in a browser, where there is one with a screen; the address is logged in any case.
 
@@ -137,6 +139,7 @@ class Viewer(Orders):
 
     # What is drawn, and how
 
+    @checked
     def draw(
         self, body: Body | str, mode: Mode = "surface", *, explode: float = 1.3,
         slice_at: tuple[ArrayLike, ArrayLike] | None = None, color: Color | None = None, opacity: float = 1.0,
@@ -164,6 +167,7 @@ class Viewer(Orders):
         self._check_open()
         self._restyle(body, Style(mode, explode, slice_at, color, opacity, visible, color_by, color_range))
 
+    @checked
     def add_camera(self, name: str, camera: Camera, *, on: Body | str | None = None, depth: float = 0.3) -> None:
         """Draw a camera's frustum from now on; another of the same name takes its place.
 
@@ -191,6 +195,7 @@ class Viewer(Orders):
             pose = compose(invert((place, turn)), pose)
         self._styles.cameras[name] = DrawnCamera(camera, carrier, pose, far)
 
+    @checked
     def remove_camera(self, name: str) -> None:
         """Draw a camera no longer.
 
@@ -200,6 +205,7 @@ class Viewer(Orders):
         if self._styles.cameras.pop(name, None) is None:
             raise UnknownNameError("camera", name, list(self._styles.cameras))
 
+    @checked
     def look_from(self, eye: ArrayLike, target: ArrayLike, *, field: float = 45.0) -> None:
         """Look from ``eye`` at ``target``, (3,) [m] each, z up; the mouse turns about the target.
 
@@ -225,6 +231,7 @@ class Viewer(Orders):
 
     # What is seen
 
+    @checked
     def record(self, path: str | os.PathLike[str] | None = None, *, rate: float = 30.0) -> Film:
         """Record the world from now on, as the viewer draws it; ``Film.save`` writes one .html file.
 
@@ -244,6 +251,7 @@ class Viewer(Orders):
         film.view = self._view
         return film
 
+    @checked
     def play(self, what: Recording | Film, *, world: int | None = None) -> Film:
         """Show a recording, with a time slider, in place of the world; ``live`` shows the world again.
 

@@ -11,7 +11,7 @@ from nuno.kernels.quiet import quiet_warp
 
 
 def checked_device(name: Any) -> str:
-    """Return a device's name as it is written; whether there is such a device shows on first use.
+    """Return a device's name as it is written; whether there is such a device here is another question.
 
     Raises:
         InvalidInputError: not a device's name.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError
 from nuno.mesh.tetrahedra import FACES, Tetrahedra, boundary_by_element
 from nuno.shapes.soft_shape import SoftShape
-from nuno.validation import finite_array, number
+from nuno.validation import checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -36,6 +36,7 @@ class Drawing:
     elements: np.ndarray | None = None
 
 
+@checked
 def draw(
     body: Body, mode: Mode = "surface", *, explode: float = 1.3, slice_at: tuple[ArrayLike, ArrayLike] | None = None
 ) -> Drawing:
@@ -53,6 +54,11 @@ def draw(
     Raises:
         InvalidInputError: no such mode, tetrahedra of a body that has none, or a plane that is none or leaves nothing.
     """
+    number("explode", explode, low=1.0)
+    if slice_at is not None:
+        slice_at = (finite_array("slice_at[0]", slice_at[0], (3,)), finite_array("slice_at[1]", slice_at[1], (3,)))
+    if not isinstance(mode, str):
+        raise InvalidInputError(f'mode must be "surface", "wireframe" or "tetrahedra", got {mode!r}')
     if mode == "surface":
         vertices, faces = body.skin()
         return Drawing(vertices, faces, _edges(faces))
@@ -64,9 +70,8 @@ def draw(
         raise InvalidInputError(f"only soft bodies have tetrahedra to draw; {body.name!r} is a {body.shape.kind}")
     made = body.shape.tetrahedra()
     if slice_at is None:
-        return exploded(made, body.vertices, number("explode", explode, low=1.0))
-    point, normal = (finite_array(f"slice_at[{k}]", part, (3,)) for k, part in enumerate(slice_at))
-    return sliced(made, body.vertices, point, normal)
+        return exploded(made, body.vertices, explode)
+    return sliced(made, body.vertices, *slice_at)
 
 
 def exploded(made: Tetrahedra, vertices: np.ndarray, factor: float) -> Drawing:

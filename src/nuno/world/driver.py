@@ -6,7 +6,11 @@ from typing import Any, Protocol
 
 
 class Driver(Protocol):
-    """The driver of a world's static bodies, asked around each frame, its lock held; see ``World.drivers``."""
+    """The driver of bodies of a world, asked around each frame, its lock held; see ``World.drivers``.
+
+    One that goes along into imagined worlds has besides ``imagined(futures, world)``, which returns the driver of its
+    copies in a batch, and ``take_future(futures, k)``, by which it becomes its copy in world ``k`` of one.
+    """
 
     def begin_frame(self, start: float, end: float) -> None:
         """Send bodies on their way in the frame from ``start`` to ``end`` [s]."""

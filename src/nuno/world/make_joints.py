@@ -20,17 +20,21 @@ from nuno.joints.joint_drives import (
     spring_drives,
 )
 from nuno.joints.tie import force_limit
+from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose, invert
-from nuno.validation import finite_array
+from nuno.validation import checked, finite_array
 
 
+@checked
 def hinge(
     a: Body, b: Body | None, *, point: ArrayLike, axis: ArrayLike, limits: Any = None, friction: Any = 0.0,
     motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
+    position: Any = 0.0,
 ) -> Joint:  # fmt: skip
     """Join a rigid body to another so that it turns about an axis, from now on: a door, a lid, a clothes-peg.
 
-    Its ``position`` [rad] is 0 as the two are now, and grows as ``a`` turns anticlockwise about ``axis`` against ``b``.
+    Its ``position`` [rad] is 0 as the two are now, or what is given. It grows as ``a`` turns anticlockwise about
+    ``axis`` against ``b``.
     ``friction``, ``limits``, ``motor`` and ``spring`` may be changed at any time.
 
     Args:
@@ -45,6 +49,7 @@ def hinge(
         max_force: [N], the most that it bears, and of turns as much [N m]; None is 10 kN, or 1,000 m/s2 times the mass
             of the heavier body.
         contact: Whether ``a`` and ``b`` touch each other.
+        position: What its position is now [rad], a number or (worlds,) within -pi and pi.
 
     Raises:
         BodyStateError: ``a`` is static or in no world, or ``b`` is not in the same.
@@ -52,17 +57,18 @@ def hinge(
     """
     values = {**limit_drives("hinge", limits), **friction_drives("hinge", friction), **motor_drives("hinge", motor),
               **spring_drives("hinge", spring)}  # fmt: skip
-    return _join("hinge", a, b, point, axis, values, max_force, contact)
+    return _join("hinge", a, b, point, axis, values, max_force, contact, position)
 
 
+@checked
 def slider(
     a: Body, b: Body | None, *, axis: ArrayLike, point: ArrayLike | None = None, limits: Any = None,
     friction: Any = 0.0, motor: Motor | None = None, spring: Spring | None = None, max_force: Any = None,
-    contact: bool = False,
+    contact: bool = False, position: Any = 0.0,
 ) -> Joint:  # fmt: skip
     """Join a rigid body to another so that it slides along an axis and does not turn, from now on: a drawer.
 
-    Its ``position`` [m] is 0 as the two are now, and grows as ``a`` goes along ``axis`` against ``b``.
+    Its ``position`` [m] is 0 as the two are now, or what is given. It grows as ``a`` goes along ``axis`` against ``b``.
 
     Args:
         a: A dynamic rigid body.
@@ -75,6 +81,7 @@ def slider(
         spring: A spring, or None.
         max_force: See ``hinge``.
         contact: Whether ``a`` and ``b`` touch each other.
+        position: What its position is now [m], a number or (worlds,).
 
     Raises:
         BodyStateError: ``a`` is static or in no world, or ``b`` is not in the same.
@@ -82,9 +89,10 @@ def slider(
     """
     values = {**limit_drives("slider", limits), **friction_drives("slider", friction), **motor_drives("slider", motor),
               **spring_drives("slider", spring)}  # fmt: skip
-    return _join("slider", a, b, point, axis, values, max_force, contact)
+    return _join("slider", a, b, point, axis, values, max_force, contact, position)
 
 
+@checked
 def ball_joint(
     a: Body, b: Body | None, *, point: ArrayLike, limit: Any = None, axis: ArrayLike | None = None,
     friction: Any = 0.0, spring: Spring | None = None, max_force: Any = None, contact: bool = False,
@@ -110,6 +118,7 @@ def ball_joint(
     return _join("ball", a, b, point, axis, values, max_force, contact)
 
 
+@checked
 def fixed_joint(a: Body, b: Body | None, *, max_force: Any = None, contact: bool = False) -> Joint:
     """Join a rigid body to another so that they move as one, from now on; as accurate as the other joints.
 
@@ -127,8 +136,9 @@ def fixed_joint(a: Body, b: Body | None, *, max_force: Any = None, contact: bool
 
 
 def _join(
-    kind: str, a: Body, b: Body | None, point: Any, axis: Any, values: dict[str, Any], max_force: Any, contact: bool
-) -> Joint:
+    kind: str, a: Body, b: Body | None, point: Any, axis: Any, values: dict[str, Any], max_force: Any, contact: bool,
+    position: Any = 0.0,
+) -> Joint:  # fmt: skip
     for body in (a, b):
         if not isinstance(body, Body) and not (body is None and body is b):
             raise InvalidInputError(f"a joint needs two bodies, or one and None, got {type(body).__name__}")
@@ -160,6 +170,16 @@ def _join(
         place, turn, other_place, other_turn = (
             np.array(np.broadcast_to(p, (worlds, p.shape[-1]))) for p in (*local, *others)
         )
+        at = np.broadcast_to(finite_array("position", position, (), (worlds,)), (worlds,))
+        if kind == "hinge":
+            if (np.abs(at) > np.pi).any():
+                raise InvalidInputError(f"a hinge's position must lie within -pi and pi, got {position!r}")
+            about = np.zeros((worlds, 4))
+            about[:, 0], about[:, 3] = np.cos(0.5 * at), np.sin(0.5 * at)
+            turn = np.where(at[:, None] == 0.0, turn, quat.multiply(turn, about))
+        elif at.any():  # a slider's other place is that much further back
+            along = quat.rotate(other_turn, np.broadcast_to((0.0, 0.0, 1.0), (worlds, 3)))
+            other_place = other_place - at[:, None] * along
         ignored = () if contact or other is None else (other.key,)
         limit = force_limit(max_force, worlds, a, other)
         spec = JointSpec(kind, place, turn, other_place, other_turn, drive_table(worlds, values), limit, ignored)

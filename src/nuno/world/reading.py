@@ -9,10 +9,12 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import ParticleDynamics
 from nuno.errors import BodyStateError
+from nuno.validation import flag
 from nuno.world.saving import Saving
 
 if TYPE_CHECKING:
     from nuno.camera.camera import Camera
+    from nuno.numbers.device_array import DeviceArray
     from nuno.world.contact_points import ContactPoints
 
 
@@ -40,9 +42,9 @@ class Reading(Saving):
             own = self._own(body)
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
-            return contact_points(self, own, itself)
+            return contact_points(self, own, flag("itself", itself))
 
-    def contact_force(self, body: Body | str) -> Any:
+    def contact_force(self, body: Body | str) -> DeviceArray:
         """Return the sum of the forces that contacts exert on a dynamic body [N], a Warp array (worlds,) of vec3.
 
         It lies on the world's device. The forces are those of ``contacts``, summed up on the host.
@@ -56,9 +58,10 @@ class Reading(Saving):
             found = self.contacts(body)
             total = np.zeros((self.world_count, 3), dtype=np.float32)
             np.add.at(total, found.worlds, found.forces)
-            return wp.array(total, dtype=wp.vec3, device=self.device)
+            force: Any = wp.array(total, dtype=wp.vec3, device=self.device)
+            return force
 
-    def state(self, body: Body | str, copy: bool = True) -> dict[str, Any]:
+    def state(self, body: Body | str, copy: bool = True) -> dict[str, DeviceArray]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
 
         They lie on the world's device, in the layout that other libraries expect (``__dlpack__``,
@@ -82,7 +85,7 @@ class Reading(Saving):
                 raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
             dynamics = own._dynamics
             names = ("positions", "velocities")
-            kept = {} if copy else self._views.get(dynamics, {})
+            kept = {} if flag("copy", copy) else self._views.get(dynamics, {})
             if isinstance(dynamics, ParticleDynamics):
                 made = (dynamics.solver.positions_on_device, dynamics.solver.velocities_on_device)
                 arrays = {name: make(kept.get(name)) for name, make in zip(names, made, strict=True)}
@@ -98,21 +101,39 @@ class Reading(Saving):
 
     # Cameras
 
-    def masks(self, camera: Camera, body: Body | str) -> Any:
+    def masks(self, camera: Camera, body: Body | str) -> DeviceArray:
         """Return where ``body`` is seen: bool (h, w) or (worlds, h, w), on the device."""
         from nuno.camera import render
 
         with self._call():
             return render.render_masks(self, camera, self._own(body))
 
-    def depth(self, camera: Camera) -> Any:
+    def segment(self, camera: Camera, *bodies: Body | str) -> dict[str, DeviceArray]:
+        """Return where each of some bodies, or of all, is seen; everything is drawn once.
+
+        Args:
+            camera: The camera.
+            bodies: Bodies or names; none named is all.
+
+        Returns:
+            By the bodies' names, Warp arrays bool (h, w) or (worlds, h, w), on the device.
+
+        Raises:
+            UnknownNameError: a body that is not in the world.
+        """
+        from nuno.camera import body_masks
+
+        with self._call():
+            return body_masks.segment(self, camera, [self._own(body) for body in bodies])
+
+    def depth(self, camera: Camera) -> DeviceArray:
         """Return the depth along the camera's axis [m]: float (h, w) or (worlds, h, w), on the device."""
         from nuno.camera import render
 
         with self._call():
             return render.render_depth(self, camera)
 
-    def ids(self, camera: Camera) -> Any:
+    def ids(self, camera: Camera) -> DeviceArray:
         """Return which body is seen, its index in ``bodies`` or -1: int (h, w) or (worlds, h, w)."""
         from nuno.camera import render
 

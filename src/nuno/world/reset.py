@@ -17,7 +17,7 @@ from nuno.joints.rows_of_worlds import SOON, WorldRows, merge_path
 from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path
 from nuno.tables.kinematic_motion import arrive
-from nuno.validation import index_array
+from nuno.validation import as_array, index_array
 from nuno.world.capture import same_shape
 from nuno.world.reset_grips import merged_grips, set_merged_grips
 from nuno.world.rigid_layout import RigidLayout
@@ -33,7 +33,7 @@ def checked_worlds(worlds: Any, world_count: int) -> np.ndarray:
     Raises:
         InvalidInputError: not whole numbers, out of range, or one twice.
     """
-    given = np.asarray(worlds)
+    given = as_array("worlds", worlds)
     if given.dtype == bool:
         if given.shape != (world_count,):
             raise InvalidInputError(f"a mask of worlds must have shape ({world_count},), got {given.shape}")

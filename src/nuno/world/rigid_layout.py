@@ -91,7 +91,8 @@ def scene_for(snapshot: Snapshot, bodies: Mapping[str, Body], world: Simulation)
         return world._rigid
     from nuno.bodies.rigid_dynamics import RigidScene
 
-    scene = RigidScene(world, layout.origin)
+    # a batch takes no more room than it needs; more is made where bodies come
+    scene = RigidScene(world, layout.origin, 1 + max((row for place in layout.places for row in place.rows), default=0))
     for place in layout.places:
         # a file may name a body of this process by another key
         key = bodies[place.key].key if place.key in bodies else place.key

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.validation import finite_array, number
+from nuno.validation import finite_array, flag, function, number
 from nuno.world.advancing import Advancing
 from nuno.world.background import Background
 from nuno.world.progress import with_bar
@@ -63,6 +63,10 @@ class Running(Advancing):
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
         span = number("seconds", seconds, low=0.0)
+        if progress is not None:
+            flag("progress", progress)
+        if each_frame is not None:
+            function("each_frame", each_frame)
         with self._change("run"):
             begin = self._time
         if self.is_running:
@@ -128,9 +132,8 @@ class Running(Advancing):
         with self._change("start"):
             if self.is_running:
                 raise BodyStateError("the world runs in the background already")
-            factor = math.inf if real_time_factor == math.inf else real_time_factor
-            if factor != math.inf:
-                factor = number("real_time_factor", factor, above=0.0)
+            endless = isinstance(real_time_factor, float) and real_time_factor == math.inf
+            factor = math.inf if endless else number("real_time_factor", real_time_factor, above=0.0)
             self._background = Background(self, factor)
 
     def stop(self) -> None:

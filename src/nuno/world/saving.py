@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.files.whole_file import file_path
 from nuno.validation import count
 from nuno.world.capture import apply, capture
 from nuno.world.memory import check_memory
@@ -18,6 +19,7 @@ from nuno.world.running import Running
 from nuno.world.snapshot import Snapshot, check_world_index
 
 if TYPE_CHECKING:
+    from nuno.world.driver import Driver
     from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
@@ -27,7 +29,14 @@ class Saving(Running):
     """A simulation with the verbs of time, and those of copies."""
 
     def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
-        """Return everything that the world is, and write it to ``path`` (.npz) where one is given."""
+        """Return everything that the world is, and write it to ``path`` (.npz) where one is given.
+
+        Raises:
+            InvalidInputError: ``path`` is no path.
+            FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
+        """
+        if path is not None:
+            file_path(path)
         with self._change("save"):
             snapshot = capture(self)
         if path is not None:
@@ -88,8 +97,8 @@ class Saving(Running):
             device: Where they run; None is where this world runs.
             world: Which world of a batch is copied; None where this is a single world.
 
-        A driver, such as a simulated robot, moves this world only: what it moves stands still in the copies, which is
-        said once, as a warning.
+        A simulated robot goes along, with what it is about to do: ``robot`` of the batch commands its copies. Other
+        drivers move this world only: what they move stands still in the copies, which is said once, as a warning.
 
         Raises:
             BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
@@ -98,12 +107,17 @@ class Saving(Running):
         worlds = count("n", n)
         with self._change("imagine"):
             chosen = self._chosen("imagine", world)
-            self._tell_of_drivers()
             futures = cast("type[World]", type(self))(device=self._device if device is None else device)
             check_memory(self, worlds, futures.device, chosen)
             snapshot = capture(self).pick(chosen)
         apply(snapshot.spread(worlds), futures)
         futures._family, futures._quiet = self._family, self._quiet
+        for driver in self.drivers:
+            copied = getattr(driver, "imagined", None)
+            if copied is None:
+                self._tell_of(driver)
+            else:
+                futures.drivers.append(copied(futures, chosen))
         return futures
 
     def adopt(self, futures: World, k: int, *, world: int | None = None) -> None:
@@ -128,6 +142,10 @@ class Saving(Running):
                 reset_worlds(self, np.array([chosen]), snapshot)
             else:
                 apply(snapshot, self)
+            for driver in self.drivers:
+                take = getattr(driver, "take_future", None)
+                if take is not None:
+                    take(futures, int(k))
 
     def _chosen(self, what: str, world: int | None) -> int:
         """Return which world is meant.
@@ -141,12 +159,22 @@ class Saving(Running):
             raise BodyStateError(f"{what} needs world=k, one of the {self.world_count} worlds of this batch")
         return 0
 
-    def _tell_of_drivers(self) -> None:
-        """Say once of each driver that imagined worlds are without it."""
-        for driver in self.drivers:
-            if driver not in self._left_out:
-                self._left_out.append(driver)
-                logger.warning(
-                    "imagine leaves %r out: in the imagined worlds what it moves stands still where it is now; "
-                    "let it follow paths there (world.move), or lead grips along the paths that are planned", driver,
-                )  # fmt: skip
+    @property
+    def robot(self) -> Any:
+        """The simulated robot of this world; of a batch, its copies, which are commanded by world.
+
+        Raises:
+            BodyStateError: there is none, or there are several: see ``drivers``.
+        """
+        if len(self.drivers) != 1:
+            raise BodyStateError(f"a world with one robot is needed, this one has {len(self.drivers)} drivers")
+        return self.drivers[0]
+
+    def _tell_of(self, driver: Driver) -> None:
+        """Say once of a driver that imagined worlds are without it."""
+        if driver not in self._left_out:
+            self._left_out.append(driver)
+            logger.warning(
+                "imagine leaves %r out: in the imagined worlds what it moves stands still where it is now; "
+                "let it follow paths there (world.move), or lead grips along the paths that are planned", driver,
+            )  # fmt: skip

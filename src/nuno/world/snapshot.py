@@ -21,7 +21,7 @@ from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path
 from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import of_world
-from nuno.validation import number
+from nuno.validation import checked, number
 from nuno.world.rigid_layout import RigidLayout
 
 if TYPE_CHECKING:
@@ -107,6 +107,7 @@ class Snapshot:
         dynamic = sum(body.dynamics is not None for body in self.bodies)
         return f"<Snapshot at t = {self.time:.3f} s, {len(self.bodies)} bodies, {dynamic} of them dynamic{batch}>"
 
+    @checked
     def spread(self, world_count: int) -> Snapshot:
         """Return a batch of equal copies of this one world."""
 
@@ -115,6 +116,7 @@ class Snapshot:
 
         return self._mapped(repeated, lambda value, _: value, lambda material: material, lambda path: path, world_count)
 
+    @checked
     def pick(self, world: int) -> Snapshot:
         """Return one world of a batch."""
         if self.world_count == 1:

@@ -80,6 +80,7 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         KeyError,
         TypeError,
         EOFError,
+        MemoryError,  # an array that claims to be larger than the machine
         IndexError,
         AttributeError,
         zipfile.BadZipFile,

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
+from nuno.bodies.body_facts import place_text
 from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
 from nuno.bodies.make_dynamics import start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.files.html_table import html_table
 from nuno.joints.grip import Grip, make_grip, warn_shared
 from nuno.joints.joint import Joint, check_joined
 from nuno.joints.tie import check_leader, check_weld, tie_to_leader
@@ -20,7 +22,7 @@ from nuno.materials import Material, Rigid
 from nuno.shapes.path import Path
 from nuno.solvers.resolution import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
-from nuno.validation import finite_array, number
+from nuno.validation import finite_array, flag, number
 from nuno.world.setting import Setting
 
 
@@ -40,6 +42,18 @@ class World(Setting):
     Raises:
         InvalidInputError: a value that is not finite or out of range.
     """
+
+    def _repr_html_(self) -> str:
+        with self.lock:
+            bodies = tuple(self._bodies.values())
+            rows = [
+                (body.name, body.shape.kind, place_text(body),
+                 "static" if body.material is None else type(body.material).__name__)
+                for body in bodies
+            ]  # fmt: skip
+            batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
+            title = f"World at t = {self.time:.3f} s{batch}"
+        return html_table(title, rows, columns=("body", "shape", "position", "dynamics") if rows else ())
 
     # Bodies
 
@@ -131,6 +145,7 @@ class World(Setting):
         """
         with self._change("attach"):
             own = self._own(body)
+            flag("keep_velocity", keep_velocity)
             if own._dynamics is not None and not keep_velocity:
                 raise BodyStateError(
                     f"{own.name!r} is dynamic already; detach it first to change its material, or set keep_velocity"
@@ -260,6 +275,8 @@ class World(Setting):
             if own._dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
             target = self._own(to) if isinstance(to, Body) else None
+            if ignore is not None and (isinstance(ignore, str) or not isinstance(ignore, Sequence)):
+                raise InvalidInputError(f"ignore must be a sequence of bodies or names, got {ignore!r}")
             if target is own:
                 raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
             if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
@@ -341,6 +358,7 @@ class World(Setting):
         """
         with self._change("ignore_contact"):
             own = self._own(a)
+            flag("ignore", ignore)
             pair = frozenset((own.key,)) if own is self._own(b) else self._pair(a, b)
             (self._rules.ignored.add if ignore else self._rules.ignored.discard)(pair)
             self._colliders_changed()
@@ -354,4 +372,5 @@ class World(Setting):
         """
         with self._change("sum_impulses"):
             own = self._own(body)
+            flag("on", on)
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)

@@ -7,6 +7,7 @@ import time
 
 import pytest
 from websockets.sync.server import serve as serve_raw
+from wire_with import PATIENCE
 
 from nuno.errors import (
     ConnectionLostError,
@@ -53,10 +54,8 @@ def test_nobody_listens():
 def test_one_who_listens_but_never_answers():
     """A program that takes the connection and says nothing is given up in time."""
     with socket.create_server(("127.0.0.1", 0)) as mute:
-        begin = time.monotonic()
         with pytest.raises(NotConnectedError, match=r"no answer within 0.3 s"):
             Connection(f"ws://127.0.0.1:{mute.getsockname()[1]}", timeout=0.3)
-        assert time.monotonic() - begin < 5.0
 
 
 def test_one_who_speaks_otherwise():
@@ -141,9 +140,9 @@ def test_lost_while_waiting(other_side):
     with Connection(other_side(handle)) as connection:
         goal = connection.send_goal("/a", "t", {})
         with pytest.raises(ConnectionLostError, match="went away without a word"):
-            connection.call("/s", "t", {}, timeout=10.0)
+            connection.call("/s", "t", {}, timeout=PATIENCE)
         with pytest.raises(ConnectionLostError):
-            goal.result(10.0)
+            goal.result(PATIENCE)
         assert goal.done
         for act in (lambda: connection.call("/s", "t", {}), lambda: connection.send_goal("/a", "t", {}),
                     lambda: connection.publish("/t", "t", {}), connection.check):  # fmt: skip
@@ -155,21 +154,22 @@ def test_closed_with_a_reason(other_side):
     """A server that says why it goes is quoted."""
     with Connection(other_side(lambda own: (own.recv(), own.close(1011, "the simulation failed")))) as connection:
         with pytest.raises(ConnectionLostError, match="code 1011, the simulation failed"):
-            connection.call("/s", "t", {}, timeout=10.0)
+            connection.call("/s", "t", {}, timeout=PATIENCE)
 
 
 def test_one_who_falls_silent(other_side):
     """A server that answers nothing any more, not even pings, is lost after a while."""
+    over = threading.Event()
 
     def freeze(own):
         own.recv()
-        own.protocol_mutex.acquire()  # its thread reads no more: no pong either
-        time.sleep(3.0)
-        own.protocol_mutex.release()
+        with own.protocol_mutex:  # its thread reads no more: no pong either
+            over.wait()
 
     connection = Connection(other_side(freeze), alive=0.4)
     with pytest.raises(ConnectionLostError):
-        connection.call("/s", "t", {}, timeout=20.0)
+        connection.call("/s", "t", {}, timeout=PATIENCE)
+    over.set()
     connection.close()
 
 
@@ -177,7 +177,7 @@ def test_too_long_a_message(other_side):
     """What is longer than is read ends the connection, by name, and fills no memory."""
     with Connection(other_side(lambda own: (own.recv(), own.send("x" * 10**6), silent(own))), max_message=10**5) as own:
         with pytest.raises(ConnectionLostError, match="1009"):
-            own.call("/s", "t", {}, timeout=10.0)
+            own.call("/s", "t", {}, timeout=PATIENCE)
 
 
 def test_sending_from_several_threads(other_side):

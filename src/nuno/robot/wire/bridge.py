@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from nuno.errors import MessageError, MissingPackageError, NotConnectedError
-from nuno.robot.wire.bridge_client import Client, Subscription
+from nuno.robot.wire.bridge_client import Client, Subscription, frame_of
 from nuno.robot.wire.outbox import KEPT, KEPT_MOST
 from nuno.robot.wire.protocol import FROM_CLIENTS, Message, decode, encode
 
@@ -55,7 +55,8 @@ class Bridge:
         self._max_message, self._alive = max_message, alive
         self._origins: list[Any] = [None, *(origins or ())]
         self._subscribers: dict[str, dict[Client, Subscription]] = {}
-        self._latched: dict[str, str] = {}
+        self._latched: dict[str, bytes] = {}
+        self._recent: dict[str, bytes] = {}
         self.clients: set[Client] = set()
         self._thread: int | None = None
 
@@ -98,7 +99,7 @@ class Bridge:
     def publish(self, topic: str, message: Message, latched: bool = False) -> None:
         """Send a message to all that have subscribed to its topic; from any thread, without waiting.
 
-        It is made into text once, whoever gets it.
+        It is made into a frame once, whoever gets it.
 
         Args:
             topic: Its name.
@@ -107,22 +108,40 @@ class Bridge:
         """
         if topic not in self._subscribers and not latched:
             return
-        text = encode({"op": "publish", "topic": topic, "msg": message})
+        frame = frame_of(encode({"op": "publish", "topic": topic, "msg": message}))
+        self._recent[topic] = frame
         if latched:
-            self._latched[topic] = text
+            self._latched[topic] = frame
         if self._thread in (None, threading.get_ident()):
-            self._publish(topic, text)
+            self._publish(topic, frame)
         else:
-            self._loop.call_soon_threadsafe(self._publish, topic, text)
+            self._loop.call_soon_threadsafe(self._publish, topic, frame)
+
+    def forget(self) -> None:
+        """Note that what was published so far is no longer how things are."""
+        self._recent.clear()
+
+    def resend(self, topic: str, client: Client) -> bool:
+        """Send a client what was published on a topic since ``forget``; returns whether there was anything."""
+        if topic not in self._recent:
+            return False
+        if topic not in self._latched:  # of those it got the last one with its subscription
+            client.write(self._recent[topic])
+        return True
+
+    def flush(self) -> None:
+        """Hand all that was published to the system now, not only at the end of this turn of the event loop."""
+        for client in self.clients:
+            client.flush()
 
     # In the event loop
 
-    def _publish(self, topic: str, text: str) -> None:
+    def _publish(self, topic: str, frame: bytes) -> None:
         now = time.monotonic()
         for client, wanted in tuple(self._subscribers.get(topic, {}).items()):
             if now - wanted.sent >= wanted.interval:
                 wanted.sent = now
-                client.write(text, topic, wanted.keep)
+                client.write(frame, topic, wanted.keep)
 
     async def _look(self) -> None:
         while True:
@@ -132,10 +151,9 @@ class Bridge:
 
     async def _stay(self, connection: Any) -> None:
         """Serve a client until it goes."""
-        from websockets.asyncio.server import broadcast
         from websockets.exceptions import ConnectionClosed
 
-        client = Client(connection, broadcast)
+        client = Client(connection)
         self.clients.add(client)
         logger.info("%s connected", client.name)
         try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +17,8 @@ TOLD = 20
 """So many of what one client does wrong the log warns of; nobody is to fill disks."""
 AHEAD = 2**15
 """[bytes] That are handed to the system before it has taken them; what comes after that waits in the outbox."""
+OPEN = "OPEN"
+"""The state of a connection that may be written to."""
 CONTROL = 2**16
 """[bytes] Of pongs that wait for a client that asks for them without end and reads none."""
 
@@ -42,21 +43,22 @@ class Subscription:
 class Client:
     """One that has connected.
 
-    What is sent goes to the socket at once, in the thread of the event loop. What a slow reader has not taken waits
-    here, bounded, until ``look`` finds room.
+    What is sent in one turn of the event loop goes to the socket together at its end. What a slow reader has not taken
+    waits here, bounded, until ``look`` finds room.
 
     Args:
         connection: To it, of the websockets package.
-        broadcast: That package's function that writes to connections without waiting.
     """
 
-    def __init__(self, connection: Any, broadcast: Callable[[Any, str], None]) -> None:
-        self.connection, self._broadcast = connection, broadcast
+    def __init__(self, connection: Any) -> None:
+        self.connection = connection
         address = connection.remote_address or ("unknown",)
         self.name = ":".join(str(part) for part in address[:2])
         self.subscriptions: dict[str, Subscription] = {}
         self.outbox = Outbox()
         self._loop, self._thread = asyncio.get_running_loop(), threading.get_ident()
+        self._frames: list[bytes] = []  # of this turn of the event loop
+        self._gathered = 0  # their size [bytes]
         self._largest = 0  # message that was written [bytes]
         self._complaints = 0
 
@@ -65,24 +67,30 @@ class Client:
 
     def send(self, message: Message) -> None:
         """Send a message that may not be lost; from any thread."""
-        text = encode(message)
+        frame = frame_of(encode(message))
         if threading.get_ident() == self._thread:
-            self.write(text)
+            self.write(frame)
         else:
-            self._loop.call_soon_threadsafe(self.write, text)
+            self._loop.call_soon_threadsafe(self.write, frame)
 
-    def write(self, text: str, topic: str | None = None, keep: int = KEPT) -> None:
-        """Send a text now, or let it wait where the client reads slowly; in the thread of the event loop.
+    def write(self, frame: bytes, topic: str | None = None, keep: int = KEPT) -> None:
+        """Send a frame in this turn of the event loop, or let it wait where the client reads slowly; in that thread.
 
         Args:
-            text: What is sent.
+            frame: What is sent: one that others get too is made once.
             topic: Of a publication: then only ``keep`` of one topic wait.
             keep: How many.
         """
         if not self.outbox and self._waiting() < AHEAD:
-            self._write(text)
-        elif not self.outbox.add(text, topic, keep):
+            self._write(frame)
+        elif not self.outbox.add(frame, topic, keep):
             self.abort("it reads too slowly")
+
+    def flush(self) -> None:
+        """Hand what was sent in this turn to the system."""
+        frames, self._frames, self._gathered = self._frames, [], 0
+        if frames and self.connection.state.name == OPEN:
+            self.connection.transport.write(frames[0] if len(frames) == 1 else b"".join(frames))
 
     def look(self) -> None:
         """Send what waits, as far as the client reads; give up one that takes nothing."""
@@ -95,6 +103,7 @@ class Client:
         """End the connection without a word to the client."""
         logger.warning("%s is disconnected: %s", self.name, reason)
         self.outbox.clear()
+        self._frames = []
         self.connection.transport.abort()
 
     def answer(self, request: Message, values: Any, good: bool = True) -> None:
@@ -110,11 +119,21 @@ class Client:
 
     def _waiting(self) -> int:
         size: int = self.connection.transport.get_write_buffer_size()
-        return size
+        return size + self._gathered
 
-    def _write(self, text: str) -> None:
-        self._largest = max(self._largest, len(text))
-        self._broadcast((self.connection,), text)
+    def _write(self, frame: bytes) -> None:
+        if not self._frames:
+            self._loop.call_soon(self.flush)
+        self._largest = max(self._largest, len(frame))
+        self._frames.append(frame)
+        self._gathered += len(frame)
+
+
+def frame_of(text: str) -> bytes:
+    """Return a text as a websocket's server sends it."""
+    from websockets.frames import Frame, Opcode
+
+    return Frame(Opcode.TEXT, text.encode()).serialize(mask=False)
 
 
 def told(message: Message) -> Message:

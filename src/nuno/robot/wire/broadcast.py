@@ -6,7 +6,8 @@ import logging
 import uuid
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from time import perf_counter
+from typing import Any, Protocol
 
 from nuno.errors import RobotModelError
 from nuno.robot.interface import WRENCHES, RobotInterface
@@ -14,7 +15,6 @@ from nuno.robot.joint_interface import Controller
 from nuno.robot.readings import JointState
 from nuno.robot.wire import image_messages as images
 from nuno.robot.wire import messages as ros
-from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.names import Names
 from nuno.robot.wire.protocol import EXECUTING
 from nuno.robot.wire.transforms import camera_frame, link_transforms
@@ -22,6 +22,16 @@ from nuno.robot.wire.transforms import camera_frame, link_transforms
 logger = logging.getLogger(__name__)
 
 Fields = dict[str, Any]
+
+
+class Publisher(Protocol):
+    """The part of a bridge that publishes."""
+
+    def has_subscribers(self, topic: str) -> bool:
+        """Return True if anyone would get what is published."""
+
+    def publish(self, topic: str, message: Fields, latched: bool = False) -> None:
+        """Send a message to all that have subscribed to its topic; latched, to those that come later too."""
 
 
 class Broadcast:
@@ -35,13 +45,18 @@ class Broadcast:
         names: Of the topics.
         controllers: Of the robot.
         image_rate: Images a second of the robot's time, of every camera that somebody looks through.
+
+    Attributes:
+        seconds: The last publication took [s], its images aside.
     """
 
     def __init__(
-        self, robot: RobotInterface, bridge: Bridge, names: Names, controllers: list[Controller], image_rate: float,
+        self, robot: RobotInterface, bridge: Publisher, names: Names, controllers: list[Controller], image_rate: float,
     ) -> None:  # fmt: skip
         self.robot, self.bridge, self.names, self.controllers = robot, bridge, names, controllers
         self._busy: dict[str, bool] = {}
+        self._asked: str | None = None
+        self.seconds = 0.0
         self._image_interval = 1.0 / image_rate
         self._wrenches = [frame for frame in WRENCHES.values() if self._has(robot.read_wrench, frame)]
         self._has_imu = self._has(robot.read_imu)
@@ -75,17 +90,19 @@ class Broadcast:
         """Publish everything as it is now, images where they are due.
 
         Args:
-            asked: A topic that is due as somebody has just subscribed to it.
+            asked: A topic that is due as somebody has just subscribed to it, which alone is published.
         """
         own, time = self.names, self.robot.now()
+        self._asked = asked
         self._publish_images(time, asked)
+        begin = perf_counter()
         self._send(own.transforms, lambda: {"transforms": link_transforms(self.robot, time)})
         self._send(own.clock, lambda: {"clock": ros.time_fields(time)})
         state = self.robot.read_joint_state()
         if state is not None:
             self._send(own.joint_states, lambda: ros.joint_state_fields(state))
         self._send(own.odometry, lambda: self._odometry(time))
-        watched = [c for c in self.controllers if self.bridge.has_subscribers(own.state_of(c))]
+        watched = [c for c in self.controllers if self._is_wanted(own.state_of(c))]
         reference = self.robot.read_reference() if watched else None
         for controller in watched:
             fields = motion_fields(controller["joint_names"], reference, state, time)
@@ -94,6 +111,7 @@ class Broadcast:
             self._send(own.wrench.format(frame=frame), partial(self._wrench, time, frame))
         if self._has_imu:
             self._send(own.imu, lambda: ros.imu_fields(self.robot.read_imu(), "imu"))
+        self.seconds = perf_counter() - begin
 
     def publish_status(self) -> None:
         """Publish which controllers follow goals, where that has changed."""
@@ -111,8 +129,7 @@ class Broadcast:
             frame, topics = camera_frame(camera), [
                 own.full(name, camera=camera) for name in (own.image, own.compressed, own.depth, own.camera_info)
             ]  # fmt: skip
-            due = [self.bridge.has_subscribers(topic) and (topic == asked or self._is_due(topic, time))
-                   for topic in topics]  # fmt: skip
+            due = [self._is_wanted(topic) and (topic == asked or self._is_due(topic, time)) for topic in topics]
             self._shown |= {topic: time for topic, now in zip(topics, due, strict=True) if now}
             if due[0] or due[1]:
                 reading = self.robot.read_image(camera)
@@ -132,8 +149,11 @@ class Broadcast:
 
     def _send(self, name: str, fields: Callable[[], Fields]) -> None:
         topic = self.names.full(name)
-        if self.bridge.has_subscribers(topic):
+        if self._is_wanted(topic):
             self.bridge.publish(topic, fields())
+
+    def _is_wanted(self, topic: str) -> bool:
+        return self._asked in (None, topic) and self.bridge.has_subscribers(topic)
 
     def _wrench(self, time: float, frame: str) -> Fields:
         return ros.wrench_fields(time, self.robot.read_wrench(frame), frame)

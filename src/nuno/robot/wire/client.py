@@ -28,7 +28,7 @@ from nuno.robot.wire.protocol import EXECUTING
 from nuno.robot.wire.velocity import VelocityStream
 from nuno.robot.wire.wire_goals import WireGoals
 from nuno.shapes.coordinates import Coordinates
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -62,6 +62,7 @@ class WireRobot(RobotInterface):
         RobotTimeoutError: no joint state came.
     """
 
+    @checked
     def __init__(
         self, url: str = "ws://127.0.0.1:9090", robot: Humanoid | str = "talos",
         default_controller: str = "default_controller", *, controllers: Mapping[str, Sequence[str]] | None = None,

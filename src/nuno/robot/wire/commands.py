@@ -75,6 +75,9 @@ class Commands:
         names: Of topics and actions.
         controllers: Of the robot.
         services: Further services by name, which answer by themselves.
+
+    Attributes:
+        taken: Types of the topics that the robot takes, by name.
     """
 
     def __init__(
@@ -101,7 +104,7 @@ class Commands:
         self._streams = {names.trajectory_of(controller): controller for controller in controllers}
         self._followed: dict[str, tuple[Client, Goal]] = {}  # by topic
         taken = {names.full(names.velocity): ros.TWIST} | dict.fromkeys(self._streams, ros.TRAJECTORY)
-        self._taken = taken
+        self.taken = taken
         for hand in robot.robot.description.hands:
             self._actions[names.full(names.gripper, hand=hand)] = partial(self._grip, hand)
         rosapi = RosApi(robot, broadcast.topics, taken, self._service_names, self._actions.keys)
@@ -252,7 +255,7 @@ class Commands:
 
     def _advertise(self, client: Client, message: Message) -> None:
         topic, kind = message["topic"], message["type"]
-        wanted = self._taken.get(topic)
+        wanted = self.taken.get(topic)
         if wanted is not None and kind not in (wanted, wanted.replace("/msg/", "/")):
             raise MessageError(f"{topic} takes {wanted}, not {kind}")
 
@@ -262,7 +265,7 @@ class Commands:
             self._follow_topic(client, topic, message["msg"])
             return
         if topic != self.names.full(self.names.velocity):
-            raise MessageError(f"nobody listens to {topic!r}, only to: {', '.join(sorted(self._taken))}")
+            raise MessageError(f"nobody listens to {topic!r}, only to: {', '.join(sorted(self.taken))}")
         velocity = ros.read_twist(message["msg"])
         if not any(velocity):
             self._stop_driving()

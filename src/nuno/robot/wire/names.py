@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from nuno.validation import check_fields, checked
+
 # Of Nuno's own server, beside what robots with ROS 2 have
 ADVANCE = "/simulation/advance"
 CLOCK_KIND = "/simulation/clock_kind"
@@ -53,6 +55,9 @@ class Names:
     camera_info: str = "{camera}/camera_info"
     transforms: str = "/tf"
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
     def state_of(self, controller: Mapping[str, Any]) -> str:
         """Return the topic on which a controller tells where its joints are to be, in full."""
         return self.full(f"{controller['controller_action'].rpartition('/')[0]}/controller_state")
@@ -65,6 +70,7 @@ class Names:
         """Return the topic on which a controller takes trajectories, in full."""
         return self.full(f"{controller['controller_action'].rpartition('/')[0]}/joint_trajectory")
 
+    @checked
     def full(self, name: str, **parts: str) -> str:
         """Return a name in full, with its parts filled in: "/joint_states"."""
         filled = name.format(**parts)

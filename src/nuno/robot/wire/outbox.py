@@ -24,17 +24,17 @@ class Outbox:
 
     def __init__(self, limit: int = LIMIT) -> None:
         self._limit = limit
-        self._waiting: deque[tuple[str | None, str]] = deque()
+        self._waiting: deque[tuple[str | None, bytes]] = deque()
         self._counts: Counter[str] = Counter()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, text: str, topic: str | None = None, keep: int = KEPT) -> bool:
+    def add(self, text: bytes, topic: str | None = None, keep: int = KEPT) -> bool:
         """Let a text wait for its turn.
 
         Args:
-            text: What is sent.
+            text: What is sent, in a frame.
             topic: Of a publication: then only ``keep`` of one topic wait.
             keep: How many.
 
@@ -51,7 +51,7 @@ class Outbox:
         self._waiting.append((topic, text))
         return True
 
-    def pop(self) -> str:
+    def pop(self) -> bytes:
         """Return the text whose turn it is, which waits no more."""
         topic, text = self._waiting.popleft()
         if topic is not None:

@@ -20,7 +20,7 @@ from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
 from nuno.robot.wire.names import ADVANCE, CLOCK_KIND, RUNNING, STEPPED, Names
 from nuno.robot.wire.protocol import Message
-from nuno.validation import number
+from nuno.validation import checked, number
 
 logger = logging.getLogger(__name__)
 
@@ -28,6 +28,8 @@ CHANGES = ("send_action_goal", "cancel_action_goal", "publish")
 """Messages after which a robot may want to be elsewhere, though no time has passed."""
 OFTEN = 0.004
 """[s] Of real time, at least, between two publications of a simulation that runs faster than its ticks are long."""
+SHARE = 2.0
+"""Times as long as a publication takes, at least, until the next: many subscribers slow it down, not the clock."""
 STALE = 0.5
 """[s] Of the robot's time, at most, between two publications."""
 ROUNDS = 3
@@ -75,6 +77,7 @@ class RobotServer:
         InvalidInputError: a value out of range.
     """
 
+    @checked
     def __init__(
         self, robot: RobotInterface, host: str = "127.0.0.1", port: int = 9090, *,
         real_time_factor: float | None = 1.0, names: Names | None = None, max_message: int = 2**23,
@@ -142,7 +145,7 @@ class RobotServer:
         self._broadcast = Broadcast(self.robot, self._bridge, names, controllers, image_rate)
         is_stepped = self._factor is None
         self._next_tick = time.perf_counter()
-        self._published = self._next_tick, self.robot.now()
+        self._published, self._cost = (self._next_tick, self.robot.now()), 0.0
         self._commands = Commands(
             self.robot, self._broadcast, names, controllers, {ADVANCE: self._wait} if is_stepped else {}
         )
@@ -216,6 +219,11 @@ class RobotServer:
         """Do what a client asks."""
         await self._take_lock()
         try:
+            if message["op"] == "subscribe":
+                if self._bridge.resend(message["topic"], client):  # nothing has changed, nobody else needs it
+                    return
+            else:
+                self._bridge.forget()
             self._commands.handle(client, message)
             if self._factor is None and not self._waiting and message["op"] in CHANGES:
                 self._broadcast.publish()  # no tick comes that would show it
@@ -245,10 +253,14 @@ class RobotServer:
 
     def _tell(self) -> None:
         now, wall = self.robot.now(), time.perf_counter()
-        old = wall - self._published[0] >= OFTEN or now - self._published[1] >= STALE
+        old = wall - self._published[0] >= max(OFTEN, SHARE * self._cost) or now - self._published[1] >= STALE
         if self._factor is None or old or self._commands.has_ended:  # a result comes after its last state
             self._published = wall, now
+            self._bridge.forget()
             self._broadcast.publish()
+            begin = time.perf_counter()
+            self._bridge.flush()
+            self._cost = self._broadcast.seconds + time.perf_counter() - begin
         self._commands.settle()
         for own in [own for own in self._waiting if now >= own[2] - 1e-9]:
             self._waiting.remove(own)

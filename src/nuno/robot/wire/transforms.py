@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from nuno.robot.interface import RobotInterface
+from nuno.robot.pinocchio import pin
 from nuno.robot.wire.image_messages import transform_fields
 
 Fields = dict[str, Any]

@@ -1,0 +1,135 @@
+"""Balance: the motors of a robot that follows a motion on its feet, frame by frame, and whether it fell."""
+
+from __future__ import annotations
+
+import copy
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.robot.link_dynamics import LinkDynamics
+from nuno.robot.pinocchio import pin
+from nuno.robot.robot_state import RobotState
+from nuno.robot.whole_body import Gains, WholeBodyControl
+
+if TYPE_CHECKING:
+    from nuno.robot.links import Links
+    from nuno.robot.servo import Servo
+    from nuno.world.world import World
+
+logger = logging.getLogger(__name__)
+
+STANDS = 1e-3
+"""[m] Above the lowest sole of the wanted posture, up to which a foot is to bear."""
+LEANS = np.cos(np.deg2rad(60.0))
+"""Of the trunk's tilt, from where on a robot has fallen."""
+SINKS = 0.5
+"""Share of the height of the wanted base, below which a robot has fallen."""
+FULL = 0.999
+"""Share of its limit, from where on a motor gives all that it can."""
+
+
+class Balance:
+    """Dynamics of a robot's links, and the control that keeps it on its feet.
+
+    In each frame `WholeBodyControl` finds the joints' torques; the motors exert them and keep softly to the velocities
+    that follow. A robot without feet, one that fell, and joints under a servo command have motors alone. A fall is
+    reported once, as a warning.
+
+    Args:
+        links: One body for each joint.
+        friction: Coulomb's coefficient of the links' surfaces.
+        gains: Of the whole-body control.
+
+    Attributes:
+        dynamics: Bodies and motors.
+    """
+
+    def __init__(self, links: Links, *, friction: float = 0.8, gains: Gains | None = None) -> None:
+        robot = links.robot
+        self.dynamics = LinkDynamics(links, friction=friction)
+        self._robot, self._world = robot, links.world
+        self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
+        self._control = WholeBodyControl(robot, links.world.gravity, friction=friction, gains=gains)
+        self._data = robot.model.createData()
+        self._warns = True
+
+    def command(
+        self, now: RobotState, wanted: RobotState, span: float, servo: Servo | None, external: Any = None
+    ) -> list[np.ndarray]:
+        """Return what the motors are told for a frame: positions, velocities, stiffness, damping and effort (n,) each.
+
+        Args:
+            now: How the robot moves.
+            wanted: How it is to move at the end of the frame.
+            span: [s] of the frame.
+            servo: A torque law that some joints are under, or None.
+            external: What bodies that the links hold do to them, as Pinocchio takes it, or None.
+        """
+        dynamics, robot = self.dynamics, self._robot
+        found = None
+        if self._feet and now.fallen is None:
+            found = self._control.solve(now, wanted, self._standing(wanted.q), external)
+        if found is None:
+            gains = dynamics.stiffness, dynamics.damping, np.zeros(len(dynamics.joints))
+            goal = robot.angles_of(wanted.q), wanted.v[6:]
+        else:
+            acceleration, effort = found
+            speed = now.v[6:]
+            gains = (*dynamics.soft, effort)
+            goal = robot.angles_of(now.q) + span * speed, speed + 0.5 * span * acceleration[6:]
+        values = [np.array(part) for part in (*goal, *gains)]
+        if servo is not None:
+            law: Any = servo.command
+            given = (law.q, law.dq, np.maximum(law.kp, 1e-9), law.kd, law.tau)
+            for part, own in zip(values, given, strict=True):
+                part[servo.rows] = own
+        return values
+
+    def judge(
+        self, before: RobotState, wanted: RobotState, q: np.ndarray, v: np.ndarray, torques: np.ndarray, time: float
+    ) -> RobotState:
+        """Return the state of a robot that moves so after a frame: whether it fell, and which motors give all.
+
+        Args:
+            before: Its state when the frame began.
+            wanted: How it was to move.
+            q: (nq,) where it is.
+            v: (nv,) how it moves.
+            torques: (n,) of its motors [N m; N].
+            time: [s].
+        """
+        span, fallen = time - before.time, before.fallen
+        a = (v - before.v) / span if span > 0.0 else np.zeros_like(v)
+        full = np.abs(torques) >= FULL * self.dynamics.efforts
+        over = tuple(name for name, is_full in zip(self._robot.joint_names, full, strict=True) if is_full)
+        if fallen is None and self._feet:
+            up = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)
+            ground = float(self._soles(wanted.q).min())
+            why = ""
+            if up < LEANS:
+                why = f"its trunk leans by {np.rad2deg(np.arccos(np.clip(up, -1.0, 1.0))):.0f} degrees"
+            elif q[2] - ground < SINKS * (wanted.q[2] - ground):
+                why = f"its base is {q[2] - ground:.2f} m above its feet's ground"
+            if why:
+                fallen = f"{why} at t = {time:.2f} s"
+                if self._warns:
+                    logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
+        return RobotState(time, q, v, a, torques, fallen, over)
+
+    def imagined(self, world: World) -> Balance:
+        """Return the same for the copies of the links in a batch that was imagined from their world."""
+        made = copy.copy(self)
+        made.dynamics, made._warns = self.dynamics.imagined(world), False
+        return made
+
+    def _soles(self, q: np.ndarray) -> np.ndarray:
+        """Return the heights of the soles' middles [m] in a configuration."""
+        pin.forwardKinematics(self._robot.model, self._data, q)
+        pin.updateFramePlacements(self._robot.model, self._data)
+        return np.array([self._data.oMf[foot].translation[2] for foot in self._feet])
+
+    def _standing(self, q: np.ndarray) -> tuple[bool, ...]:
+        heights = self._soles(q)
+        return tuple(bool(height < heights.min() + STANDS) for height in heights)

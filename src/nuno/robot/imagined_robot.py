@@ -1,0 +1,189 @@
+"""ImaginedRobot: the copies of a simulated robot in a batch of imagined worlds, each with its own commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.robot_state import RobotState
+from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.wanted_motion import WantedMotion
+from nuno.shapes.path import Path
+from nuno.validation import finite_array, number
+
+if TYPE_CHECKING:
+    from nuno.robot.balance import Balance
+    from nuno.robot.simulated_robot import SimulatedRobot
+    from nuno.world.world import World
+
+
+class ImaginedRobot:
+    """A robot in every world of a batch: ``world.imagine(n).robot``.
+
+    What is under way in the robot's world goes on in each of them. Commands may differ from world to world. Sensors and
+    cameras are the original's alone.
+
+    Args:
+        original: The robot.
+        world: A batch that was imagined from its world.
+        of: The copies that these are copies of, and which of them; None where the original is copied.
+
+    Attributes:
+        original: The robot.
+        world: The batch.
+        joint_names: Names of its joints, n of them.
+    """
+
+    def __init__(
+        self, original: SimulatedRobot, world: World, of: tuple[ImaginedRobot, int] | None = None
+    ) -> None:  # fmt: skip
+        self.original, self.world = original, world
+        self.joint_names = original.actual.joint_names
+        state, motion, self._servo = original.saved() if of is None else of[0].saved_of(of[1])
+        self._links = [world.find(body.name) for body in original.links.bodies]
+        self.balance: Balance | None = None
+        if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
+            self.balance = original.balance.imagined(world)
+        self._states: list[RobotState] = [state] * world.world_count
+        groups = {name: own.names for name, own in original.joints.controllers.items()}
+        self._motions = []
+        for _ in range(world.world_count):
+            own = WantedMotion(original.wanted.copy(), groups, world.time)
+            own.load(motion)
+            own.disown()
+            for name, controller in own.joints.controllers.items():
+                controller.near = original.joints.controllers[name].near
+            self._motions.append(own)
+        self._before = self._states
+
+    def __repr__(self) -> str:
+        return f"<ImaginedRobot {self.original.actual.name!r} in {self.world.world_count} worlds>"
+
+    # What it does
+
+    def state(self) -> tuple[RobotState, ...]:
+        """Return where the robot is and how it moves, and whether it fell, of each world."""
+        with self.world.lock:
+            return tuple(self._states)
+
+    def angle_vector(
+        self, angles: ArrayLike | Mapping[str, ArrayLike] | None = None, seconds: float = 1.0
+    ) -> np.ndarray:
+        """Send joints to angles in ``seconds`` [s] where they are given, and return where they are, (worlds, n).
+
+        Args:
+            angles: (n,) for all worlds or (worlds, n) [rad; m for slides], or by name a number or (worlds,), others
+                staying where they are sent.
+            seconds: [s].
+
+        Raises:
+            InvalidInputError: angles of other shapes, or not finite.
+            UnknownNameError: no joint of that name.
+            BodyStateError: the robot walks or is under a servo command.
+        """
+        with self.world.lock:
+            worlds = self.world.world_count
+            if angles is not None:
+                span = number("seconds", seconds, above=0.0)
+                wanted = np.array([own.joints.desired[0] for own in self._motions])
+                if isinstance(angles, Mapping):
+                    for name, value in angles.items():
+                        k = self.original.actual.joint_index(name)
+                        wanted[:, k] = finite_array(f"the angle of {name!r}", value, (), (worlds,))
+                else:
+                    count = len(self.joint_names)
+                    wanted = np.array(
+                        np.broadcast_to(finite_array("angles", angles, (count,), (worlds, count)), wanted.shape)
+                    )
+                if self._servo is not None or any(own.gait.is_walking for own in self._motions):
+                    raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
+                for own, goal in zip(self._motions, wanted, strict=True):
+                    for name, rows in own.joints.rows.items():
+                        names = own.joints.controllers[name].names
+                        own.joints.send(name, JointTrajectory(names, np.array([span]), goal[rows][None]))
+            robot = self.original.actual
+            return np.array([robot.angles_of(state.q) for state in self._states])
+
+    def saved_of(self, world: int) -> tuple[RobotState, Any, Any]:
+        """Return state, wanted motion and servo command of one world, as ``SimulatedRobot.saved`` does."""
+        if not 0 <= world < len(self._motions):
+            raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
+        return self._states[world], self._motions[world].save(), self._servo
+
+    # What the world asks of it
+
+    def begin_frame(self, start: float, end: float) -> None:
+        """Set the motors for a frame, or send the links on their way."""
+        span, self._before = end - start, list(self._states)
+        servo = None if self.balance is not None or self._servo is None else self._serve
+        aims = [own.begin(end, span, servo) for own in self._motions]
+        if span <= 0.0:
+            return
+        if self.balance is not None:
+            loads = self.balance.dynamics.loads()
+            told = [
+                self.balance.command(state, aim, span, self._servo, load)
+                for state, aim, load in zip(self._states, aims, loads, strict=True)
+            ]
+            self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
+            return
+        moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
+        if moved:
+            self._lead(start, end, aims)
+        self._states = aims
+
+    def end_frame(self) -> None:
+        """Take the frame's motion as done."""
+        if self.balance is None:
+            for own in self._motions:
+                own.joints.take_step()
+                own.gait.end_frame()
+            return
+        q, v = self.balance.dynamics.read()
+        torques = self.balance.dynamics.efforts_now()
+        for w, own in enumerate(self._motions):
+            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
+            self._states[w] = state
+            own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
+            own.gait.end_frame()
+
+    def cancel_frame(self) -> None:
+        """Go back to where the robot was when the frame began."""
+        self._states = list(self._before)
+        for own in self._motions:
+            own.cancel()
+
+    def save(self) -> Any:
+        """Return all that it is, for a snapshot."""
+        joints = () if self.balance is None else self.balance.dynamics.joints
+        return list(self._states), [own.save() for own in self._motions], joints, self._servo
+
+    def load(self, saved: Any) -> None:
+        """Become what it was when a snapshot was taken."""
+        states, motions, joints, self._servo = saved
+        self._states = list(states)
+        for own, motion in zip(self._motions, motions, strict=True):
+            own.load(motion)
+        if self.balance is not None:
+            self.balance.dynamics.joints = joints
+
+    def imagined(self, futures: World, world: int) -> ImaginedRobot:
+        """Return the copies of one world's robot in a batch that was imagined from that world."""
+        return ImaginedRobot(self.original, futures, (self, world))
+
+    def _lead(self, start: float, end: float, aims: list[RobotState]) -> None:
+        """Send the links to where the robots are at the end of the frame, on a path for each world."""
+        poses = [self.original.links.poses_of(own.robot) for own in self._motions]
+        places, turns = (np.array(part) for part in zip(*poses, strict=True))
+        worlds, times = self.world.world_count, np.array([start, end])
+        for k, body in enumerate(self._links):
+            place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
+            path = Path(times, np.stack([place, places[:, k]], axis=1), np.stack([turn, turns[:, k]], axis=1))
+            self.world.move(body, path)
+
+    def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
+        return self._servo.rows, self._servo.step(before, others, base, span, None)

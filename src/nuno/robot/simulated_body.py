@@ -1,0 +1,100 @@
+"""SimulatedBody: dynamics of a simulated robot's links, given and taken away at any time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.simulated_senses import SimulatedSenses
+from nuno.robot.trajectory_controller import ARRIVED
+
+if TYPE_CHECKING:
+    from nuno.robot.balance import Balance
+    from nuno.robot.gait import Gait
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.links import Links
+    from nuno.robot.simulated_joints import SimulatedJoints
+    from nuno.robot.wanted_motion import WantedMotion
+
+
+class SimulatedBody(SimulatedSenses):
+    """Dynamics of ``SimulatedRobot``.
+
+    Attributes:
+        links: Its links in the world.
+        joints: Its joints and controllers.
+        gait: Its walks.
+        balance: Its dynamics; None where its links are one body for each shape.
+    """
+
+    links: Links
+    joints: SimulatedJoints
+    gait: Gait
+    balance: Balance | None
+    wanted: Humanoid
+    _motion: WantedMotion
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Return True if the links have dynamics."""
+        return self.balance is not None and self.balance.dynamics.is_attached
+
+    def attach(self) -> None:
+        """Give the links dynamics from where they are, at rest: masses, motors, contact and balance.
+
+        Raises:
+            BodyStateError: they have them.
+            InvalidInputError: links that were made otherwise than by ``dynamics=True`` or ``enter(world, "joints")``.
+        """
+        if self.balance is None:
+            raise InvalidInputError(
+                f"the links of {self.actual.name!r} are one body for each shape; dynamics need one for each joint: "
+                'SimulatedRobot(..., dynamics=True), or links of robot.enter(world, "joints")'
+            )
+        with self.world.lock:
+            self.balance.dynamics.attach()
+            self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
+
+    def detach(self) -> None:
+        """Take the dynamics away: the robot stands still in its posture, and goes exactly where it is sent from now on.
+
+        Raises:
+            BodyStateError: it has none.
+        """
+        with self.world.lock:
+            if self.balance is None or not self.is_dynamic:
+                raise BodyStateError(f"{self.actual.name!r} has no dynamics")
+            self.balance.dynamics.detach()
+            self._arrive_within(ARRIVED)
+            self._start_from(self.actual.configuration())
+
+    def set_up(self, position: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
+        """Stand the robot up in its posture, at rest, wherever it is now, as somebody would who lifts it.
+
+        Args:
+            position: (3,) [m], of the point between its soles.
+            yaw: Where it looks [rad].
+        """
+        with self.world.lock:
+            was_dynamic = self.is_dynamic
+            if was_dynamic:
+                self.detach()
+            self.actual.angle_vector(self.actual.angles_of(self.actual.posture_configuration()))
+            self.actual.stand(position, yaw)
+            self.links.follow(0.0)
+            self._start_from(self.actual.configuration())
+            if was_dynamic:
+                self.attach()
+
+    def _arrive_within(self, near: float) -> None:
+        for controller in self.joints.controllers.values():
+            controller.near = near
+
+    def _start_from(self, q: np.ndarray) -> None:
+        self._motion.start_from(q, self.world.time)
+        self._state = self._motion.aim
+        if self.actual is not self.wanted:
+            self.actual.move_to(self.wanted.angle_vector(), q[:7])

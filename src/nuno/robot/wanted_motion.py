@@ -1,0 +1,114 @@
+"""WantedMotion: how a robot is to move as its controllers and its walk say, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.robot.gait import Gait
+from nuno.robot.robot_state import RobotState
+from nuno.robot.simulated_joints import SimulatedJoints, joined
+from nuno.robot.stance import Stance
+from nuno.robot.trajectory import Motion
+
+if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
+
+Servo = Callable[[RobotState, Motion, "np.ndarray | None", float], tuple[np.ndarray, Motion]]
+"""Joints that something else moves, and their motion: from the state before, the others' motion, the base, a span."""
+
+
+class WantedMotion:
+    """Joints, walk and stance of a robot, and where they want it.
+
+    Without dynamics that is where the robot is.
+
+    Args:
+        robot: The robot, which goes where it is wanted.
+        groups: Joint names by controller.
+        time: [s], now.
+
+    Attributes:
+        robot: The robot.
+        joints: Its joints and controllers.
+        gait: Its walks.
+        aim: How it is to move at the end of the frame.
+    """
+
+    def __init__(self, robot: Humanoid, groups: Mapping[str, Sequence[str]], time: float) -> None:
+        self.robot = robot
+        self.joints = SimulatedJoints(robot, groups)
+        self.gait, self._stance = Gait(robot, self.joints), Stance(robot)
+        nothing = np.zeros(robot.model.nv)
+        self.aim = RobotState(time, robot.configuration(), nothing, nothing)
+        self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
+
+    def begin(self, end: float, span: float, servo: Servo | None = None) -> RobotState:
+        """Return how the robot is to move at a time ``end`` [s], ``span`` [s] from now; ``end_frame`` takes that."""
+        before, robot = self.aim, self.robot
+        rows, given = None, None
+        self._kept = (before, robot._angles, robot._position, robot._quaternion)
+        if span <= 0.0:
+            self.joints.step(0.0)
+            return before
+        base = base_motion = None
+        if self.gait.is_walking:
+            walk = self.gait.at(self.joints.clock + span)
+            rows = self.gait.rows
+            given = (robot.angles_of(walk.q)[rows], walk.v[6:][rows], walk.a[6:][rows])
+            base, base_motion = walk.q[:7], (walk.v[:6], walk.a[:6])
+        if servo is not None:
+            others = self.joints.step(span, rows, given)
+            rows, given = joined(rows, given, *servo(before, others, base, span))
+        positions, velocities, accelerations = self.joints.step(span, rows, given)
+        if positions is robot._angles and base is None:
+            self.aim = RobotState(end, before.q, before.v, before.a)
+            return self.aim
+        if base is None and (stood := self._stance.base(robot._angles, (positions, velocities, accelerations))):
+            base, base_motion = stood
+        v, a = np.zeros_like(before.v), np.zeros_like(before.a)
+        v[6:], a[6:] = velocities, accelerations
+        if base is not None and base_motion is not None:
+            v[:6], a[:6] = base_motion
+        robot.move_to(positions, base)
+        self.aim = RobotState(end, robot.configuration(), v, a)
+        return self.aim
+
+    def cancel(self) -> None:
+        """Go back to where all was when the frame began."""
+        assert self._kept is not None
+        self.aim, *pose = self._kept
+        self._put(*pose)
+
+    def start_from(self, q: np.ndarray, time: float) -> None:
+        """Be at rest in a configuration (nq,): nothing that was wanted before is wanted any more."""
+        robot, nothing = self.robot, np.zeros(self.robot.model.nv)
+        robot.move_to(np.clip(robot.angles_of(q), *robot.joint_limits), q[:7])
+        self.aim = RobotState(time, robot.configuration(), nothing, nothing)
+        self.gait.give_up("the robot was put elsewhere")
+        self.joints.put(robot.angle_vector())
+
+    def save(self) -> tuple[Any, ...]:
+        """Return all that it is, for ``load``."""
+        robot = self.robot
+        pose = (robot._angles, robot._position, robot._quaternion)
+        return self.aim, pose, self.joints.save(), self.gait.save()
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Become what it was; goals that came since are given up."""
+        self.aim, pose, joints, gait = saved
+        self._put(*pose)
+        self.joints.load(joints)
+        self.gait.load(gait)
+
+    def disown(self) -> None:
+        """Take copies in place of the goals: those of whoever it was loaded from stay as they are."""
+        for controller in self.joints.controllers.values():
+            controller.goal = None if controller.goal is None else controller.goal.copy()
+        self.gait.disown()
+
+    def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
+        self.robot._angles = angles
+        self.robot._place(position, quaternion)

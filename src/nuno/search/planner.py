@@ -1,0 +1,144 @@
+"""plan: what to do next, found by imagining it: sampling-based model-predictive control over knots of a motion."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nuno.errors import EstimationError, InvalidInputError
+from nuno.validation import count, finite_array, number
+from nuno.world.world import World
+
+log = logging.getLogger(__name__)
+
+METHODS = ("cem", "mppi")
+SMALLEST = 1e-3
+"""Share of its first value that a standard deviation keeps at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The knots of the best motion that was imagined.
+
+    Attributes:
+        knots: (k, d) float, what the caller's ``act`` takes.
+        cost: What it cost in imagination.
+        history: (iterations,) float, the lowest cost so far after each iteration.
+        mean: (k, d) float, of the last distribution.
+        spread: (k, d) float, standard deviations likewise.
+        failed: How many futures had no finite cost.
+    """
+
+    knots: np.ndarray
+    cost: float
+    history: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    failed: int
+
+
+def plan(
+    world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *, start: ArrayLike,
+    spread: ArrayLike, horizon: float, samples: int = 32, iterations: int = 4, method: Literal["cem", "mppi"] = "cem",
+    elites: int | None = None, temperature: float = 0.1, bounds: tuple[ArrayLike, ArrayLike] | None = None,
+    seed: int = 0, device: str | None = None,
+) -> Plan:  # fmt: skip
+    """Find what to do next: imagine many motions in one batch, keep to the best, and do so again around them.
+
+    The world itself stays as it is. To act, give the knots to the robot or the grips of the world, run it for a while,
+    and plan again from there: with ``start=plan.knots``, a few iterations are enough.
+
+    Args:
+        world: A single world.
+        act: Sets a batch on its way: ``act(futures, knots)`` with knots (samples, k, d), such as paths for grips
+            (``nuno.Path`` takes an axis of worlds) or angles for ``futures.robot``.
+        cost: ``cost(futures)`` after the horizon, (samples,); what is not finite counts as failed.
+        start: (k, d), the motion to begin with; it is among those that are tried.
+        spread: Standard deviations of the first iteration, a number or (k, d) or (d,).
+        horizon: How long each motion is imagined [s].
+        samples: Futures in an iteration.
+        iterations: How many.
+        method: "cem", the cross-entropy method: mean and standard deviation of the best ones (Rubinstein & Kroese,
+            2004). Or "mppi", model-predictive path integral control: a mean weighted by exp(-cost / temperature), of
+            costs scaled to the range of the iteration (Williams et al., ICRA 2016).
+        elites: How many the best ones of "cem" are; None is an eighth of the samples, at least 2.
+        temperature: Of "mppi".
+        bounds: Lowest and highest knots, each a number, (d,) or (k, d); None is none.
+        seed: Of the samples.
+        device: Where futures run; None is where the world runs.
+
+    Raises:
+        InvalidInputError: an argument out of range, or costs of another shape.
+        EstimationError: no future of the first iteration has a finite cost.
+    """
+    mean = finite_array("start", start, ("k", "d"))
+    shape = mean.shape
+    sigma = np.array(np.broadcast_to(_fitting("spread", spread, shape), shape))
+    if (sigma <= 0.0).any():
+        raise InvalidInputError(f"spread must be above 0, got {sigma.min():g}")
+    low, high = (
+        np.broadcast_to(_fitting("bounds", side, shape), shape) if bounds is not None else np.full(shape, default)
+        for side, default in zip(bounds or (0.0, 0.0), (-np.inf, np.inf), strict=True)
+    )
+    if (low > high).any():
+        raise InvalidInputError("the lower bounds must not be above the upper ones")
+    seconds = number("horizon", horizon, above=0.0)
+    n, rounds = count("samples", samples), count("iterations", iterations)
+    best_of = max(2, n // 8) if elites is None else count("elites", elites)
+    if method not in METHODS:
+        raise InvalidInputError(f"method must be one of {METHODS}, got {method!r}")
+    if n < 2 or best_of > n:
+        raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
+    heat = number("temperature", temperature, above=0.0)
+    random, floor = np.random.default_rng(seed), SMALLEST * sigma
+    futures = world.imagine(n, device)
+    saved = futures.save()
+    found, lowest, failed, history = mean, np.inf, 0, []
+    for k in range(rounds):
+        knots = mean + sigma * random.standard_normal((n, *shape))
+        knots[0] = mean if k == 0 else found  # the start, and then the best, are always among them
+        knots = np.clip(knots, low, high)
+        if k:
+            futures.restore(saved)
+        act(futures, knots)
+        futures.run(seconds)
+        costs = _checked(cost(futures), n)
+        finite = np.isfinite(costs)
+        failed += int(n - finite.sum())
+        if not finite.any():
+            if k == 0:
+                raise EstimationError("no motion that was imagined has a finite cost; is the start possible at all?")
+            history.append(lowest)
+            continue
+        order = np.argsort(np.where(finite, costs, np.inf), kind="stable")
+        if costs[order[0]] < lowest:
+            found, lowest = knots[order[0]], float(costs[order[0]])
+        if method == "cem":
+            chosen = knots[order[: min(best_of, int(finite.sum()))]]
+            mean, sigma = chosen.mean(axis=0), np.maximum(chosen.std(axis=0), floor)
+        else:
+            span = max(float(np.ptp(costs[finite])), 1e-300)
+            weights = np.where(finite, np.exp(-(np.where(finite, costs, 0.0) - costs[order[0]]) / span / heat), 0.0)
+            mean = np.einsum("n,nkd->kd", weights / weights.sum(), knots)
+        history.append(lowest)
+        log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
+    return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
+
+
+def _fitting(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.asarray(value, dtype=float)
+    if array.shape not in ((), shape[1:], shape) or np.isnan(array).any():
+        raise InvalidInputError(f"{name} must be a number, {shape[1:]} or {shape}, got {value!r}")
+    return array
+
+
+def _checked(costs: Any, n: int) -> np.ndarray:
+    array = np.asarray(costs.numpy() if hasattr(costs, "numpy") else costs, dtype=float)
+    if array.shape != (n,):
+        raise InvalidInputError(f"cost must return one number for each of {n} futures, got shape {array.shape}")
+    return array

@@ -1,0 +1,91 @@
+"""Robots in imagined worlds: what is under way goes on with the same bits, commands differ, and the best is adopted."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.errors import BodyStateError, InvalidInputError
+
+
+def standing(dynamics):
+    """Return a world and a robot in it whose arm is under way, with a towel that falls before it."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    towel = world.add(nuno.sheet((0.2, 0.2), cells=(4, 4), position=(0.6, 0.0, 1.0)))
+    world.attach(towel)
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=dynamics)
+    robot.angle_vector({"arm_left_4_joint": float(robot.angle_vector()[17]) - 0.3}, 0.5)
+    world.run(0.1)
+    return world, robot, towel
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["kinematic", "dynamic"])
+def scene(request):
+    """The scene of ``standing``, saved."""
+    world, robot, towel = standing(request.param)
+    return world, robot, towel, world.save()
+
+
+def test_what_is_under_way_goes_on_in_every_world(scene):
+    """An arm on its way goes on, in each of three worlds, to the bit as in the robot's own world."""
+    world, robot, towel, saved = scene
+    world.restore(saved)
+    futures = world.imagine(3)
+    assert [state.q.tolist() for state in futures.robot.state()] == [robot.state().q.tolist()] * 3
+    world.run(0.3)
+    futures.run(0.3)
+    link = robot.links.bodies[20]
+    for k, state in enumerate(futures.robot.state()):
+        assert np.array_equal(state.q, robot.state().q) and np.array_equal(state.v, robot.state().v)
+        assert np.array_equal(futures.find(link.name).vertices[k], link.vertices)
+        assert np.array_equal(futures.find(towel.name).vertices[k], towel.vertices)
+
+
+def test_commands_differ_and_the_best_is_adopted(scene):
+    """Each world's head goes elsewhere; the world becomes the second one, robot and its goal included."""
+    world, robot, _, saved = scene
+    world.restore(saved)
+    futures = world.imagine(3)
+    wanted = np.array([-0.1, 0.0, 0.1])
+    futures.robot.angle_vector({"head_1_joint": wanted}, 0.2)
+    futures.run(0.5)
+    k = robot.actual.joint_index("head_1_joint")
+    np.testing.assert_allclose(futures.robot.angle_vector()[:, k], wanted, atol=0.01)
+    assert robot.read_reference().positions[k] == pytest.approx(0.0, abs=1e-3)  # the robot itself knows nothing of it
+    one = futures.robot.state()[2]
+    world.adopt(futures, 2)
+    assert np.array_equal(robot.state().q, one.q)
+    futures.run(0.1)
+    world.run(0.1)
+    assert np.array_equal(robot.state().q, futures.robot.state()[2].q)
+
+
+def test_a_batch_goes_back_with_its_robots(scene):
+    """Saved and restored, all worlds' robots go on with the same bits; copies of a copy too."""
+    world, _, _, saved = scene
+    world.restore(saved)
+    futures = world.imagine(2)
+    futures.robot.angle_vector({"head_1_joint": np.array([-0.1, 0.1])}, 0.2)
+    futures.run(0.1)
+    kept = futures.save()
+    futures.run(0.1)
+    once = [state.q for state in futures.robot.state()]
+    futures.restore(kept)
+    again = futures.imagine(2, world=1)
+    futures.run(0.1)
+    again.run(0.1)
+    assert all(np.array_equal(a, state.q) for a, state in zip(once, futures.robot.state(), strict=True))
+    assert all(np.array_equal(once[1], state.q) for state in again.robot.state())
+
+
+def test_bad_commands_are_named(scene):
+    """Another number of joints or worlds, and a world without a robot."""
+    world, _, _, saved = scene
+    world.restore(saved)
+    futures = world.imagine(2)
+    with pytest.raises(InvalidInputError, match="angles"):
+        futures.robot.angle_vector(np.zeros((2, 5)))
+    with pytest.raises(InvalidInputError, match="head_1_joint"):
+        futures.robot.angle_vector({"head_1_joint": np.zeros(3)})
+    with pytest.raises(BodyStateError, match="one robot"):
+        _ = nuno.World(device="cpu").robot
