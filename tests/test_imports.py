@@ -26,6 +26,10 @@ REPLACED = {
 }  # fmt: skip
 
 
+STILL_LONG = {"camera/picture.py"}
+"""Files that are yet to be cut. Who cuts one takes it away; nothing is added."""
+
+
 @cache
 def modules():
     """Return each module's name below ``nuno`` and its tree."""
@@ -105,11 +109,12 @@ def test_file_names_are_unique():
 
 
 def test_files_are_short():
-    """No file has more than 400 lines: past that there is a second concept in it."""
+    """No file has more than 400 lines, for past that there is a second concept in it; but the list of public names."""
     lengths = {
         path.relative_to(PACKAGE).as_posix(): len(path.read_text().splitlines()) for path in PACKAGE.rglob("*.py")
     }
-    assert not {place: lines for place, lines in lengths.items() if lines > 400}
+    long = {place for place, lines in lengths.items() if lines > 400}
+    assert long == {"__init__.py", *STILL_LONG}
 
 
 def test_replaced_words_name_nothing():

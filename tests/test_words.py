@@ -38,7 +38,6 @@ ALLOWED = {
     r"query_ball_point|fillConvexPoly|_least_squares": "names of SciPy and OpenCV; the field's least squares",
     r"fill_(doubtful_)?holes": "morphology's hole filling",
     r"(taught_|find_)?[lL]ayers": "the layers of a folded cloth, public names",
-    r"(is_)?root": "of a tree of joints",
     r"over": "what lies over a point, public: `Layers.over`",
     r"known": "public argument of `nuno.fit_material`: the rest of the material",
     r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",

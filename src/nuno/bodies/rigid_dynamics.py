@@ -314,7 +314,7 @@ class RigidDynamics(Dynamics):
         self.load_state(whole)
 
     def has_shape(self, deformed: tuple[np.ndarray, Pose] | None, thickness: float) -> bool:
-        """Return whether it moves a body in this shape, deformed or not, of this thickness [m]."""
+        """Return True if it moves a body in this shape, deformed or not, of this thickness [m]."""
         return self.thickness == thickness and same_deformation(self.deformed, deformed)
 
     def finite(self) -> np.ndarray:

@@ -31,7 +31,7 @@ class StaticPlace:
     where: tuple[bytes, bytes] | None
 
     def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
-        """Return whether this is what a body is, or was when it was saved, but for where it is."""
+        """Return True if this is what a body is, or was when it was saved, but for where it is."""
         return self.what == what_of(body) and same_deformation(self.deformed, deformed)
 
 
@@ -41,7 +41,7 @@ def what_of(body: Body | BodyRecord) -> tuple[Any, ...]:
 
 
 def same_deformation(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pose] | None) -> bool:
-    """Return whether two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
+    """Return True if two bodies were deformed in the same way: the same vertices, and the pose that they belong to."""
     if a is None or b is None:
         return a is b
     return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))

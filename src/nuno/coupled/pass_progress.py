@@ -36,7 +36,7 @@ def island_of(passing: Passing, world: int, body: int):
 
 @wp.func
 def is_linked(passing: Passing, world: int, body: int):
-    """Return whether particles of a body's island lie between rigid bodies."""
+    """Return True if particles of a body's island lie between rigid bodies."""
     of = world * passing.bodies
     return passing.linked[of + passing.island[of + body]]
 

@@ -115,7 +115,7 @@ def link_supports(particles: Particles, rows: Rows, passing: Passing, world: int
 
 @wp.func
 def with_mate(rows: Rows, r: int, k_pass: int):
-    """Return whether a row was solved in this pass with its mate, whose turn came first."""
+    """Return True if a row was solved in this pass with its mate, whose turn came first."""
     mate = rows.mate[r]
     solved = bool(False)
     if mate >= 0:
@@ -128,7 +128,7 @@ def with_mate(rows: Rows, r: int, k_pass: int):
 
 @wp.func
 def rubs_both(particles: Particles, rows: Rows, r: int):
-    """Return whether the friction of a row with a mate is solved with its mate's.
+    """Return True if the friction of a row with a mate is solved with its mate's.
 
     Not where something holds a body: how two that are held share friction is open, and a difference between them would
     use it up.

@@ -30,7 +30,7 @@ for _kind in _REAL:
 
 
 def is_real(masks: Any) -> bool:
-    """Return whether a NumPy or Warp array holds real numbers."""
+    """Return True if a NumPy or Warp array holds real numbers."""
     return masks.dtype in _REAL if isinstance(masks, wp.array) else masks.dtype.kind == "f"
 
 

@@ -72,7 +72,7 @@ class LinkDynamics:
 
     @property
     def is_attached(self) -> bool:
-        """Return whether the links move dynamically."""
+        """Return True if the links move dynamically."""
         return bool(self.joints)
 
     def attach(self) -> None:
@@ -207,7 +207,7 @@ def _possible(inertia: np.ndarray, mass: float) -> np.ndarray:
 
 
 def _axis_of(joint: Any) -> tuple[bool, np.ndarray]:
-    """Return whether a joint of the model slides, and its axis in its own frame (3,)."""
+    """Return True if a joint of the model slides, and its axis in its own frame (3,)."""
     kind = joint.shortname()
     if kind[-1] in "XYZ":
         return "JointModelP" in kind, np.eye(3)["XYZ".index(kind[-1])]

@@ -52,7 +52,7 @@ class LinkShape:
 
     @property
     def is_bare(self) -> bool:
-        """Return whether this only stands for a joint that carries no shape."""
+        """Return True if this only stands for a joint that carries no shape."""
         return isinstance(self.shape, Sphere) and self.shape.radius == BARE
 
 

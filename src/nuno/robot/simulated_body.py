@@ -39,7 +39,7 @@ class SimulatedBody(SimulatedSenses):
 
     @property
     def is_dynamic(self) -> bool:
-        """Return whether the links have dynamics."""
+        """Return True if the links have dynamics."""
         return self.balance is not None and self.balance.dynamics.is_attached
 
     def attach(self) -> None:

@@ -187,7 +187,7 @@ def check_pool(executor: Executor, *needed: Any) -> None:
 
 
 def is_found(module: str, name: str) -> bool:
-    """Return whether this process has something by that name."""
+    """Return True if this process has something by that name."""
     return find(module, name) is not None
 
 

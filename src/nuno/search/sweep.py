@@ -72,7 +72,7 @@ class SweepResult:
 
     @property
     def is_complete(self) -> bool:
-        """Return whether every trial has finished, or failed."""
+        """Return True if every trial has finished, or failed."""
         return (self.planned or len(self)) == len(self) and all(trial is not None for trial in self.trials)
 
     @property

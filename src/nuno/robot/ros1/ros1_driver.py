@@ -80,7 +80,7 @@ class Ros1Driver:
 
     @property
     def alive(self) -> bool:
-        """Return whether the node is there."""
+        """Return True if the node is there."""
         return self._process.poll() is None
 
     def close(self) -> None:

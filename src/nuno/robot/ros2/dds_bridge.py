@@ -93,12 +93,12 @@ class DdsBridge:
         self._write(service, {"guid": request["guid"], "seq": request["seq"], **fields})
 
     def has_subscribers(self, topic: str) -> bool:
-        """Return whether anyone would get what is published."""
+        """Return True if anyone would get what is published."""
         own = self._writers.get(topic)
         return own is not None and own[1].get_publication_matched_status().current_count > 0
 
     def has_publishers(self, topic: str) -> bool:
-        """Return whether anyone publishes to a topic, or asks a service, that is read here."""
+        """Return True if anyone publishes to a topic, or asks a service, that is read here."""
         return bool(self._readers[topic][1].get_subscription_matched_status().current_count > 0)
 
     def publish(self, topic: str, message: Fields, latched: bool = False) -> None:

@@ -48,7 +48,7 @@ class FollowAction:
 
     @property
     def has_clients(self) -> bool:
-        """Return whether anyone is there who could send goals."""
+        """Return True if anyone is there who could send goals."""
         return self._bridge.has_publishers(self._send)
 
     def requests(self, now: float) -> list[Message]:

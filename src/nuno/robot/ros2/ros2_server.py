@@ -103,7 +103,7 @@ class Ros2Server:
 
     @property
     def alive(self) -> bool:
-        """Return whether it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
+        """Return True if it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
         return self._thread.is_alive()
 
     def close(self) -> None:

@@ -28,7 +28,7 @@ class Publisher(Protocol):
     """The part of a bridge that publishes."""
 
     def has_subscribers(self, topic: str) -> bool:
-        """Return whether anyone would get what is published."""
+        """Return True if anyone would get what is published."""
 
     def publish(self, topic: str, message: Fields, latched: bool = False) -> None:
         """Send a message to all that have subscribed to its topic; latched, to those that come later too."""
