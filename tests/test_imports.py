@@ -26,10 +26,6 @@ REPLACED = {
 }  # fmt: skip
 
 
-STILL_LONG = {"camera/picture.py"}
-"""Files that are yet to be cut. Who cuts one takes it away; nothing is added."""
-
-
 @cache
 def modules():
     """Return each module's name below ``nuno`` and its tree."""
