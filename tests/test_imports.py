@@ -110,7 +110,7 @@ def test_files_are_short():
         path.relative_to(PACKAGE).as_posix(): len(path.read_text().splitlines()) for path in PACKAGE.rglob("*.py")
     }
     long = {place for place, lines in lengths.items() if lines > 400}
-    assert long == {"__init__.py", *STILL_LONG}
+    assert not long - {"__init__.py"}
 
 
 def test_replaced_words_name_nothing():
