@@ -44,6 +44,7 @@ class Balance:
 
     Attributes:
         dynamics: Bodies and motors.
+        is_on: Whether the robot balances; else its motors hold the joints where they are wanted, and it may fall.
     """
 
     def __init__(self, links: Links, *, friction: float = 0.8, gains: Gains | None = None) -> None:
@@ -54,6 +55,7 @@ class Balance:
         self._control = WholeBodyControl(robot, links.world.gravity, friction=friction, gains=gains)
         self._data = robot.model.createData()
         self._warns = True
+        self.is_on = True
 
     def command(
         self, now: RobotState, wanted: RobotState, span: float, servo: Servo | None, external: Any = None
@@ -69,7 +71,7 @@ class Balance:
         """
         dynamics, robot = self.dynamics, self._robot
         found = None
-        if self._feet and now.fallen is None:
+        if self.is_on and self._feet and now.fallen is None:
             found = self._control.solve(now, wanted, self._standing(wanted.q), external)
         if found is None:
             gains = dynamics.stiffness, dynamics.damping, np.zeros(len(dynamics.joints))
