@@ -30,7 +30,8 @@ from hostile_values import VALUES, may_accept
 EACH = 7
 """Of the calls, every so many is made where all would take long: all arguments and all values come up."""
 # Valid calls of which the recipe has no file, robot's sensor or the like
-WITHOUT = {"read_case", "read_fold_case", "read_sweep", "Recording.load", "triangulate", "Viewer.remove_camera",
+WITHOUT = {"segment_before", "segment_after",
+           "read_case", "read_fold_case", "read_sweep", "Recording.load", "triangulate", "Viewer.remove_camera",
            "Viewer.remove_plot", "RobotInterface.read_wrench"}  # fmt: skip
 
 

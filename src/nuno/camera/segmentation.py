@@ -14,12 +14,14 @@ from nuno.camera.scene_without_cloth import compare
 from nuno.camera.surface_colours import discriminant, guided_filter
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError, InvalidInputError
+from nuno.validation import checked
 
 _CERTAIN = 6.0  # [nats] no single pixel says more than this
 _IN_DOUBT = 2.0  # [nats] a smoothed ratio below this says little
 _NEAR = 12  # [px] around the cloth what is in doubt counts
 
 
+@checked
 def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None) -> np.ndarray:
     """Find the cloth that lies flat on the table.
 
@@ -47,6 +49,7 @@ def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: Arra
     return refine(rgb, blob, surface)
 
 
+@checked
 def segment_after(
     image: ArrayLike, camera: Camera, table: Table, before_image: ArrayLike, before_mask: ArrayLike,
     hand_position: ArrayLike, *, hand_radius: float = 0.014, hidden: ArrayLike | None = None,

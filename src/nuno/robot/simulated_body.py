@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.robot.simulated_senses import SimulatedSenses
 from nuno.robot.trajectory_controller import ARRIVED
+from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
@@ -71,6 +72,7 @@ class SimulatedBody(SimulatedSenses):
             self._arrive_within(ARRIVED)
             self._start_from(self.actual.configuration())
 
+    @checked
     def set_up(self, position: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0) -> None:
         """Stand the robot up in its posture, at rest, wherever it is now, as somebody would who lifts it.
 

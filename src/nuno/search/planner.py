@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import EstimationError, InvalidInputError
-from nuno.validation import count, finite_array, number
+from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -42,6 +42,7 @@ class Plan:
     failed: int
 
 
+@checked
 def plan(
     world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *, start: ArrayLike,
     spread: ArrayLike, horizon: float, samples: int = 32, iterations: int = 4, method: Literal["cem", "mppi"] = "cem",
@@ -76,15 +77,18 @@ def plan(
         InvalidInputError: an argument out of range, or costs of another shape.
         EstimationError: no future of the first iteration has a finite cost.
     """
+    function("act", act)
+    function("cost", cost)
     mean = finite_array("start", start, ("k", "d"))
     shape = mean.shape
-    sigma = np.array(np.broadcast_to(_fitting("spread", spread, shape), shape))
+    sigma = np.array(np.broadcast_to(finite_array("spread", spread, (), shape[1:], shape), shape))
     if (sigma <= 0.0).any():
         raise InvalidInputError(f"spread must be above 0, got {sigma.min():g}")
-    low, high = (
-        np.broadcast_to(_fitting("bounds", side, shape), shape) if bounds is not None else np.full(shape, default)
-        for side, default in zip(bounds or (0.0, 0.0), (-np.inf, np.inf), strict=True)
-    )
+    low, high = np.full(shape, -np.inf), np.full(shape, np.inf)
+    if bounds is not None:
+        if not isinstance(bounds, tuple | list) or len(bounds) != 2:
+            raise InvalidInputError(f"bounds must be a pair (lowest, highest) or None, got {bounds!r}")
+        low, high = (np.broadcast_to(finite_array("bounds", side, (), shape[1:], shape), shape) for side in bounds)
     if (low > high).any():
         raise InvalidInputError("the lower bounds must not be above the upper ones")
     seconds = number("horizon", horizon, above=0.0)
@@ -95,7 +99,7 @@ def plan(
     if n < 2 or best_of > n:
         raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
     heat = number("temperature", temperature, above=0.0)
-    random, floor = np.random.default_rng(seed), SMALLEST * sigma
+    random, floor = np.random.default_rng(count("seed", seed, low=0)), SMALLEST * sigma
     futures = world.imagine(n, device)
     saved = futures.save()
     found, lowest, failed, history = mean, np.inf, 0, []
@@ -128,13 +132,6 @@ def plan(
         history.append(lowest)
         log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
     return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
-
-
-def _fitting(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
-    array = np.asarray(value, dtype=float)
-    if array.shape not in ((), shape[1:], shape) or np.isnan(array).any():
-        raise InvalidInputError(f"{name} must be a number, {shape[1:]} or {shape}, got {value!r}")
-    return array
 
 
 def _checked(costs: Any, n: int) -> np.ndarray:
