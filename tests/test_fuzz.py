@@ -105,7 +105,7 @@ class Fuzz:
             return
         body = self.world.find(name)
         rigid = isinstance(body.material, nuno.Rigid)
-        where = None if rigid else self.random.integers(0, len(body.vertices), 2)
+        where = None if rigid else self.random.choice(len(body.vertices), 2, replace=False)
         held = body.position if rigid else body.vertices[where].mean(axis=0)
         compliance = self.pick([0.0, 1e-3])
         other = self.pick(self.model.dynamic - {name})

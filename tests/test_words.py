@@ -41,6 +41,7 @@ ALLOWED = {
     r"over": "what lies over a point, public: `Layers.over`",
     r"known": "public argument of `nuno.fit_material`: the rest of the material",
     r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",
+    r"(is_)?root": "of a tree of joints",
     r"least": "public attribute of `nuno.solvers.resolution.Resolution`",
     r"MOST": "shapes that one particle is held against, until `nuno.coupled` has another word",
     r"least_(force|squeeze)|most|rounds": "public names of `nuno.tasks.lift`: what a search found, and how far it goes",

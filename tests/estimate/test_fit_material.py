@@ -167,6 +167,6 @@ def test_bad_arguments():
     ]:
         with pytest.raises(error, match=message):
             fit_material(seen, **changes)
-    with pytest.raises(InvalidInputError, match="seen must be Footage"):
+    with pytest.raises(InvalidInputError, match="seen must be a Footage"):
         fit_material("video.mp4")
     assert set(BOUNDS) == {"bending_rigidity", "stretch_stiffness", "friction"}

@@ -259,7 +259,7 @@ def test_damaged_file(tmp_path, spoil, message):
         ({"x": [1]}, {"world": 3}, "world must be"),
         ({"x": [1]}, {"world": searched.broken_room}, "no room"),
         ({"x": [1]}, {"device": "tpu"}, "device must be"),
-        ({"x": [1]}, {"executor": 4}, "must be a Executor or None"),
+        ({"x": [1]}, {"executor": 4}, "must be a concurrent.futures.Executor"),
         ({"x": [1]}, {"results": "no/such/folder/results.jsonl"}, "there is no folder"),
     ],
 )

@@ -139,7 +139,7 @@ def test_what_cannot_be_carried_is_refused(talos, tmp_path):
         (dict(mat=nuno.box((0.6, 0.4, 0.02))), "a mat is a cloth or a soft body"),
         (dict(arm_distances=[0.7]), "cannot lie on both"),
         (dict(mat=nuno.sheet((2.5, 0.4), cells=(20, 4))), "wider than the arms"),
-        (dict(arms="spheres"), "arms must be one of"),
+        (dict(arms="spheres"), "arms must be hulls or boxes"),
         (dict(hands_at=(0.5, np.nan)), "finite"),
         (dict(arm_distances=[]), "arm_distances"),
         (dict(walks=[]), "walks must be 10"),

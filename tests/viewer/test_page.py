@@ -267,6 +267,7 @@ def test_the_page_controls_the_world(browser, tmp_path):
     browser.wait_for("!document.getElementById('notice').hidden")
 
 
+@needs_chromium
 def test_the_documentation_shows_the_page(tmp_path):
     """Its picture of the viewer is what a browser shows now, but for fonts."""
     viewer_page(tmp_path / "viewer_page.png")

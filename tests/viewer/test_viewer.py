@@ -445,7 +445,7 @@ def test_bad_input_to_its_methods():
             (lambda: viewer.draw("towel", opacity=0.0), "opacity"),
             (lambda: viewer.look_from((1, 1, 1), (1, 1, 1)), "different points"),
             (lambda: viewer.play("film.html"), "Recording or a Film"),
-            (lambda: viewer.add_camera("eye", "camera"), "a nuno.Camera"),
+            (lambda: viewer.add_camera("eye", "camera"), "a Camera"),
         ):
             with pytest.raises(nuno.InvalidInputError, match=message):
                 call()

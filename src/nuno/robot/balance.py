@@ -26,6 +26,8 @@ LEANS = np.cos(np.deg2rad(60.0))
 """Of the trunk's tilt, from where on a robot has fallen."""
 SINKS = 0.5
 """Share of the height of the wanted base, below which a robot has fallen."""
+SURE = 0.75
+"""Share of the soles' friction that balance counts on: floors may have less."""
 FULL = 0.999
 """Share of its limit, from where on a motor gives all that it can."""
 
@@ -52,7 +54,7 @@ class Balance:
         self.dynamics = LinkDynamics(links, friction=friction)
         self._robot, self._world = robot, links.world
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
-        self._control = WholeBodyControl(robot, links.world.gravity, friction=friction, gains=gains)
+        self._control = WholeBodyControl(robot, links.world.gravity, friction=SURE * friction, gains=gains)
         self._data = robot.model.createData()
         self._warns = True
         self.is_on = True

@@ -118,6 +118,8 @@ class ImaginedRobot:
 
     def begin_frame(self, start: float, end: float) -> None:
         """Set the motors for a frame, or send the links on their way."""
+        if not self._is_whole():
+            return
         span, self._before = end - start, list(self._states)
         servo = None if self.balance is not None or self._servo is None else self._serve
         aims = [own.begin(end, span, servo) for own in self._motions]
@@ -138,6 +140,8 @@ class ImaginedRobot:
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
+        if not self._is_whole():
+            return
         if self.balance is None:
             for own in self._motions:
                 own.joints.take_step()
@@ -171,9 +175,15 @@ class ImaginedRobot:
         if self.balance is not None:
             self.balance.dynamics.joints = joints
 
-    def imagined(self, futures: World, world: int) -> ImaginedRobot:
-        """Return the copies of one world's robot in a batch that was imagined from that world."""
+    def imagined(self, futures: World, world: int) -> ImaginedRobot | None:
+        """Return the copies of one world's robot in a batch that was imagined from that world; None without links."""
+        if not self._is_whole():
+            return None
         return ImaginedRobot(self.original, futures, (self, world))
+
+    def _is_whole(self) -> bool:
+        """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""
+        return all(body._world is self.world for body in self._links)
 
     def _lead(self, start: float, end: float, aims: list[RobotState]) -> None:
         """Send the links to where the robots are at the end of the frame, on a path for each world."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import logging
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
-from nuno.robot.known_joints import KnownJoints
+from nuno.robot.known_joints import Angles, KnownJoints
 from nuno.robot.limb_controllers import LimbControllers
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes.path import minimum_jerk
@@ -137,7 +137,7 @@ class JointInterface(LimbControllers, KnownJoints):
 
     @checked
     def angle_vector(
-        self, av: ArrayLike | Mapping[str, float] | None = None, time: float | None = None,
+        self, av: Angles | None = None, time: float | None = None,
         controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
         velocities: ArrayLike | None = None, interpolation: str | None = None, interpolation_dt: float = 0.01,
     ) -> Any:  # fmt: skip
@@ -183,7 +183,7 @@ class JointInterface(LimbControllers, KnownJoints):
 
     @checked
     def angle_vector_sequence(
-        self, avs: Sequence[ArrayLike | Mapping[str, float]], times: Sequence[float | None] | float | None = None,
+        self, avs: Sequence[Angles], times: Sequence[float | None] | float | None = None,
         controller_type: str | None = None, start_time: float = 0.0, time_scale: float = 5.0,
     ) -> Any:  # fmt: skip
         """Send the joints through many angles, and return at once.
@@ -294,7 +294,7 @@ class JointInterface(LimbControllers, KnownJoints):
 
     @checked
     def angle_vector_duration(
-        self, start_av: ArrayLike, end_av: ArrayLike, controller_type: str | None = None,
+        self, start_av: Angles, end_av: Angles, controller_type: str | None = None,
         return_joint_names: bool = False,
     ) -> Any:  # fmt: skip
         """Return the shortest time [s] between two vectors of angles at the velocity limits.

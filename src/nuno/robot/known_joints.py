@@ -29,6 +29,10 @@ STATE_TIMEOUT = 3.0
 """[s] How long a fresh joint state is waited for."""
 
 
+Angles = ArrayLike | Mapping[str, float]
+"""Of all joints in the order of ``joint_names``, or by name; a model of scikit-robot stands for its own, by names."""
+
+
 class KnownJoints(ABC):
     """The joints of a robot, and a clock to wait on until more is known of them.
 
@@ -167,7 +171,7 @@ class KnownJoints(ABC):
         return self.sub_angle_vector(self.reference_vector(), self.robot.angle_vector())
 
     @checked
-    def sub_angle_vector(self, v0: ArrayLike, v1: ArrayLike) -> np.ndarray:
+    def sub_angle_vector(self, v0: Angles, v1: Angles) -> np.ndarray:
         """Return v0 - v1, (n,); of joints that turn freely the shorter way round."""
         change = self._checked_vector("v0", v0) - self._checked_vector("v1", v1)
         lower, upper = self.robot.joint_limits

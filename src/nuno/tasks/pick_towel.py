@@ -25,7 +25,6 @@ from nuno.estimate.pick_result import PickResult
 from nuno.materials import Cloth
 from nuno.robot.head_cameras import STEREO, HeadCameras
 from nuno.robot.humanoid import Humanoid
-from nuno.robot.interface import RobotInterface
 from nuno.robot.links import Links
 from nuno.robot.stereo import triangulate
 from nuno.shapes.coordinates import Coordinates
@@ -121,8 +120,10 @@ class TowelPicker:
 
     @checked
     def __init__(
-        self, driver: RobotInterface, *, table: Table, rest_height: float = 0.0025, device: str = "auto",
+        self, driver: Any, *, table: Table, rest_height: float = 0.0025, device: str = "auto",
     ) -> None:  # fmt: skip
+        if not all(hasattr(driver, name) for name in ("robot", "update_robot_state", "angle_vector")):
+            raise InvalidInputError(f"driver must have a robot's interface, got {type(driver).__name__}")
         if table.half_extents is None or table.centre is None:
             raise InvalidInputError("the robot must know where its table ends")
         self.driver, self.table, self.rest_height = driver, table, rest_height

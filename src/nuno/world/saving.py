@@ -116,8 +116,8 @@ class Saving(Running):
             copied = getattr(driver, "imagined", None)
             if copied is None:
                 self._tell_of(driver)
-            else:
-                futures.drivers.append(copied(futures, chosen))
+            elif (own := copied(futures, chosen)) is not None:
+                futures.drivers.append(own)
         return futures
 
     def adopt(self, futures: World, k: int, *, world: int | None = None) -> None:
