@@ -177,7 +177,10 @@ def test_restored_it_goes_on_bit_for_bit(standing):
 
 @pytest.mark.parametrize("push", [(0.0, 10.0, 0.0), (10.0, 0.0, 0.0)])
 def test_a_light_push_is_survived(standing, push):
-    """10 N s on the base: its centre of mass goes as a critically damped mass, J / (m e rate), and comes back."""
+    """10 N s on the base: its centre of mass goes as far as a critically damped mass, J / (m e rate), and comes back.
+
+    Or less far, as trunk and posture are held besides: 0.7 to 1.1 of that.
+    """
     world, robot = standing
     _, start = momentum(robot)
     world.push(robot.links.bodies[0], np.array(push) / 0.05, duration=0.05)
@@ -186,7 +189,7 @@ def test_a_light_push_is_survived(standing, push):
         world.step()
         far = max(far, float(np.linalg.norm((momentum(robot)[1] - start)[:2])))
     expected = 10.0 / (robot.actual.mass * np.e * Gains().centre_rate)
-    assert far == pytest.approx(expected, rel=0.2)
+    assert 0.7 * expected < far < 1.1 * expected
     # soles have slid by that much
     assert np.linalg.norm((momentum(robot)[1] - start)[:2]) < 2.5e-3 and robot.state().fallen is None
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import EstimationError, InvalidInputError
+from nuno.errors import EstimationError, InvalidInputError, NunoError
 from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.world import World
 
@@ -109,9 +109,9 @@ def plan(
         knots = np.clip(knots, low, high)
         if k:
             futures.restore(saved)
-        act(futures, knots)
+        _called("act", act, futures, knots)
         futures.run(seconds)
-        costs = _checked(cost(futures), n)
+        costs = _checked(_called("cost", cost, futures), n)
         finite = np.isfinite(costs)
         failed += int(n - finite.sum())
         if not finite.any():
@@ -132,6 +132,16 @@ def plan(
         history.append(lowest)
         log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
     return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
+
+
+def _called(name: str, own: Callable[..., Any], *given: Any) -> Any:
+    """Return what a function of the caller returns; what it raises comes out with its name before it."""
+    try:
+        return own(*given)
+    except NunoError:
+        raise
+    except Exception as error:
+        raise InvalidInputError(f"{name} failed: {type(error).__name__}: {error}") from error
 
 
 def _checked(costs: Any, n: int) -> np.ndarray:

@@ -182,6 +182,7 @@ def world_without_robots(cloth: Body) -> World:
     """Return a copy of the world that a cloth is in, to be imagined further, in which points are carried by nothing."""
     world: Any = cloth._world
     copy: World = world.imagine(1)
+    copy.drivers.clear()
     for body in world.bodies:
         if body._links is not None:
             copy.remove(body.name)

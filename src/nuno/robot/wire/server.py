@@ -10,6 +10,8 @@ import time
 from concurrent.futures import Future
 from contextlib import suppress
 
+import numpy as np
+
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
 from nuno.robot.known_joints import TICK
@@ -90,7 +92,7 @@ class RobotServer:
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
             raise InvalidInputError(f"port must be a whole number in [0, 65535], got {port!r}")
         self._factor: float | None = real_time_factor
-        if real_time_factor is not None and real_time_factor != float("inf"):
+        if real_time_factor is not None and not (isinstance(real_time_factor, float) and np.isposinf(real_time_factor)):
             self._factor = number("real_time_factor", real_time_factor, above=0.0)
         own = 1.0 / robot.world.frame_rate if hasattr(robot, "world") else TICK
         self.tick = own if tick is None else number("tick", tick, above=0.0)
