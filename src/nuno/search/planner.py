@@ -17,6 +17,8 @@ from nuno.world.world import World
 log = logging.getLogger(__name__)
 
 METHODS = ("cem", "mppi")
+LONGEST = 3600.0
+"""[s] That a motion may be imagined for."""
 SMALLEST = 1e-3
 """Share of its first value that a standard deviation keeps at least."""
 
@@ -61,9 +63,9 @@ def plan(
         cost: ``cost(futures)`` after the horizon, (samples,); what is not finite counts as failed.
         start: (k, d), the motion to begin with; it is among those that are tried.
         spread: Standard deviations of the first iteration, a number or (k, d) or (d,).
-        horizon: How long each motion is imagined [s].
+        horizon: How long each motion is imagined [s], up to an hour.
         samples: Futures in an iteration.
-        iterations: How many.
+        iterations: How many, up to 10,000.
         method: "cem", the cross-entropy method: mean and standard deviation of the best ones (Rubinstein & Kroese,
             2004). Or "mppi", model-predictive path integral control: a mean weighted by exp(-cost / temperature), of
             costs scaled to the range of the iteration (Williams et al., ICRA 2016).
@@ -91,8 +93,8 @@ def plan(
         low, high = (np.broadcast_to(finite_array("bounds", side, (), shape[1:], shape), shape) for side in bounds)
     if (low > high).any():
         raise InvalidInputError("the lower bounds must not be above the upper ones")
-    seconds = number("horizon", horizon, above=0.0)
-    n, rounds = count("samples", samples), count("iterations", iterations)
+    seconds = number("horizon", horizon, above=0.0, high=LONGEST)
+    n, rounds = count("samples", samples), count("iterations", iterations, high=10_000)
     best_of = max(2, n // 8) if elites is None else count("elites", elites)
     if method not in METHODS:
         raise InvalidInputError(f"method must be one of {METHODS}, got {method!r}")
