@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import InvalidInputError, RobotTimeoutError
 from nuno.robot.other_models import angles_of_model, is_model, show_on_model
 from nuno.robot.readings import JointState
-from nuno.validation import checked, finite_array, number
+from nuno.validation import as_array, checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
@@ -205,7 +205,8 @@ class KnownJoints(ABC):
             av = angles_of_model(av)
         if not isinstance(av, Mapping):
             names = self.robot.joint_names
-            if np.ndim(av) == 1 and len(av) != len(names):
+            av = as_array(what, av)
+            if av.ndim == 1 and len(av) != len(names):
                 raise InvalidInputError(
                     f"{what} has {len(av)} angles, {self.robot.name!r} has {len(names)} joints: {', '.join(names)}; "
                     "a mapping from names to angles, or a scikit-robot model, does as well"
