@@ -73,6 +73,8 @@ def cases(folder: Path, device: str, sideways: float | None) -> list[dict[str, A
         result = read_case(path).estimate(**options) if named else from_masks(path, options)
         rows.append(row(path.name, result, tuple(true)))
         print(rows[-1], flush=True)
+    if not rows:
+        sys.exit(f"no case with a truth.json in {folder}: --cases names a folder of case folders")
     return rows
 
 

@@ -1,5 +1,6 @@
 """Settings and images of an estimate of a pick, checked before anything is imagined."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -63,3 +64,17 @@ def test_images_that_are_needed_are_asked_for():
     nothing = read_images(None, image, None, None, None, CAMERA)
     with pytest.raises(nuno.InvalidInputError, match="the image before is needed"):
         find_cloth_before(nothing, None, None, settings())
+
+
+@pytest.mark.parametrize(("end", "told"), [(0.20, False), (0.29, False), (0.30, True), (0.36, True)])
+def test_a_cloth_over_the_border_of_its_table_is_told(end, told):
+    """Of a cloth that reaches beyond the border at x = 0.3 m the rest is not seen: its length is too short."""
+    camera = nuno.Camera(640, 480, 600.0, 600.0, 319.5, 239.5, camera_to_world=LOOKING_DOWN)
+    table = check_table(0.0, (0.3, 0.3), None, 0.04)
+    corners = np.array([[-0.1, -0.1, 0], [end, -0.1, 0], [end, 0.12, 0], [-0.1, 0.12, 0]])
+    shown = np.minimum(corners, [0.3, 0.3, 0.0])  # as segmentation sees it
+    mask = np.zeros((480, 640), np.uint8)
+    cv2.fillConvexPoly(mask, np.round(camera.project(shown)).astype(np.int32), 1)
+    images = read_images(None, None, mask.astype(bool), mask.astype(bool), None, camera)
+    _, found = find_cloth_before(images, None, None, settings(camera=camera, table=table))
+    assert any("table's border" in warning for warning in found.warnings) == told

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,8 +14,14 @@ from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.segmentation import segment_before
+from nuno.camera.table import Table
 from nuno.errors import InvalidInputError
 from nuno.estimate.pick_settings import PickSettings
+
+RIM = 0.006
+"""Distance from the table's border [m] within which a cloth's outline lies on it."""
+RIM_SHARE = 0.05
+"""Share of a cloth's outline on the table's border from which the cloth is taken to hang over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +83,29 @@ def find_cloth_before(
     if rectangle is None:
         assert images.mask_before is not None
         rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
+        over = _over_the_border(images.mask_before, camera, table)
+        if over is not None:
+            rectangle = replace(rectangle, warnings=(*rectangle.warnings, over))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
     return images, rectangle
+
+
+def _over_the_border(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
+    """Return a warning where the outline of a mask (h, w) runs along the table's border: the cloth goes on there."""
+    if table.half_extents is None:
+        return None
+    outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = np.concatenate(outlines)[:, 0].astype(float)
+    offset = np.abs(camera.back_project(outline, table.height)[:, :2] - np.asarray(table.centre or (0.0, 0.0)))
+    beyond = (offset - np.asarray(table.half_extents)).max(axis=1)
+    share = float((beyond > -RIM).mean())
+    if share < RIM_SHARE:
+        return None
+    return (
+        f"{100.0 * share:.0f} % of the cloth's outline lies on the table's border: what hangs over it is not seen, so "
+        "the cloth may be larger and its points elsewhere; rectangle= takes its true corners"
+    )
 
 
 def _image(image: Any, camera: Camera, name: str) -> np.ndarray | None:
