@@ -161,7 +161,7 @@ def collides_with_itself(dynamics: Any) -> bool:
 def _thickness(solver: Any) -> np.ndarray:
     from nuno.state.cloth_state import THICKNESS
 
-    return np.maximum(solver._scalars[:, THICKNESS], 1e-6)
+    return np.maximum(solver.scalars[:, THICKNESS], 1e-6)
 
 
 def _fast_worlds(dynamics: Any) -> np.ndarray:
@@ -219,10 +219,10 @@ def take_apart(body: Body, worlds: np.ndarray) -> None:
     if not len(worlds):
         return
     positions, faces, moved = solver.positions(), np.asarray(body.faces), {}
-    free = solver._inverse_mass_now(solver._state.w) > 0.0
+    free = solver.inverse_mass_now(solver.state.w) > 0.0
     for world in worlds.tolist():
         if np.isfinite(positions[world]).all():
-            moved[world], left = untangle(positions[world], faces, free[world], STEP * solver._cell_size)
+            moved[world], left = untangle(positions[world], faces, free[world], STEP * solver.cell_size)
             solver.guarded[world] = GUARDED + (WAIT if left else 0)
             solver.tangled[world] = solver.tangled[world] + 1 if left else 0
             if solver.tangled[world] >= TRIES:
