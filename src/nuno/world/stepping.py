@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.dynamics import SOON, touches_itself
+from nuno.solvers.resolution import warn_of_overloads
 from nuno.world.frame_runs import FrameRuns
 from nuno.world.impacts import Impacts, collides_with_itself, look_at, look_due, next_look
 from nuno.world.islands import Islands, find_islands
@@ -66,8 +67,7 @@ class Stepping:
             if apart and not self.careful:
                 now = next_look(now, stop, world.frame_rate) if looking else stop
                 self._run_apart(moving, before, now - before)
-                if looking and look_due(before, now, world.frame_rate):
-                    look_at(moving)
+                self._look(moving, before, now, looking)
                 continue
             # the same instants whether a span is gone through at once or in pieces, and the same steps by itself or not
             duration = frame if stop - now > frame - SOON else stop - now
@@ -76,8 +76,15 @@ class Stepping:
                 self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
-            if looking and look_due(before, now, world.frame_rate):
-                look_at(moving)
+            self._look(moving, before, now, looking)
+
+    def _look(self, moving: list[Body], before: float, now: float, crossings: bool) -> None:
+        """Look at cloths every few frames: whether some pass through themselves, or bear more than they can."""
+        if self._world._quiet or not look_due(before, now, self._world.frame_rate):
+            return
+        if crossings:
+            look_at(moving)
+        warn_of_overloads(moving, now)
 
     def _run_apart(self, moving: list[Body], time: float, duration: float, substeps: int | None = None) -> None:
         slots = []
