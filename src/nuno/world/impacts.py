@@ -92,7 +92,7 @@ class Impacts:
                 # nor more than the fastest goes: what is not fast alone is not here, beside a world that is
                 apart = np.minimum(apart, np.linalg.norm(velocities, axis=-1).max(axis=1))
                 asked = np.nan_to_num(apart * frame / (WAY * _thickness(solver)), posinf=0.0)
-                self.substeps[k] = [_at_least(int(own[k]), float(least)) for least in asked]
+                self.substeps[k] = [_doubled(int(own[k]), float(least)) for least in asked]
         if self._guarded and all(own.all() for own in self._guarded.values()):
             # all would go again: they begin with what they would come to
             self._thorough[:] = True
@@ -173,7 +173,7 @@ def _fast_worlds(dynamics: Any) -> np.ndarray:
     return np.asarray(fast | (deepest(solver) > DEEP * _thickness(solver)))
 
 
-def _at_least(own: int, asked: float) -> int:
+def _doubled(own: int, asked: float) -> int:
     """Return the body's own substeps, doubled as often as it takes, so that few different numbers come up."""
     count = own
     while count < min(asked, MOST):

@@ -57,7 +57,7 @@ class Stepping:
             self._couplings.clear()
             self._version = world._collider_version
         self.last = []
-        apart = not self._may_meet(moving, rigid) and not (rigid and world._kinematic_bodies())
+        apart = not self._may_touch(moving, rigid) and not (rigid and world._kinematic_bodies())
         if apart:
             self._prepare(moving, time)
         looking = not world._quiet and any(collides_with_itself(body._dynamics) for body in moving)
@@ -104,7 +104,7 @@ class Stepping:
         for body in moving:
             body._dynamics.prepare(time, 1.0 / self._world.frame_rate)  # type: ignore[union-attr]
 
-    def _may_meet(self, moving: list[Body], rigid: list[Body]) -> bool:
+    def _may_touch(self, moving: list[Body], rigid: list[Body]) -> bool:
         """Return True if two bodies of different solvers could touch, a soft one itself, or any are tied."""
         if any(grip.is_tie for body in moving for grip in body._dynamics.grips):  # type: ignore[union-attr]
             return True
@@ -194,8 +194,8 @@ class Stepping:
         nothing = np.zeros((worlds, 3)), np.zeros((worlds, 3))
         if grip.is_tie:
             for coupled in self.last:
-                told = coupled.wrench(grip)
-                for sums, own in zip(nothing, told or (), strict=False):
+                borne = coupled.wrench(grip)
+                for sums, own in zip(nothing, borne or (), strict=False):
                     sums[coupled.kept[grip.body]] = own[coupled.kept[grip.body]]
             return nothing
         dynamics: Any = grip.body._dynamics
