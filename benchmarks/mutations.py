@@ -3,7 +3,7 @@
 Each is made in a copy of the package and the tests, and the named test files run on it. A mutation that no test sees
 has survived. What runs out of time is listed as such, and counts neither way.
 
-    python benchmarks/mutations.py --out out/mutations [--only constraints rigid] [--seconds 900]
+    python benchmarks/mutations.py --out out/mutations [--only constraints rigid] [--numbers 0 7] [--seconds 900]
 """
 
 import argparse
@@ -66,11 +66,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--only", nargs="*", default=None, help="areas")
+    parser.add_argument("--numbers", nargs="*", type=int, default=None, help="places in the list, from 0")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="for all of them")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds for each")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    chosen = [each for each in MUTATIONS if options.only is None or each[0] in options.only]
+    listed = MUTATIONS if options.numbers is None else [MUTATIONS[number] for number in options.numbers]
+    chosen = [each for each in listed if options.only is None or each[0] in options.only]
     begin, found = time.perf_counter(), []
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)

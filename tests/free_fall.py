@@ -51,11 +51,11 @@ class FreeFall:
         self.friction, self.grips, self.forces, self.colliders = friction, [], None, None
         self.runs = []
         # never fast: no figures of a run, and as thick as may be
-        self.frame_rate, self._state = frame_rate, SimpleNamespace(notes=None)
-        self._scalars = np.full((len(self.x), 8), 1e6)
+        self.frame_rate, self.state = frame_rate, SimpleNamespace(notes=None)
+        self.scalars = np.full((len(self.x), 8), 1e6)
         self.guarded = np.zeros(len(self.x), dtype=int)  # nor crossed
 
-    def _get(self, array, count):
+    def download(self, array, count):
         """No figures."""
         return np.zeros((len(self.x), count))
 

@@ -140,6 +140,26 @@ def test_a_box_on_a_towel_on_a_table(device, monkeypatch):
     np.testing.assert_allclose(told["box"], (0.0, 0.0, -weight(world, box)), atol=0.01 * both)
 
 
+def test_worlds_in_which_a_pair_takes_other_substeps():
+    """Equilibrium in every world: a box presses its weight on a towel, beside a stiff cube in one of two worlds."""
+    world = nuno.World(device="cpu")
+    table(world)
+    world.add(nuno.sheet((0.32, 0.16), cells=(16, 8), position=(0.0, 0.0, 0.0021), name="towel"))
+    world.add(nuno.box((0.1, 0.1, 0.05), position=(-0.08, 0.0, 0.03), name="box"))
+    world.add(nuno.soft_box((0.06, 0.06, 0.06), (3, 3, 3), position=(0.08, 0.0, 0.036), name="cube"))
+    worlds = world.imagine(2)
+    body, box, cube = (worlds.find(name) for name in ("towel", "box", "cube"))
+    worlds.attach(body, nuno.Cloth())
+    worlds.attach(box, nuno.Rigid(mass=0.3))
+    worlds.attach(cube, nuno.Soft(density=200.0, youngs_modulus=2e5, damping=0.02))
+    assert cube.resolution.substeps > body.resolution.substeps
+    worlds.set_pose(cube, position=(0.6, 0.0, 0.032), worlds=[0])  # on the table alone
+    worlds.run(1.0)
+    found = worlds.contacts(body).impulses["box"]
+    weight_of_box = 0.3 * GRAVITY / worlds.frame_rate
+    np.testing.assert_allclose(found, [(0.0, 0.0, -weight_of_box)] * 2, atol=0.02 * weight_of_box)
+
+
 def thrown(world):
     """Throw a towel at two crossed rods and the edge of a box over a floor, fast enough for careful frames."""
     world.add(nuno.plane(name="floor"))

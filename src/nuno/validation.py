@@ -23,6 +23,10 @@ Kind = TypeVar("Kind")
 P = ParamSpec("P")
 R = TypeVar("R")
 NO_NUMBERS = (str, bytes, bool, np.bool_, complex, np.complexfloating, np.datetime64, np.timedelta64)
+LATEST = 1e9
+"""[s] (32 years) A clock beyond this does not tell a frame's end from what is near it: a double's step is 0.1 us."""
+LONGEST_WAIT = 3600.0
+"""[s] The longest that a pick is lifted, or a fold or a load waited for, frame by frame in memory."""
 MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
 
@@ -104,6 +108,19 @@ def number(name: str, value: Any, *, low: float = -np.inf, above: float = -np.in
     if not np.isfinite(result) or result < low or result <= above or result > high:
         raise InvalidInputError(f"{name} must be {valid}, got {result}")
     return result
+
+
+def instant(name: str, time: float) -> float:
+    """Return ``time`` [s], to which a world is to run, if its clock still tells frames apart there.
+
+    Raises:
+        InvalidInputError: it is later than `LATEST`.
+    """
+    if time > LATEST:
+        raise InvalidInputError(
+            f"{name} would set the clock to {time:g} s, and it tells frames apart up to {LATEST:g} s"
+        )
+    return time
 
 
 def count(name: str, value: Any, *, low: int = 1, high: int = MAX_COUNT) -> int:

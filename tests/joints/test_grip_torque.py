@@ -60,3 +60,38 @@ def test_a_soft_bar_held_at_its_end(how, direction):
     np.testing.assert_allclose(force, (0.0, 0.0, -MASS * GRAVITY), atol=0.01 * MASS * GRAVITY)
     # the bar sags by 1 mm, and its middle comes no nearer
     np.testing.assert_allclose(torque, (0.0, direction * LEVER, 0.0), atol=0.02 * LEVER)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_torque_on_a_held_rigid_body_is_borne(axis):
+    """Equilibrium: the grip bears the torque that the body is pushed with, with its sign, and no force."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    cube = world.add(nuno.box((0.05, 0.06, 0.07)))
+    world.attach(cube, nuno.Rigid(mass=0.2))
+    grip = world.grip(cube, to=cube.position)
+    asked = np.zeros(3)
+    asked[axis] = 0.02
+    world.push(cube, (0.0, 0.0, 0.0), torque=asked)
+    world.run(0.5)
+    force, torque = mean_torque(world, grip)
+    np.testing.assert_allclose(force, 0.0, atol=1e-4)
+    np.testing.assert_allclose(torque, asked, atol=0.002 * 0.02)
+
+
+def test_a_heavy_body_welded_to_a_light_one_turns_with_it():
+    """Exact: a pair of 1000 times each other's inertia turns as one about its common axis, at the mean spin."""
+    world = nuno.World(device="cpu", gravity=(0, 0, 0))
+    heavy = world.add(nuno.box((0.1, 0.1, 0.1)))
+    light = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.1)))
+    world.attach(heavy, nuno.Rigid(mass=1.0), angular_velocity=(0.0, 0.0, 2.0))
+    world.attach(light, nuno.Rigid(mass=0.001), angular_velocity=(0.0, 0.0, 2.0))
+    world.ignore_contact(heavy, light)
+    weld = world.weld(heavy, light)
+    world.push(heavy, (0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.001), duration=0.1)
+    world.run(1.0)
+    inertia = 1.001 * 0.1**2 / 6.0
+    spin = 2.0 + 0.001 * 0.1 / inertia
+    for body in (heavy, light):
+        np.testing.assert_allclose(body.angular_velocity, (0.0, 0.0, spin), atol=1e-3 * spin)
+    assert abs(heavy.quaternion @ light.quaternion) > np.cos(0.5 * 1e-3)  # less than 1 mrad apart
+    assert weld.active

@@ -108,7 +108,7 @@ def test_a_saved_state_goes_on_to_the_bit(worlds):
     made.run(0.1, 0.1)
     np.testing.assert_array_equal(made.local_positions(), ended)
     # what is seen between runs is what the doubles round to
-    np.testing.assert_array_equal(made._get(made._state.x, made.particle_count), ended[..., 0].astype(np.float32))
+    np.testing.assert_array_equal(made.download(made.state.x, made.particle_count), ended[..., 0].astype(np.float32))
     for each in (made, other):
         each.run(0.2, 0.1, FLOATS)
         assert each.local_positions().dtype == np.float32

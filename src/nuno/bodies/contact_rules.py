@@ -43,6 +43,6 @@ class ContactRules:
 
     def colliders_of(self, dynamic: Body, static: list[Body]) -> tuple[list[Body], dict[str, Any]]:
         """Return the bodies that ``dynamic`` touches, and by name the friction of pairs with their own."""
-        touched = [body for body in static if self.touch(dynamic, body)]
-        friction = {body.name: self.friction.get(frozenset((dynamic.key, body.key))) for body in touched}
-        return touched, {name: mu for name, mu in friction.items() if mu is not None}
+        touching = [body for body in static if self.touch(dynamic, body)]
+        friction = {body.name: self.friction.get(frozenset((dynamic.key, body.key))) for body in touching}
+        return touching, {name: mu for name, mu in friction.items() if mu is not None}

@@ -37,7 +37,7 @@ class Quantities:
         Raises:
             BodyStateError: the body is static.
         """
-        return self._told(self._motion("mass").mass)
+        return self._of_worlds(self._motion("mass").mass)
 
     @property
     def centre_of_mass(self) -> np.ndarray:
@@ -46,7 +46,7 @@ class Quantities:
         Raises:
             BodyStateError: the body is static.
         """
-        return self._told(self._motion("centre of mass").centre)
+        return self._of_worlds(self._motion("centre of mass").centre)
 
     @property
     def inertia(self) -> np.ndarray:
@@ -57,7 +57,7 @@ class Quantities:
         Raises:
             BodyStateError: the body is static.
         """
-        return self._told(self._motion("inertia").inertia)
+        return self._of_worlds(self._motion("inertia").inertia)
 
     @property
     def velocity(self) -> np.ndarray:
@@ -90,7 +90,7 @@ class Quantities:
         point = None if about is None else finite_array("about", about, (3,), (worlds, 3))
         if self._dynamics is None or point is None:
             return self._moving("angular_momentum", (3,))
-        return self._told(self._motion("angular momentum").angular_momentum_about(point))
+        return self._of_worlds(self._motion("angular momentum").angular_momentum_about(point))
 
     @property
     def kinetic_energy(self) -> Any:
@@ -107,7 +107,7 @@ class Quantities:
         with self._guard():
             if self._dynamics is None:
                 return self._still(())
-            return self._told(self._dynamics.elastic_energy(self))  # type: ignore[arg-type]
+            return self._of_worlds(self._dynamics.elastic_energy(self))  # type: ignore[arg-type]
 
     def _motion(self, asked: str) -> BodyMotion:
         with self._guard():
@@ -118,12 +118,12 @@ class Quantities:
     def _moving(self, name: str, shape: tuple[int, ...]) -> Any:
         """A quantity of the motion, zero while the body is static."""
         with self._guard():
-            return self._still(shape) if self._dynamics is None else self._told(getattr(self._motion(name), name))
+            return self._still(shape) if self._dynamics is None else self._of_worlds(getattr(self._motion(name), name))
 
     def _still(self, shape: tuple[int, ...]) -> Any:
-        return self._told(np.zeros((self._world_count(), *shape)))
+        return self._of_worlds(np.zeros((self._world_count(), *shape)))
 
-    def _told(self, values: np.ndarray) -> Any:
+    def _of_worlds(self, values: np.ndarray) -> Any:
         """One world's own value, or a copy of all worlds' (worlds, ...)."""
         if len(values) > 1:
             return np.array(values)

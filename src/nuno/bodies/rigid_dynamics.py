@@ -308,7 +308,7 @@ class RigidDynamics(Dynamics):
         for name, values in state.items():
             own, given = whole[name], np.asarray(values)
             if given.shape[1:] != own.shape[1:]:  # rows of contacts have become longer since
-                own, given = _as_wide(own, given, name)
+                own, given = _padded_alike(own, given, name)
             own[worlds] = given
             whole[name] = own
         self.load_state(whole)
@@ -326,7 +326,7 @@ class RigidDynamics(Dynamics):
         self.solver.remove(self.slot)
 
 
-def _as_wide(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _padded_alike(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return contacts (worlds, parts, row, ...) of two states with rows of one length."""
     fill = -1 if name in ("partner_slot", "partner_part") else 0
     row = max(a.shape[2], b.shape[2])

@@ -21,7 +21,7 @@ from nuno.state.cloth_state import DAMPING, Settings
 
 
 @wp.func
-def hasten(t: Any, i: Any, change: Any):
+def change_velocity(t: Any, i: Any, change: Any):
     """Change the velocity of particle i by a vector."""
     put_velocity(t, i, velocity(t, i) + change)
 
@@ -35,9 +35,9 @@ def damp_line(t: Any, a: Any, b: Any, c: Any, alpha: Any, gamma: Any):
     wc = at(t.w, c)
     weight = gamma * (wa + wb * 4.0 + wc)
     s = gamma * -1.0 / bend_stiffness(weight, alpha)
-    hasten(t, a, rate * (s * wa))
-    hasten(t, b, rate * (s * wb * -2.0))
-    hasten(t, c, rate * (s * wc))
+    change_velocity(t, a, rate * (s * wa))
+    change_velocity(t, b, rate * (s * wb * -2.0))
+    change_velocity(t, c, rate * (s * wc))
 
 
 @wp.func
@@ -50,10 +50,10 @@ def damp_twist(t: Any, a: Any, b: Any, c: Any, d: Any, alpha: Any, gamma: Any):
     wd = at(t.w, d)
     weight = gamma * (wa + wb + wc + wd)
     s = gamma / bend_stiffness(weight, alpha)
-    hasten(t, a, rate * (s * wa * -1.0))
-    hasten(t, b, rate * (s * wb))
-    hasten(t, c, rate * (s * wc))
-    hasten(t, d, rate * (s * wd * -1.0))
+    change_velocity(t, a, rate * (s * wa * -1.0))
+    change_velocity(t, b, rate * (s * wb))
+    change_velocity(t, c, rate * (s * wc))
+    change_velocity(t, d, rate * (s * wd * -1.0))
 
 
 @wp.func
@@ -83,7 +83,7 @@ def damp_patch(t: Any, table: Any, k: int, alpha: Any, gamma: Any):
         s = gamma * -1.0 / bend_stiffness(gamma * weight, alpha)
         for q in range(corners):
             i = table.patch[6 * k + q]
-            hasten(t, i, rate * (s * at(t.w, i) * table.patch_weight[row + q]))
+            change_velocity(t, i, rate * (s * at(t.w, i) * table.patch_weight[row + q]))
 
 
 @wp.func

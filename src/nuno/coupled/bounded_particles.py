@@ -128,7 +128,7 @@ def against(v: wp.vec3, size: float):
 
 
 @wp.func
-def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, most_shape: float, body_free: wp.vec3, body_w: float,
+def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, limit_shape: float, body_free: wp.vec3, body_w: float,
                 most: float):  # fmt: skip
     """Friction on a particle that a body presses on a shape, both at once.
 
@@ -139,7 +139,7 @@ def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, most_shape: float
         free: Where the particle would come to without friction [m].
         w: Its inverse mass.
         shape_moved: What the shape's surface moves [m].
-        most_shape: The most that the shape's friction may move the particle [m].
+        limit_shape: The most that the shape's friction may move the particle [m].
         body_free: Where the body's point would come to without this friction [m].
         body_w: The body's inverse mass there.
         most: The largest multiplier between particle and body.
@@ -151,8 +151,8 @@ def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, most_shape: float
     part = body_w / (w + body_w)
     slip = body_free * (1.0 - part) + free * part - shape_moved
     length = wp.length(slip)
-    drag = against(slip, most_shape)
-    if length < part * most_shape:
+    drag = against(slip, limit_shape)
+    if length < part * limit_shape:
         drag = -slip / wp.max(part, 1.0e-12)
     multiplier = (body_free - free - drag) / (w + body_w)
     if wp.length(multiplier) > most:
@@ -160,12 +160,12 @@ def rub_between(free: wp.vec3, w: float, shape_moved: wp.vec3, most_shape: float
         slip = shape_moved - body_free
         multiplier = against(slip, wp.min(most, wp.length(slip) / (body_w + 1.0e-12)))
         drag = shape_moved - free - multiplier * w
-        if wp.length(drag) > most_shape:
+        if wp.length(drag) > limit_shape:
             # it slides on both
             place = free
             tries = int(3)
             for _again in range(tries):
-                drag = against(place - shape_moved, most_shape)
+                drag = against(place - shape_moved, limit_shape)
                 multiplier = against(place - body_free, most)
                 place = free + drag + multiplier * w
     return drag, multiplier

@@ -5,7 +5,7 @@ import warp as wp
 from nuno.coupled.bounded_particles import Particles, bound_all
 from nuno.coupled.contact_rows import Rows, forget_sharers, take_sums
 from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint, projections_of, settle_spins, sum_joint
-from nuno.coupled.joint_contacts import press_entries, press_others
+from nuno.coupled.joint_contacts import resolve_entries, resolve_others
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees, project_trees
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, is_linked, island_of, note_wrong
@@ -185,7 +185,7 @@ def solve(
             take_sums(particles, rigid, first, start, rank, size)
             barrier(size)
         if joints.count > 0 or linked_count > 0:
-            off = press_entries(rigid, parts, manifolds, joints, passing, world, dt, k_pass, counts, rank, size)
+            off = resolve_entries(rigid, parts, manifolds, joints, passing, world, dt, k_pass, counts, rank, size)
             wrong = wp.max(wrong, off)
         if rank == 0:
             for k in range(ties.count):
@@ -247,4 +247,4 @@ def end_contacts(
 ):
     """One pass over the positions of rigid bodies that touch, where joints are: those without any had none yet."""
     tid = wp.tid()
-    press_others(rigid, parts, manifolds, joints, passing, tid / size, dt, tid % size, size)
+    resolve_others(rigid, parts, manifolds, joints, passing, tid / size, dt, tid % size, size)

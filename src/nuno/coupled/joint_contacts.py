@@ -22,7 +22,7 @@ ROUNDING = wp.constant(2.0e-7)
 
 
 @wp.func
-def press_entry(rigid: RigidState, parts: Parts, c: Contacts, world: int, e: int, i: int, j: int, dt: float):
+def resolve_entry(rigid: RigidState, parts: Parts, c: Contacts, world: int, e: int, i: int, j: int, dt: float):
     """Take one pass over a manifold; returns how far that moved its bodies at the contact, beyond rounding [m]."""
     a = rigid.position[i]
     b = rigid.position[j]
@@ -57,7 +57,7 @@ def island_with_passes(joints: Joints, passing: Passing, world: int, a: int, b: 
 
 
 @wp.func
-def press_entries(
+def resolve_entries(
     rigid: RigidState, parts: Parts, c: Contacts, joints: Joints, passing: Passing, world: int, dt: float, k_pass: int,
     rowed: bool, rank: int, size: int,
 ):  # fmt: skip
@@ -81,7 +81,7 @@ def press_entries(
                     j = world * rigid.capacity + b
                     off = float(1.0)
                     if k_pass > 0:
-                        off = press_entry(rigid, parts, c, world, e, i, j, dt)
+                        off = resolve_entry(rigid, parts, c, world, e, i, j, dt)
                     # once rows are left as they are, only joints are gone on for
                     if rowed or passing.jointed[world * passing.bodies + body] != 0:
                         note_wrong(passing, island, off, size)
@@ -91,7 +91,7 @@ def press_entries(
 
 
 @wp.func
-def press_others(
+def resolve_others(
     rigid: RigidState, parts: Parts, c: Contacts, joints: Joints, passing: Passing, world: int, dt: float, rank: int,
     size: int,
 ):  # fmt: skip

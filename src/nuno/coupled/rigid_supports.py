@@ -209,8 +209,8 @@ def follow(particles: Particles, rigid: RigidState, first: int, start: int, rows
 
 
 @wp.func
-def rub_both(free: wp.vec3, w: float, free_a: wp.vec3, wa: float, most_a: float, free_b: wp.vec3, wb: float,
-             most_b: float):  # fmt: skip
+def rub_both(free: wp.vec3, w: float, free_a: wp.vec3, wa: float, limit_a: float, free_b: wp.vec3, wb: float,
+             limit_b: float):  # fmt: skip
     """Friction on a particle between two rigid bodies, a and b: `rub_between` of two that both give way.
 
     Args:
@@ -218,10 +218,10 @@ def rub_both(free: wp.vec3, w: float, free_a: wp.vec3, wa: float, most_a: float,
         w: Its inverse mass.
         free_a: Where a's point would come to without friction with the particle [m].
         wa: Its inverse mass.
-        most_a: The largest multiplier between a and the particle.
+        limit_a: The largest multiplier between a and the particle.
         free_b: As of a.
         wb: As of a.
-        most_b: As of a.
+        limit_b: As of a.
 
     Returns:
         The two multipliers.
@@ -229,24 +229,24 @@ def rub_both(free: wp.vec3, w: float, free_a: wp.vec3, wa: float, most_a: float,
     det = w * wa + w * wb + wa * wb
     a = ((free_a - free) * wb + (free_a - free_b) * w) / det
     b = ((free_b - free) * wa + (free_b - free_a) * w) / det
-    if wp.length(a) > most_a or wp.length(b) > most_b:
+    if wp.length(a) > limit_a or wp.length(b) > limit_b:
         # it sticks to a, and slides on b
         part = w / (w + wa)
         slip = wp.lerp(free, free_a, part) - free_b
-        b = against(slip, wp.min(most_b, wp.length(slip) / (wb + wa * part + 1.0e-12)))
+        b = against(slip, wp.min(limit_b, wp.length(slip) / (wb + wa * part + 1.0e-12)))
         a = (free_a - free - b * w) / (w + wa)
-        if wp.length(a) > most_a:
+        if wp.length(a) > limit_a:
             # a slides over it, and it sticks to b
             part = w / (w + wb)
             slip = wp.lerp(free, free_b, part) - free_a
-            a = against(slip, wp.min(most_a, wp.length(slip) / (wa + wb * part + 1.0e-12)))
+            a = against(slip, wp.min(limit_a, wp.length(slip) / (wa + wb * part + 1.0e-12)))
             b = (free_b - free - a * w) / (w + wb)
-            if wp.length(b) > most_b:
+            if wp.length(b) > limit_b:
                 # it slides on both
                 place = free
                 tries = int(3)
                 for _again in range(tries):
-                    a = against(place - free_a, most_a)
-                    b = against(place - free_b, most_b)
+                    a = against(place - free_a, limit_a)
+                    b = against(place - free_b, limit_b)
                     place = free + (a + b) * w
     return a, b

@@ -150,8 +150,8 @@ def drag_between(particles: Particles, rigid: RigidState, first: int, start: int
     body_w = body_weight(particles, rigid, start, rows, r, wp.normalize(slip + n * 1.0e-12), at_once)
     free = own - old * w - before
     body_free = own - slip + old * body_w
-    most_shape = particles.shape_friction[c] * particles.shape_push[c]
-    drag, multiplier = rub_between(free, w, motion, most_shape, body_free, body_w, most)
+    limit_shape = particles.shape_friction[c] * particles.shape_push[c]
+    drag, multiplier = rub_between(free, w, motion, limit_shape, body_free, body_w, most)
     rows.drag[r] = multiplier
     rows.drag_change[r] = multiplier - old
     apply_row(particles, rigid, first, start, rows, r, multiplier - old, at_once)
@@ -176,9 +176,9 @@ def drag_both(particles: Particles, rigid: RigidState, first: int, start: int, r
     old_b = rows.drag[s]
     wa = wp.max(support_weight(rigid, start, rows, r, wp.normalize(slip + n * 1.0e-12)), SPLIT * w)
     wb = wp.max(support_weight(rigid, start, rows, s, wp.normalize(slip_b + n * 1.0e-12)), SPLIT * w)
-    most_b = rows.friction[s] * rows.push[s]
+    limit_b = rows.friction[s] * rows.push[s]
     free = own - (old_a + old_b) * w
-    a, b = rub_both(free, w, own - slip + old_a * wa, wa, most, own - slip_b + old_b * wb, wb, most_b)
+    a, b = rub_both(free, w, own - slip + old_a * wa, wa, most, own - slip_b + old_b * wb, wb, limit_b)
     rows.drag[r] = a
     rows.drag[s] = b
     move_support(particles, rigid, first, start, rows, r, a - old_a)

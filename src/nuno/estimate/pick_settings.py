@@ -15,7 +15,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.hypotheses import Discretisation
 from nuno.estimate.ranking import EVIDENCE, RANKINGS
 from nuno.estimate.rotations import checked_turns
-from nuno.validation import finite_array, number
+from nuno.validation import LONGEST_WAIT, finite_array, number
 from nuno.world.device import checked_device, found_device
 
 MAX_CANDIDATES = 1024
@@ -75,7 +75,7 @@ def check_settings(
     _check_hand(camera, hand, table)
     labels, uv, grid = _candidates(candidates)
     number("rest_height", rest_height, above=0.0)
-    number("lift_seconds", lift_seconds, above=0.0)
+    number("lift_seconds", lift_seconds, above=0.0, high=LONGEST_WAIT)
     number("sure", sure, above=0.0, high=1.0)
     if sideways is not None:
         number("sideways", sideways, above=0.0)

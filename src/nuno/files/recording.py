@@ -17,9 +17,10 @@ from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, Unkn
 from nuno.files.export import check_extension, one_world
 from nuno.files.html_table import html_table
 from nuno.files.whole_file import file_path, replacing, write_whole
+from nuno.mesh.memory_limit import check_host_memory
 from nuno.shapes.color import linear, rgb
 from nuno.shapes.soft_shape import SoftShape
-from nuno.validation import checked, count, finite_array, index_array, number
+from nuno.validation import checked, count, finite_array, index_array, instant, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -39,6 +40,8 @@ UNREADABLE = (
     AttributeError,
     zipfile.BadZipFile,
 )
+FRAME_BYTES = 64
+"""Of a frame in which nothing moves: its time, and where the bodies' vertices are."""
 ARRAYS = ("vertices", "faces", "skin_corners", "skin_weights")
 
 
@@ -108,11 +111,20 @@ class Recording:
             world: The world.
             seconds: How long it runs [s]; the last frame may be shorter.
             bodies: Which bodies, or their names; None for all.
+
+        Raises:
+            InvalidInputError: ``seconds`` is no time, or would set the clock beyond 1e9 s.
+            NotEnoughMemoryError: so many frames of the dynamic bodies have no room.
         """
         recording = cls(world, bodies)
-        recording.add()
         begin, span = world.time, number("seconds", seconds, low=0.0)
+        instant("seconds", begin + span)
         frames = span * world.frame_rate
+        each = sum(body.vertices.nbytes for body in recording._bodies if body.is_dynamic) + FRAME_BYTES
+        check_host_memory(
+            f"a recording of {frames:.0f} frames", int(frames * each), "record less time, or fewer bodies"
+        )
+        recording.add()
         for k in range(1, int(np.ceil(frames - 1e-6)) + 1):
             world.run(begin + min(k, frames) / world.frame_rate - world.time)
             recording.add()

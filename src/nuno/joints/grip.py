@@ -12,6 +12,7 @@ import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.tie import force_limit, make_hold, make_tie
+from nuno.mesh.memory_limit import check_host_memory
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 from nuno.shapes.path import Path
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 
 log = logging.getLogger(__name__)
+
+KEY_BYTES = 40
+"""Of each coordinate of a key of a grip's path, while it is made: five doubles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,6 +326,11 @@ def _along(path: Path, offsets: np.ndarray, world: Simulation) -> tuple[np.ndarr
         around = offsets[:, :, None]
     else:
         # Straight lines between turned keys would cut the arc of the offsets: a key a frame follows it.
+        frames = (times[-1] - times[0]) * world.frame_rate
+        check_host_memory(
+            f"a grip along a path that turns for {times[-1] - times[0]:g} s", int(KEY_BYTES * frames * offsets.size),
+            "a key a frame is made of it: grip with shorter paths, one after the other",
+        )  # fmt: skip
         steps = np.arange(times[0], times[-1], 1.0 / world.frame_rate)
         times, interpolation = np.union1d(times, steps), "linear"
         centres = path.at(times)

@@ -12,15 +12,15 @@ CLOTH_BYTES = 2_100
 """Of each vertex of a cloth while its dynamics are made, measured on sheets of 200 x 200 and 400 x 400 cells."""
 
 
-def check_host_memory(what: str, needed: int) -> None:
-    """Check that the host has so many bytes free.
+def check_host_memory(what: str, needed: int, hint: str = "take fewer, larger cells") -> None:
+    """Check that the host has so many bytes free; ``hint`` says what helps where it has not.
 
     Raises:
         NotEnoughMemoryError: it has not.
     """
     free = free_bytes("cpu")
     if needed > free:
-        raise NotEnoughMemoryError(what, needed, free, "take fewer, larger cells")
+        raise NotEnoughMemoryError(what, needed, free, hint)
 
 
 def free_bytes(device: str) -> int:

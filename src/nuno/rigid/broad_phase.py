@@ -305,7 +305,7 @@ def in_row(parts: Parts, c: Contacts, k: int, size: int):
 
 @wp.func
 def refresh_rows(
-    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, rank: int, size: int, those: Any
+    s: RigidState, parts: Parts, c: Contacts, world: int, dt: float, down: float, rank: int, size: int, crew: Any
 ):
     """All manifolds, and what the passes need of them."""
     for k in range(rank, parts.count * c.row, size):
@@ -315,7 +315,7 @@ def refresh_rows(
             if may_act(s, parts, c, world, e, p) == 1:
                 refresh(s, parts, c, world, e, p, dt, down)
     # a mesh's first entry has found the points of the others
-    wait_for(those)
+    wait_for(crew)
     for k in range(rank, parts.count * c.row, size):
         p, place = in_row(parts, c, k, size)
         e = (world * c.parts + p) * c.row + place

@@ -160,7 +160,7 @@ def convex_part(points: np.ndarray, thickness: float = 0.0) -> RigidPart:
     size = float(np.linalg.norm(high - low))
     normals, loops = _faces(corners, hull, size)
     planes = np.column_stack([normals, [-(corners[loop] @ n).max() for loop, n in zip(loops, normals, strict=True)]])
-    centre, inner = _inner_ball(planes)
+    centre, inner = _inner_sphere(planes)
     inset = INSET * inner
     shrunk = HalfspaceIntersection(planes + np.array([0.0, 0.0, 0.0, inset]), centre).intersections
     cores = shrunk[ConvexHull(shrunk).vertices]
@@ -190,7 +190,7 @@ def _faces(corners: np.ndarray, hull: Any, size: float) -> tuple[np.ndarray, tup
     return np.array(normals), tuple(loops)
 
 
-def _inner_ball(planes: np.ndarray) -> tuple[np.ndarray, float]:
+def _inner_sphere(planes: np.ndarray) -> tuple[np.ndarray, float]:
     """Centre and radius of the largest ball inside of planes (n, 4) with outward normals."""
     from scipy.optimize import linprog
 

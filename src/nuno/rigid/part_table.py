@@ -211,8 +211,8 @@ def ridges(vertices: np.ndarray, faces: np.ndarray, solid: bool) -> np.ndarray:
     opposite = faces[there, (second % 3 + 2) % 3]
     level = np.einsum("ij,ij->i", normals[here], vertices[opposite] - vertices[edges[first, 0]])
     bent = np.einsum("ij,ij->i", normals[here], normals[there]) < np.cos(RIDGE)
-    sharp = bent & (level < 0.0) if solid else bent
-    out[first], out[second] = sharp, sharp
+    creased = bent & (level < 0.0) if solid else bent
+    out[first], out[second] = creased, creased
     return (out.reshape(-1, 3) * np.array([1, 2, 4])).sum(axis=1).astype(np.int32)
 
 

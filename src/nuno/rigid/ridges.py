@@ -10,7 +10,7 @@ from nuno.rigid.convex import BOX_PART, CYLINDER_PART, HULL
 from nuno.rigid.convex_parts import RigidPart
 from nuno.shapes import quaternion
 
-SHARP = 0.05
+CREASED = 0.05
 """Sine of the angle between the normals of two faces from which on they meet in a sharp edge, 3 degrees: across what is
 flatter a chord cuts by a fortieth of half its length."""
 
@@ -60,10 +60,10 @@ def ridges_of(part: RigidPart, rim_points: int) -> Ridges:
         return _cylinder_ridges(float(part.half[0]), float(part.half[1]), rim_points)
     if part.kind == HULL:
         return _hull_ridges(part)
-    return _sharp(np.zeros((0, 2, 3)), np.zeros((0, 2, 3)), 0.0)
+    return _ridges_of(np.zeros((0, 2, 3)), np.zeros((0, 2, 3)), 0.0)
 
 
-def _sharp(ends: np.ndarray, normals: np.ndarray, depth: float) -> Ridges:
+def _ridges_of(ends: np.ndarray, normals: np.ndarray, depth: float) -> Ridges:
     """Ridges of ends (k, 2, 3) and normals (k, 2, 3)."""
     count = len(ends)
     return Ridges(ends[:, 0], ends[:, 1], normals[:, 0], normals[:, 1], np.zeros(count), np.full(count, depth))
@@ -81,7 +81,7 @@ def _box_ridges(half: np.ndarray) -> Ridges:
                 side[:, along] = -1.0, 1.0
                 ends.append((side + n.sum(axis=0)) * half)
                 normals.append(n)
-    return _sharp(np.array(ends), np.array(normals), float(half.min()))
+    return _ridges_of(np.array(ends), np.array(normals), float(half.min()))
 
 
 def _cylinder_ridges(radius: float, half_height: float, rim_points: int) -> Ridges:
@@ -96,7 +96,7 @@ def _cylinder_ridges(radius: float, half_height: float, rim_points: int) -> Ridg
         ring = rim + half_height * up
         ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
         normals = np.stack([np.broadcast_to(up, out.shape), out], axis=1)
-        each.append(_sharp(ends, normals, min(radius, half_height)))
+        each.append(_ridges_of(ends, normals, min(radius, half_height)))
     tip, none = np.array([[0.0, 0.0, half_height]]), np.zeros((1, 3))
     each.append(Ridges(-tip, tip, none, none, np.array([radius]), np.array([radius])))
     return Ridges.joined(each)
@@ -109,8 +109,8 @@ def _hull_ridges(part: RigidPart) -> Ridges:
     for face, loop in enumerate(part.loops):
         for a, b in zip(loop, np.roll(loop, -1), strict=True):
             faces.setdefault((min(a, b), max(a, b)), []).append(face)
-    pairs = sorted((edge, beside) for edge, beside in faces.items() if len(beside) == 2)
+    pairs = sorted((edge, both) for edge, both in faces.items() if len(both) == 2)
     edges = np.array([edge for edge, _ in pairs], dtype=int).reshape(-1, 2)
-    normals = part.normals[np.array([beside for _, beside in pairs], dtype=int).reshape(-1, 2)]
-    sharp = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1) > SHARP
-    return _sharp(part.corners[edges[sharp]], normals[sharp], float(part.half[0]))
+    normals = part.normals[np.array([both for _, both in pairs], dtype=int).reshape(-1, 2)]
+    creased = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1) > CREASED
+    return _ridges_of(part.corners[edges[creased]], normals[creased], float(part.half[0]))

@@ -95,9 +95,9 @@ class RigidArrays:
         partner = self.manifolds.partner
         table = partner.numpy().reshape(self._entry_shape("partner")).copy()
         count = self.manifolds.count.numpy().reshape(table.shape).copy()
-        gone = np.isin(table, list(rows))
-        gone[:, list(rows)] = True
-        table[gone], count[gone] = -1, 0
+        dropped = np.isin(table, list(rows))
+        dropped[:, list(rows)] = True
+        table[dropped], count[dropped] = -1, 0
         partner.assign(table.ravel())
         self.manifolds.count.assign(count.ravel())
         self._list_anew()

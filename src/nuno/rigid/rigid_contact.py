@@ -137,11 +137,11 @@ def solve_points(c: Contacts, m: Meeting, start: Going, e: int, step: float, of:
             c.force[o] = f
         went = against(g, ra, rb)
         over = beyond(c, o, wp.dot(m.n, went), of)
-        press = wp.max(0.0, f[0] - over * mass[0] * rate)
-        if c.start[o][0] < FAR and (press > 0.0 or f[0] > 0.0):
+        normal_force = wp.max(0.0, f[0] - over * mass[0] * rate)
+        if c.start[o][0] < FAR and (normal_force > 0.0 or f[0] > 0.0):
             slip_t = f[1] - wp.dot(m.t, went) * mass[1] * rate
             slip_u = f[2] - wp.dot(m.u, went) * mass[2] * rate
-            force = limited(wp.vec3(press, slip_t, slip_u), c.friction[e])
+            force = limited(wp.vec3(normal_force, slip_t, slip_u), c.friction[e])
             c.force[o] = force
             d = force - f
             push = step * (d[0] * m.n + d[1] * m.t + d[2] * m.u)

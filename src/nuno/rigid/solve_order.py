@@ -115,8 +115,8 @@ def priority(c: Contacts, world: int, e: int):
 
 
 @wp.func
-def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int, size: int, those: Any):
-    """Bring the entries with points into rounds, by all ``those`` threads of a block or a block group.
+def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int, size: int, crew: Any):
+    """Bring the entries with points into rounds, by all threads of ``crew``, of a block or a block group.
 
     In each round every entry bids its priority for its two bodies, and those that win both are the round.
     """
@@ -130,13 +130,13 @@ def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int
         c.bounds[base] = 0
     for k in range(rank, s.capacity, size):
         c.winner[bodies + k] = wp.uint64(0)
-    wait_for(those)
+    wait_for(crew)
     for local in range(rank, parts.count * c.row, size):
         e = base + local
         if c.count[e] > 0:
             if may_act(s, parts, c, world, e, local / c.row) == 1:
                 c.waiting[base + wp.atomic_add(c.counts, count + WAITING, 1)] = e
-    wait_for(those)
+    wait_for(crew)
     waiting = c.counts[count + WAITING]
     done = int(0)
     colours = int(0)
@@ -151,7 +151,7 @@ def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int
                     wp.atomic_max(c.winner, i, bid)
                 if s.weight[j] > 0.0:
                     wp.atomic_max(c.winner, j, bid)
-        wait_for(those)
+        wait_for(crew)
         for k in range(rank, waiting, size):
             e = c.waiting[base + k]
             if e >= 0:
@@ -161,14 +161,14 @@ def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int
                 if (s.weight[i] == 0.0 or c.winner[i] == bid) and (s.weight[j] == 0.0 or c.winner[j] == bid):
                     c.order[base + wp.atomic_add(c.counts, count + ENTRIES, 1)] = e
                     c.waiting[base + k] = -1
-        wait_for(those)
+        wait_for(crew)
         for k in range(rank, s.capacity, size):
             c.winner[bodies + k] = wp.uint64(0)
         done = c.counts[count + ENTRIES]
         colours = colours + 1
         if rank == 0:
             c.bounds[base + colours] = done
-        wait_for(those)
+        wait_for(crew)
     if rank == 0:
         c.counts[count + COLOURS] = colours
-    wait_for(those)
+    wait_for(crew)

@@ -84,8 +84,8 @@ class ClothLaunches(ParticleSolver):
         return DOUBLE_RATE if self.resolution.given else 0.0
 
     def _advance(self, run: Settings, substeps: int) -> None:
-        doubles = self._doubles.bring(run)
-        states = [self._state] if doubles is None else [doubles, self._state]
+        doubles = self.doubles.bring(run)
+        states = [self.state] if doubles is None else [doubles, self.state]
         if self.plan == "grid":
             if self._grid is None:
                 self._grid = self._grid_plan()
@@ -94,30 +94,30 @@ class ClothLaunches(ParticleSolver):
             self._launch_blocks(run, substeps, doubles)
         elif self.plan == "vector":
             if self._simd is None:
-                self._simd = pack_topology(self.topology, self._topology)
-            inputs = [*states, self._topology, self._simd, self._size, run, self._shapes, substeps]
+                self._simd = pack_topology(self.topology, self.device_topology)
+            inputs = [*states, self.device_topology, self._simd, self._size, run, self.shapes, substeps]
             self._launches.launch(run_simd if doubles is None else run_double_simd, 1, inputs)
         else:
             kernels = (run_lanes, run_double_lanes) if self.lanes > 1 else (run_worlds, run_double_worlds)
             kernel = kernels[doubles is not None]
-            before = [*states, self._topology, self._size]
+            before = [*states, self.device_topology, self._size]
 
             def launch(group: int, piece: Settings, count: int) -> None:
-                inputs = [*before, piece, self._shapes, group, count]
+                inputs = [*before, piece, self.shapes, group, count]
                 wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
 
     def _launch_blocks(self, run: Settings, substeps: int, doubles: Any) -> None:
         """Launch a block for each world and each that helps, or as many as there is room for, which take turns."""
-        state, blocks = self._state, self.world_count
+        state, blocks = self.state, self.world_count
         kernel = self._block_kernel(doubles is not None)
         states = [state] if doubles is None else [doubles, state]
         cores = cores_of(self.device)
         slices = kernel in (run_blocks_shared, run_blocks_many)
         few = kernel is run_blocks_shared if slices else blocks <= cores
         threads = FEW_THREADS if few else MANY_THREADS
-        inputs = [*states, self._topology, self._size, run, self._shapes, substeps, threads]
+        inputs = [*states, self.device_topology, self._size, run, self.shapes, substeps, threads]
         shared, queued = state.spare_blocks > 0 and substeps > 1, False
         if slices:
             room = cores if few else cores * MANY_AT_ONCE
@@ -156,14 +156,14 @@ class ClothLaunches(ParticleSolver):
         if not self._crowded:
             block_groups, blocks = block_groups_of(self.world_count, cores_of(self.device), SHARED_OUT)
         if self._lists is None:
-            self._lists = make_lists(self._topology, self.world_count, self.device)
+            self._lists = make_lists(self.device_topology, self.world_count, self.device)
         shared = wp.zeros(SHARED_FIGURES * self.world_count, dtype=float, device=self.device)
 
         def after(blocks: int) -> tuple[Any, ...]:
-            return self._shapes, self._work(blocks), self._lists, shared
+            return self.shapes, self._work(blocks), self._lists, shared
 
         return GridPlan(
-            (run_grid, run_double_grid), self._state, (self._topology, self._size), after, self.device,
+            (run_grid, run_double_grid), self.state, (self.device_topology, self._size), after, self.device,
             self.world_count, block_groups, blocks, THREADS,
         )  # fmt: skip
 

@@ -98,7 +98,7 @@ class ClothSolver(ClothLaunches):
     ) -> None:
         # block groups have one world after the other, also where that is tried out on the CPU
         self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
-        self.topology, self._cell_size = topology, topology.cell_size
+        self.topology, self.cell_size = topology, topology.cell_size
         self._launches = RecordedLaunches(self.device, 1)
         down = float(np.linalg.norm(self.gravity))
         values = material.resolved(self.world_count, topology.element_count)
@@ -149,6 +149,11 @@ class ClothSolver(ClothLaunches):
         parts = share["stretch"], share["shear"], bending
         return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
+    def bearable_tension(self) -> np.ndarray:
+        """(worlds,) [N/m], the tension that a sheet bears in substeps as long as the last were."""
+        density = (self.mass / self.topology.area).min(axis=1)
+        return density * bearable_tension(self.topology, 1.0, 1.0) / np.reshape(self.last_dt, -1) ** 2
+
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count
         state = StateLanes() if self.lanes > 1 else StateFloat()
@@ -159,8 +164,8 @@ class ClothSolver(ClothLaunches):
             setattr(topo, name, value)
         topo.particles, topo.leaves, topo.columns = n, topology.leaves.count, topology.leaves.columns
         put_sides(topo, topology, self.device, STRETCHED)
-        self._size, self._state, self._topology, self._surface = size, state, topo, topo
-        self._doubles = DoublePositions(self, StateDoubleLanes if self.lanes > 1 else StateDouble, self._double_rate)
+        self._size, self.state, self.device_topology, self._surface = size, state, topo, topo
+        self.doubles = DoublePositions(self, StateDoubleLanes if self.lanes > 1 else StateDouble, self._double_rate)
 
         found = compliances(topology, values)
         for kind in ("stretch", "shear", "bend"):
@@ -168,6 +173,10 @@ class ClothSolver(ClothLaunches):
             setattr(state, f"{kind}_compliance", self._put(table))
             setattr(size, f"{kind}_compliance", table.shape[1])
         self._compliances = found
+        # as `nuno.solvers.line_tension` reads it: world by world in every plan
+        self.stretch_table: wp.array = wp.array(
+            np.asarray(found.stretch, dtype=np.float32), dtype=float, device=self.device
+        )
         for kind in ("edge", "cell", "line", "twist", "patch"):
             setattr(topo, f"{kind}_compliance", wp.array(getattr(found, kind), dtype=int, device=self.device))
         topo.triangle_compliance = wp.array(found.triangle, dtype=wp.vec3i, device=self.device)
@@ -180,14 +189,14 @@ class ClothSolver(ClothLaunches):
         )
         # thicker than half a cell, layers of one fold would push their own neighbours apart
         thickness = np.minimum(values["thickness"], 0.5 * topology.cell_size)
-        self._scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
-        self._scalars[:, :ORIGIN] = np.concatenate([values["air_drag"], own, values["damping"], thickness], axis=1)
+        self.scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
+        self.scalars[:, :ORIGIN] = np.concatenate([values["air_drag"], own, values["damping"], thickness], axis=1)
         self._damped = bool(np.any(values["damping"] > 0))
         self._allocate()
 
     def _allocate(self) -> None:
         """Room for what the kernels keep for themselves."""
-        state, size, n, empty = self._state, self._size, self.particle_count, self._empty
+        state, size, n, empty = self.state, self._size, self.particle_count, self._empty
         leaves = self.topology.leaves
         # boxes of blocks, and of groups of blocks, six numbers each
         size.bounds = 6 * (leaves.count + -(-leaves.count // GROUP))
@@ -256,14 +265,14 @@ class ClothSolver(ClothLaunches):
             return
         self._all_edges = diagonals
         for name, array in upload_blocks(self.topology, diagonals, self.device).items():
-            setattr(self._topology, name, array)
+            setattr(self.device_topology, name, array)
         room = self._listing_numbers()
         if room > self._size.middle:
             self._size.middle = room
-            self._state.middle = self._empty(room, self._number)
-        notes = self._get(self._state.notes, NOTES).copy()
+            self.state.middle = self._empty(room, self._number)
+        notes = self.download(self.state.notes, NOTES).copy()
         notes[:, TRAVEL] = 1.0e9
-        wp.copy(self._state.notes, self._put(notes))
+        wp.copy(self.state.notes, self._put(notes))
         self._forget_launches()
 
     def _listing_numbers(self) -> int:
@@ -280,7 +289,7 @@ class ClothSolver(ClothLaunches):
         Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks, for one
         world after the other, stands world by world: see `candidate_pairs`.
         """
-        state, size, empty = self._state, self._size, self._empty
+        state, size, empty = self.state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
         state.edge_edge = self._list(4 * size.edge_edge)
         state.pair_count = empty(COUNTS, self._integer)
@@ -309,7 +318,7 @@ class ClothSolver(ClothLaunches):
 
     def _allocate_work_queue(self) -> None:
         """Room for blocks that help others list pairs: as many as there are multiprocessors without a world."""
-        state, worlds, cores = self._state, self.world_count, 0
+        state, worlds, cores = self.state, self.world_count, 0
         if self._cuda and self.plan != "grid" and self.self_contact:
             cores = cores_of(self.device)
         state.spare_blocks = max(0, min(cores - worlds, MAX_SPARE_BLOCKS * worlds))
@@ -320,16 +329,16 @@ class ClothSolver(ClothLaunches):
     @property
     def pair_counts(self) -> np.ndarray:
         """(worlds, 2) int: listed vertex-triangle and edge-edge candidates, those that did not fit included."""
-        return self._get(self._state.pair_count, COUNTS)[:, :2]
+        return self.download(self.state.pair_count, COUNTS)[:, :2]
 
     @property
     def listings(self) -> np.ndarray:
         """(worlds,) float, how often pairs were listed since the state was set."""
-        return self._get(self._state.notes, NOTES)[:, LISTINGS]
+        return self.download(self.state.notes, NOTES)[:, LISTINGS]
 
     def candidate_pairs(self, world: int) -> list[np.ndarray]:
         """The vertices of a world's listed vertex-triangle and edge-edge candidates, (k, 4) int each."""
-        state, size, rows = self._state, self._size, []
+        state, size, rows = self.state, self._size, []
         kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
         for (array, room), count in zip(kinds, self.pair_counts[world], strict=True):
             numbers = array.numpy().ravel()[4 * room * world : 4 * room * (world + 1)]
@@ -346,23 +355,23 @@ class ClothSolver(ClothLaunches):
         self._left_out = False
         if left_out:  # the run that is gone through again must not find the device too busy once more
             self._crowded, self._grid = True, None
-        counts = self._get(self._state.pair_count, COUNTS) if self._counted is None else self._counted
+        counts = self.download(self.state.pair_count, COUNTS) if self._counted is None else self._counted
         self._counted = None
         missed = find_missed(self._size, counts)
         if not missed.any():
             return left_out
-        rows = max(self.group_count, self._state.spare_blocks)
+        rows = max(self.group_count, self.state.spare_blocks)
         longer = lengthen_lists(self._size, counts, self.group_count * self.lanes, rows, self.device)
         if longer:
             self._allocate_lists()
             self._forget_launches()
         else:
             self.missed |= missed
-            self._state.pair_count.zero_()  # tells of what comes after this
+            self.state.pair_count.zero_()  # tells of what comes after this
         # what is listed now is gone
-        notes = self._get(self._state.notes, NOTES).copy()
+        notes = self.download(self.state.notes, NOTES).copy()
         notes[:, TRAVEL] = 1.0e9
-        wp.copy(self._state.notes, self._put(notes))
+        wp.copy(self.state.notes, self._put(notes))
         return longer or left_out
 
     def settings(self, time: float, dt: float, frame: int) -> Settings:
@@ -370,7 +379,7 @@ class ClothSolver(ClothLaunches):
         run = super().settings(time, dt, frame)
         run.passes = self.passes
         if self.plan in ("grid", "vector"):
-            run.margin = LIST_MARGIN * self._cell_size
+            run.margin = LIST_MARGIN * self.cell_size
         run.sweeps = self.sweeps
         run.rise, run.onset = RELAXATIONS[self.sweeps]
         return run

@@ -104,7 +104,7 @@ class Coupling(CouplingResults):
         self._particles.held = wp.array(held_slots(numbers.size, holds, joints), dtype=int, device=self.device)
         self._start = wp.zeros(max(1, self.world_count * total), dtype=wp.vec3, device=self.device)
         self._cells = np.full(self._bodies, np.inf)
-        self._cells[: len(self._solvers)] = [solver._cell_size for solver in self._solvers]
+        self._cells[: len(self._solvers)] = [solver.cell_size for solver in self._solvers]
         self._radii = elements.radius.numpy().reshape(self.world_count, self._bodies).T.astype(float)
         self._touches_itself = elements.touch.numpy()[:: self._bodies + 1][: self._bodies] != 0
         tied = set(ties.body.numpy()[: ties.count].tolist())
@@ -160,11 +160,11 @@ class Coupling(CouplingResults):
         made.particles, made.lanes, made.first = solver.particle_count, solver.lanes, self._firsts[k]
         for name in PARTICLE_ARRAYS:
             if not name.startswith("v"):
-                setattr(made, name, plain(getattr(solver._state, name), float))
-        made.doubles = int(solver._doubles.count)
+                setattr(made, name, plain(getattr(solver.state, name), float))
+        made.doubles = int(solver.doubles.count)
         if made.doubles:
             for name in PLACES:
-                setattr(made, name.upper(), plain(solver._doubles.array(name), wp.float64))
+                setattr(made, name.upper(), plain(solver.doubles.array(name), wp.float64))
         made.origin = wp.array(solver.origin.astype(np.float32), dtype=wp.vec3, device=self.device)
         offset = (solver.origin - self._origins[:, k]).astype(np.float32)
         made.offset = wp.array(offset, dtype=wp.vec3, device=self.device)
@@ -172,8 +172,8 @@ class Coupling(CouplingResults):
 
     @staticmethod
     def _surroundings(solver: ParticleSolver) -> Surroundings:
-        made, state = Surroundings(), solver._state
-        made.shapes, made.worlds, made.stride = solver._shapes, solver.world_count, solver._size.shape_list
+        made, state = Surroundings(), solver.state
+        made.shapes, made.worlds, made.stride = solver.shapes, solver.world_count, solver._size.shape_list
         made.near, made.scalars = state.shape_list, plain(state.scalars, float)
         return made
 

@@ -141,7 +141,7 @@ class CouplingResults:
 
     def _speeds(self) -> np.ndarray:
         """The largest speed in each one's island, (bodies, worlds) [m/s]."""
-        own = [np.sqrt(s._get(s._state.notes, NOTES)[:, SPEED].astype(float)) for s in self._solvers]
+        own = [np.sqrt(s.download(s.state.notes, NOTES)[:, SPEED].astype(float)) for s in self._solvers]
         if self._rigid is not None:
 
             def sizes(array: wp.array) -> np.ndarray:

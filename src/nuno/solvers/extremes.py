@@ -22,8 +22,8 @@ def deepest(solver: Any) -> np.ndarray:
 def forget_extremes(solver: Any) -> None:
     """Let `fastest` and `deepest` tell of what comes next."""
     for entry in (FASTEST, DEEPEST):
-        reset_note(solver._state, solver.group_count, solver.device, entry)
+        reset_note(solver.state, solver.group_count, solver.device, entry)
 
 
 def _notes(solver: Any) -> np.ndarray:
-    return np.asarray(solver._get(solver._state.notes, NOTES))
+    return np.asarray(solver.download(solver.state.notes, NOTES))

@@ -22,29 +22,31 @@ Copied = dict[str, np.ndarray]  # (worlds, ...) each
 
 def copy_particles(solver: ParticleSolver) -> Copied:
     """Return all that a run changes of a cloth or soft body and that outlasts it."""
-    copied = {name: solver._get(getattr(solver._state, name), count).copy() for name, count in _columns(solver).items()}
-    if solver._doubles.count:
+    copied = {
+        name: solver.download(getattr(solver.state, name), count).copy() for name, count in _columns(solver).items()
+    }
+    if solver.doubles.count:
         copied |= {f"double_{name}": array.copy() for name, array in _doubles(solver).items()}
     if solver.sums is not None:
         copied |= {f"given_{key}": impulse for key, impulse in solver.sums.given().items()}
-    return copied | {"last_dt": np.full(solver.world_count, solver._last_dt)}
+    return copied | {"last_dt": np.full(solver.world_count, solver.last_dt)}
 
 
 def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
     """Set the state to that of each copy in the worlds (worlds,) bool beside it."""
     for name, count in _columns(solver).items():
-        array = getattr(solver._state, name)
-        values = solver._get(array, count).copy()
+        array = getattr(solver.state, name)
+        values = solver.download(array, count).copy()
         for copied, worlds in made:
             values[worlds] = copied[name][worlds]
         if name == "notes":
             values[:, TRAVEL] = 1.0e9
         wp.copy(array, solver._put(values))
     _mix_doubles(solver, made)
-    last = np.full(solver.world_count, solver._last_dt)
+    last = np.full(solver.world_count, solver.last_dt)
     for copied, worlds in made:
         last[worlds] = copied["last_dt"][worlds]
-    solver._last_dt = last
+    solver.last_dt = last
     if solver.sums is not None:
         given: Copied = {}
         for copied, worlds in made:
@@ -71,27 +73,27 @@ def move_particles(solver: ParticleSolver, moved: dict[int, np.ndarray]) -> None
 
 def _mix_doubles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
     """The same for coordinates that are doubles in some copies; in the others they are the floats'."""
-    if not solver._doubles.count and not any("double_x" in copied for copied, _ in made):
+    if not solver.doubles.count and not any("double_x" in copied for copied, _ in made):
         return
     mixed = []
     for name, values in _doubles(solver).items():
         for copied, worlds in made:
             values[worlds] = copied.get(f"double_{name}", copied[name])[worlds]
         mixed.append(values)
-    solver._doubles.put(np.stack(mixed, axis=-1))
+    solver.doubles.put(np.stack(mixed, axis=-1))
 
 
 def _doubles(solver: ParticleSolver) -> Copied:
     """The coordinates that count, as doubles."""
     count = solver.particle_count
-    arrays = zip(("x", "y", "z"), solver._doubles.arrays, strict=True)
-    return {name: solver._get(array, count).astype(np.float64) for name, array in arrays}
+    arrays = zip(("x", "y", "z"), solver.doubles.arrays, strict=True)
+    return {name: solver.download(array, count).astype(np.float64) for name, array in arrays}
 
 
 def _columns(solver: ParticleSolver) -> dict[str, int]:
     """Numbers a world of each array."""
     columns = {name: solver.particle_count for name in PARTICLE_ARRAYS if name != "w"}
-    return columns | {"notes": NOTES, "grip_load": LOADS * max(1, solver._grip_count)}
+    return columns | {"notes": NOTES, "grip_load": LOADS * max(1, solver.grip_count)}
 
 
 def copy_rigid(solver: RigidSolver) -> Copied:

@@ -46,11 +46,11 @@ class ParticleSolver(ParticleState):
     substeps: int
     self_contact: bool
     _damped: bool
-    _cell_size: float
+    cell_size: float
 
     def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set the first state; nothing acts yet."""
-        self._last_dt: Any = 1.0  # of the last run [s], one or (worlds,)
+        self.last_dt: Any = 1.0  # of the last run [s], one or (worlds,)
         self.set_state(positions, velocities)
         self.set_colliders(None)
         self.set_grips(())
@@ -85,10 +85,10 @@ class ParticleSolver(ParticleState):
             shapes.planes = wp.zeros(1, dtype=wp.vec4, device=self.device)
         else:
             shapes = colliders.shapes
-        self._colliders, self._shapes = colliders, shapes
+        self._colliders, self.shapes = colliders, shapes
         self._size.shape_list = max(1, int(shapes.count)) + 1
         self._size.feature_shapes = len(self._surface.feature_colour) + self._size.shape_list
-        self._state.shape_list, self._state.feature_shapes = (
+        self.state.shape_list, self.state.feature_shapes = (
             self._empty(self._size.shape_list, int),
             self._empty(self._size.feature_shapes, int),
         )
@@ -103,7 +103,7 @@ class ParticleSolver(ParticleState):
 
     def set_forces(self, forces: np.ndarray | None) -> None:
         """Forces [N] on the vertices, (worlds, n, 3), held until set anew; None for none."""
-        s = self._state
+        s = self.state
         self._pushed = forces is not None
         if forces is None:
             self._size.forces = 1
@@ -124,7 +124,7 @@ class ParticleSolver(ParticleState):
         rows = grip_rows(grips, self.origin, self._inverse_mass)
         _, count, keys, _ = rows.place.shape
         self._grip_times = rows.times
-        s, size = self._state, self._size
+        s, size = self.state, self._size
         size.keys, size.grips = count * keys, count
         for k, name in enumerate(("grip_x", "grip_y", "grip_z")):
             setattr(s, name, self._put(rows.place[..., k]))
@@ -134,7 +134,7 @@ class ParticleSolver(ParticleState):
             self._put(np.zeros((self.world_count, LOADS * count))),
         )
         wp.copy(s.w, self._put(rows.mass))
-        self._grip_count, self._grip_keys = rows.count, keys
+        self.grip_count, self._grip_keys = rows.count, keys
         self._compliant_grips = int((rows.fixed == 0).any())
 
         def put(values: np.ndarray, dtype: Any) -> wp.array:
@@ -155,9 +155,9 @@ class ParticleSolver(ParticleState):
             on top.
         """
         worlds, rows = self.world_count, np.arange(self.world_count)[:, None]
-        loads = self._get(self._state.grip_load, LOADS * max(1, self._grip_count)).astype(float)
+        loads = self.download(self.state.grip_load, LOADS * max(1, self.grip_count)).astype(float)
         loads = loads.reshape(worlds, -1, LOADS)
-        forces = loads[..., :3] / np.maximum(loads[..., 3:], 1.0) / np.reshape(self._last_dt, (-1, 1, 1)) ** 2
+        forces = loads[..., :3] / np.maximum(loads[..., 3:], 1.0) / np.reshape(self.last_dt, (-1, 1, 1)) ** 2
         result, first = [], 0
         fixed = self._grip_fixed.numpy()
         for grip in self._grips:
@@ -169,9 +169,9 @@ class ParticleSolver(ParticleState):
             first += k
         return result
 
-    def _inverse_mass_now(self, array: wp.array) -> np.ndarray:
+    def inverse_mass_now(self, array: wp.array) -> np.ndarray:
         """(worlds, n), zero for what is held."""
-        fixed = self._get(array, self.particle_count).copy()
+        fixed = self.download(array, self.particle_count).copy()
         fixed[fixed < 0.5 * self._inverse_mass] = 0.0
         return fixed
 
@@ -207,19 +207,19 @@ class ParticleSolver(ParticleState):
 
     def open(self, time: float, dt: float, frame: int) -> None:
         """Begin to advance by parts of a substep of ``dt`` [s], ``frame`` of them a frame; see `step_parts`."""
-        self._opened = self.settings(time, dt, frame)
-        self._doubles.bring(self._opened)
+        self.opened = self.settings(time, dt, frame)
+        self.doubles.bring(self.opened)
         self._reset_clock()
 
     def step_parts(self, index: int, parts: int) -> None:
         """Do some parts (see `nuno.state.cloth_state`) of substep ``index`` since `open`."""
-        self._opened.first, self._opened.parts = index, parts
-        self._advance(self._opened, 1)
+        self.opened.first, self.opened.parts = index, parts
+        self._advance(self.opened, 1)
 
     def begin_substep(self, index: int) -> None:
         """Do substep ``index`` since `open` up to where shapes are met."""
         self.step_parts(index, MOTION | COMPLIANT_GRIPS | SELF_CONTACT)
-        if self.sums is not None and index % self._opened.frame == 0:
+        if self.sums is not None and index % self.opened.frame == 0:
             self.sums.begin()
 
     def end_substep(self, index: int) -> None:
@@ -234,15 +234,15 @@ class ParticleSolver(ParticleState):
         if self._colliders is not None:
             self._colliders.begin(time, dt)
         run = Settings()
-        run.dt = self._last_dt = dt
+        run.dt = self.last_dt = dt
         run.gravity = wp.vec3(*(float(g) for g in self.gravity))
         run.pushed, run.damped, run.touching = int(self._pushed), int(self._damped), int(self.self_contact)
         # candidates within a third of a cell: few enough to look at, and good for several substeps
-        run.cell = self._cell_size
-        run.margin = 0.35 * self._cell_size
-        run.reach = 0.25 * self._cell_size
+        run.cell = self.cell_size
+        run.margin = 0.35 * self.cell_size
+        run.reach = 0.25 * self.cell_size
         run.frame, run.first, run.parts = frame, 0, ALL_PARTS
-        run.grips, run.keys, run.pulled = self._grip_count, self._grip_keys, self._compliant_grips
+        run.grips, run.keys, run.pulled = self.grip_count, self._grip_keys, self._compliant_grips
         run.grip_start = wp.array([time], dtype=wp.float64, device=self.device)
         run.grip_time, run.step = self._grip_time, wp.float64(dt)
         run.grip_ease, run.grip_fixed = self._grip_ease, self._grip_fixed
@@ -255,7 +255,7 @@ class ParticleSolver(ParticleState):
     def _reset_clock(self) -> None:
         from nuno.state.pack import reset_clock
 
-        reset_clock(self._state, self.group_count, self.device)
+        reset_clock(self.state, self.group_count, self.device)
 
 
 def substeps_of(duration: float, frame: float, substeps: int) -> int:

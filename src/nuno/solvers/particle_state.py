@@ -41,13 +41,13 @@ class ParticleState:
 
     plan: str
     mass: np.ndarray
-    _state: Any
+    state: Any
     _size: Any
-    _topology: Any
+    device_topology: Any
     _surface: Any
-    _scalars: np.ndarray
+    scalars: np.ndarray
     _inverse_mass: np.ndarray
-    _doubles: DoublePositions
+    doubles: DoublePositions
 
     def _prepare(
         self, positions: np.ndarray, device: str, gravity: Sequence[float], frame_rate: float, lanes: bool = True
@@ -83,7 +83,7 @@ class ParticleState:
         values = values.reshape(self.group_count, self.lanes, -1).transpose(0, 2, 1)
         return np.ascontiguousarray(values).reshape(-1, self.lanes)
 
-    def _get(self, array: wp.array, count: int) -> np.ndarray:
+    def download(self, array: wp.array, count: int) -> np.ndarray:
         """The (worlds, count) numbers of a device array."""
         values = array.numpy()
         if self.lanes > 1:
@@ -102,7 +102,7 @@ class ParticleState:
 
     def _allocate_particles(self) -> None:
         """Room for the arrays that all particles have."""
-        state, n = self._state, self.particle_count
+        state, n = self.state, self.particle_count
         for name in PARTICLE_ARRAYS:
             setattr(state, name, self._empty(self._whole, self._number)[: self.group_count * n])
         state.notes = self._empty(NOTES, self._number)
@@ -118,12 +118,12 @@ class ParticleState:
 
     def local_positions(self) -> np.ndarray:
         """(worlds, n, 3) relative to each world's ``origin`` [m]: the solver's own digits, float32 or float64."""
-        return np.stack([self._get(a, self.particle_count) for a in self._doubles.arrays], axis=-1)
+        return np.stack([self.download(a, self.particle_count) for a in self.doubles.arrays], axis=-1)
 
     @property
     def origin(self) -> np.ndarray:
         """(worlds, 3) float64, what ``local_positions`` are relative to [m]."""
-        return self._scalars[:, ORIGIN : ORIGIN + 3].astype(np.float64)
+        return self.scalars[:, ORIGIN : ORIGIN + 3].astype(np.float64)
 
     def velocities(self) -> np.ndarray:
         """(worlds, n, 3) float32, a copy [m/s]."""
@@ -131,8 +131,8 @@ class ParticleState:
 
     def velocities_apart(self, kept: Kept | None = None) -> tuple[np.ndarray, ...]:
         """The velocities' x, y and z, (worlds, n) float32 each [m/s], as they are or as `keep` kept them."""
-        arrays = [getattr(self._state, name) for name in KEPT] if kept is None else kept[1]
-        return tuple(self._get(arrays[KEPT.index(name)], self.particle_count) for name in ("vx", "vy", "vz"))
+        arrays = [getattr(self.state, name) for name in KEPT] if kept is None else kept[1]
+        return tuple(self.download(arrays[KEPT.index(name)], self.particle_count) for name in ("vx", "vy", "vz"))
 
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
@@ -140,43 +140,43 @@ class ParticleState:
 
     def save_state(self) -> dict[str, np.ndarray]:
         """Return all that the next step depends on, each array (worlds, ...): what `load_state` takes, bit for bit."""
-        notes = self._get(self._state.notes, NOTES)[:, :FASTEST].copy()
+        notes = self.download(self.state.notes, NOTES)[:, :FASTEST].copy()
         # the list of candidate pairs is not part of the state: it is made anew, which changes no result
         notes[:, TRAVEL] = 1.0e9
         return dict(
-            local=self.local_positions(), origin=self._scalars[:, ORIGIN : ORIGIN + 3].copy(),
+            local=self.local_positions(), origin=self.scalars[:, ORIGIN : ORIGIN + 3].copy(),
             velocities=self.velocities(), notes=notes,
         )  # fmt: skip
 
     def load_state(self, state: dict[str, np.ndarray]) -> None:
         """Set the state that `save_state` gave; leading axes of 1 are spread over the worlds."""
-        s, worlds, n = self._state, self.world_count, self.particle_count
+        s, worlds, n = self.state, self.world_count, self.particle_count
         local = np.broadcast_to(state["local"], (worlds, n, 3))
         velocities = np.broadcast_to(state["velocities"], (worlds, n, 3))
         for k, (a, b, c) in enumerate((("x", "px", "vx"), ("y", "py", "vy"), ("z", "pz", "vz"))):
             wp.copy(getattr(s, a), self._put(local[..., k]))
             wp.copy(getattr(s, b), self._put(local[..., k]))
             wp.copy(getattr(s, c), self._put(velocities[..., k]))
-        self._doubles.count = False
+        self.doubles.count = False
         if local.dtype == np.float64:
-            self._doubles.put(local)
+            self.doubles.put(local)
         notes = np.broadcast_to(state["notes"], (worlds, FASTEST))
         wp.copy(s.notes, self._put(np.pad(notes, ((0, 0), (0, NOTES - FASTEST)))))
-        self._scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
-        s.scalars = self._put(self._scalars)
+        self.scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
+        s.scalars = self._put(self.scalars)
 
     def keep(self) -> Kept:
         """Return what `put_back` takes: the present state, copied on the device, which nobody waits for."""
-        own = [wp.clone(getattr(self._state, name)) for name in KEPT]
-        doubles = [wp.clone(array) for array in self._doubles.arrays] if self._doubles.count else []
-        return self._scalars[:, ORIGIN : ORIGIN + 3].copy(), own, doubles
+        own = [wp.clone(getattr(self.state, name)) for name in KEPT]
+        doubles = [wp.clone(array) for array in self.doubles.arrays] if self.doubles.count else []
+        return self.scalars[:, ORIGIN : ORIGIN + 3].copy(), own, doubles
 
     def put_back(self, kept: Kept) -> None:
         """Set the state that `keep` kept, as `load_state` does what `save_state` gave then."""
         for name, array in zip(KEPT, kept[1], strict=True):
-            wp.copy(getattr(self._state, name), array)
-        self._doubles.count = bool(kept[2])
-        for target, array in zip(self._doubles.arrays, kept[2], strict=False):
+            wp.copy(getattr(self.state, name), array)
+        self.doubles.count = bool(kept[2])
+        for target, array in zip(self.doubles.arrays, kept[2], strict=False):
             wp.copy(target, array)
         self.load_state({**self.save_state(), "origin": kept[0]})
 
@@ -184,14 +184,14 @@ class ParticleState:
         """(worlds,) bool: whether every position and velocity is a finite number."""
         from nuno.state.pack import finite_worlds
 
-        s, n = self._state, self.particle_count
+        s, n = self.state, self.particle_count
         if self._cuda:
             finite, self._counted = finite_worlds(s, self.world_count, n, self.device, self._counts)
             return finite
         arrays = (s.x, s.y, s.z, s.vx, s.vy, s.vz)
         if all(np.isfinite(a.numpy()).all() for a in arrays):  # lanes beyond the last world repeat it
             return np.ones(self.world_count, dtype=bool)
-        return np.all([np.isfinite(self._get(a, n)).all(axis=1) for a in arrays], axis=0)
+        return np.all([np.isfinite(self.download(a, n)).all(axis=1) for a in arrays], axis=0)
 
     def make_room(self) -> bool:
         """Make room for what did not fit in the run before, which must then be gone through again."""
@@ -201,14 +201,14 @@ class ParticleState:
         """(worlds, n) array of vec3 [m] on the solver's device, for the renderer; a copy, into ``out`` if given."""
         from nuno.state.pack import pack_positions
 
-        worlds, n, places = self.world_count, self.particle_count, self._doubles.arrays
-        return pack_positions(self._state, worlds, n, self.lanes, self.device, out, places)
+        worlds, n, places = self.world_count, self.particle_count, self.doubles.arrays
+        return pack_positions(self.state, worlds, n, self.lanes, self.device, out, places)
 
     def velocities_on_device(self, out: wp.array | None = None) -> wp.array:
         """(worlds, n) array of vec3 [m/s] on the solver's device; a copy, into ``out`` if given."""
         from nuno.state.pack import pack_velocities
 
-        return pack_velocities(self._state, self.world_count, self.particle_count, self.lanes, self.device, out)
+        return pack_velocities(self.state, self.world_count, self.particle_count, self.lanes, self.device, out)
 
     @property
     def arrays(self) -> dict[str, wp.array]:
@@ -217,16 +217,16 @@ class ParticleState:
         On CUDA and for one world on the CPU each is (worlds * n,) float32; in a batch on the CPU it is
         (groups * n,) vectors of 16 worlds.
         """
-        return {name: getattr(self._state, name) for name in ("x", "y", "z", "vx", "vy", "vz")}
+        return {name: getattr(self.state, name) for name in ("x", "y", "z", "vx", "vy", "vz")}
 
     @property
     def memory_bytes(self) -> int:
         """Bytes of device memory that this body holds, elements shared by all worlds included."""
-        return array_bytes(self._state, self._topology, self._surface)
+        return array_bytes(self.state, self.device_topology, self._surface)
 
     def world_bytes(self) -> tuple[int, int]:
         """Return what each world takes on the device, and what making a copy of it takes on the host [bytes]."""
-        return array_bytes(self._state) // self.world_count, HOST_COPIES * 8 * 6 * self.particle_count
+        return array_bytes(self.state) // self.world_count, HOST_COPIES * 8 * 6 * self.particle_count
 
 
 def state_from(positions: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:

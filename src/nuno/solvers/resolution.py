@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -14,7 +17,10 @@ logger = logging.getLogger(__name__)
 
 WARNED_BELOW = 0.9
 """A share of the stiffness below which a warning says so."""
+OVERLOAD = 1.1
+"""A tension, over the one that is borne, above which a warning says so: a load that is put on at once swings."""
 _warned: set[str] = set()  # keys of bodies that were warned of, the same for their copies in imagined worlds
+_overloaded: set[str] = set()  # the same of those under more tension than they bear
 
 
 @dataclass(frozen=True)
@@ -72,3 +78,29 @@ def warn_of_resolution(body: Body, world: Simulation) -> None:
         "mend that; %r.resolution says how much",
         body.name, parts, why, cure, body.name,
     )  # fmt: skip
+
+
+def warn_of_overloads(bodies: list[Body], time: float) -> None:
+    """Warn, once for a body and its copies, of sheets under more tension than their substeps bear at ``time`` [s]."""
+    for body in bodies:
+        found = body.resolution
+        if found is None or found.tension is None or body.key in _overloaded:
+            continue
+        from nuno.solvers.line_tension import line_tension
+
+        solver: Any = body._dynamics.solver  # type: ignore[union-attr]
+        load, borne = line_tension(solver), solver.bearable_tension()
+        world = int(np.argmax(np.where(np.isfinite(load), load / borne, 0.0)))
+        share = float(load[world] / borne[world])
+        if not OVERLOAD < share < math.inf:
+            continue
+        _overloaded.add(body.key)
+        substeps = round(math.sqrt(float(borne[world]) / found.tension) * found.substeps)
+        enough = math.ceil(substeps * math.sqrt(OVERLOAD * share))
+        logger.warning(
+            "%r is stretched as by %.3g N/m at %.3g s, and bears %.3g N/m in %d substeps a frame: beyond, it flutters, "
+            "is longer than its material says and slips on what it touches. World(substeps=%d) bears a tenth more than "
+            "that, as what is borne goes with the square of the substeps; less load, slower moves, coarser cells or "
+            "heavier cloth mend it too; %r.resolution.tension says what is borne",
+            body.name, load[world], time, borne[world], substeps, enough, body.name,
+        )  # fmt: skip

@@ -23,8 +23,8 @@ def self_contact_forces(solver: ParticleSolver, time: float) -> tuple[np.ndarray
     if not solver.self_contact:
         nothing = np.zeros((solver.world_count, solver.particle_count, 3))
         return nothing, nothing
-    saved, loads, last = solver.save_state(), wp.clone(solver._state.grip_load), solver._last_dt
-    friction = solver._scalars[:, FRICTION].copy()
+    saved, loads, last = solver.save_state(), wp.clone(solver.state.grip_load), solver.last_dt
+    friction = solver.scalars[:, FRICTION].copy()
     dt = 1.0 / solver.frame_rate / solver.substeps
 
     def moved() -> np.ndarray:
@@ -36,12 +36,12 @@ def self_contact_forces(solver: ParticleSolver, time: float) -> tuple[np.ndarray
         return solver.local_positions() - start
 
     forces = moved() * (solver.mass / dt**2)[..., None]
-    solver._scalars[:, FRICTION] = 0.0
+    solver.scalars[:, FRICTION] = 0.0
     push = moved()
-    solver._scalars[:, FRICTION] = friction
+    solver.scalars[:, FRICTION] = friction
     solver.load_state(saved)
-    wp.copy(solver._state.grip_load, loads)
-    solver._last_dt = last
+    wp.copy(solver.state.grip_load, loads)
+    solver.last_dt = last
     size = np.linalg.norm(push, axis=-1, keepdims=True)
     normals = np.divide(push, size, out=np.zeros_like(push), where=size > 0.0)
     return normals, np.where(size > 0.0, forces, 0.0)

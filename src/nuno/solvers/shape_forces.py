@@ -28,20 +28,20 @@ def shape_forces(solver: ParticleSolver, time: float) -> list[tuple[int, np.ndar
         The shape's number in the table, the normals (worlds, n, 3) at the particles that it pushes, zero elsewhere,
         and the forces [N] on them, (worlds, n, 3).
     """
-    s, saved, loads, last = solver._state, solver.save_state(), wp.clone(solver._state.grip_load), solver._last_dt
+    s, saved, loads, last = solver.state, solver.save_state(), wp.clone(solver.state.grip_load), solver.last_dt
     dt = 1.0 / solver.frame_rate / solver.substeps
     solver.open(time, dt, solver.substeps)
     solver.step_parts(0, MOTION | COMPLIANT_GRIPS | SELF_CONTACT)
     starts = shape_lists(solver)
     lists = {name: getattr(s, name).numpy().reshape(solver.group_count, -1).copy() for name in starts}
     shapes = shapes_of_list(lists["shape_list"], starts["shape_list"])
-    before, held = [wp.clone(a) for a in solver._doubles.arrays], wp.clone(s.w)
-    table: Any = wp.clone(solver._shapes.table)
+    before, held = [wp.clone(a) for a in solver.doubles.arrays], wp.clone(s.w)
+    table: Any = wp.clone(solver.shapes.table)
     slick = table.numpy().reshape(-1, COLUMNS).copy()
     slick[:, MU : MU + 2] = 0.0
 
     def moved(shape: int) -> np.ndarray:
-        for array, first in zip(solver._doubles.arrays, before, strict=True):
+        for array, first in zip(solver.doubles.arrays, before, strict=True):
             wp.copy(array, first)
         wp.copy(s.w, held)
         for name, start in starts.items():
@@ -54,16 +54,16 @@ def shape_forces(solver: ParticleSolver, time: float) -> list[tuple[int, np.ndar
     result = []
     for shape in shapes:
         forces = moved(shape) * (solver.mass / dt**2)[..., None]
-        solver._shapes.table.assign(slick.ravel())
+        solver.shapes.table.assign(slick.ravel())
         push = moved(shape)
-        solver._shapes.table.assign(table)
+        solver.shapes.table.assign(table)
         size = np.linalg.norm(push, axis=-1, keepdims=True)
-        forces[solver._inverse_mass_now(held) == 0.0] = 0.0
+        forces[solver.inverse_mass_now(held) == 0.0] = 0.0
         if size.any():
             result.append((shape, np.divide(push, size, out=np.zeros_like(push), where=size > 0.0), forces))
     solver.load_state(saved)
     wp.copy(s.grip_load, loads)
-    solver._last_dt = last
+    solver.last_dt = last
     return result
 
 

@@ -56,7 +56,7 @@ class ShapeImpulses:
         self._launches = RecordedLaunches(solver.device, BLOCK_THREADS)
         # x, y and z, and what they were, for floats and for doubles
         self._places: dict[Any, tuple[list[wp.array], list[wp.array]]] = {}
-        self._w = plain(solver._state.w, float)
+        self._w = plain(solver.state.w, float)
 
     def _array(self, count: int, dtype: Any) -> wp.array:
         return wp.zeros(max(1, count), dtype=dtype, device=self._solver.device)
@@ -65,7 +65,7 @@ class ShapeImpulses:
 
     def begin(self) -> None:
         """Begin the sums of a frame, in whose first substep the shapes nearby have just been listed."""
-        solver, s, colliders = self._solver, self._solver._state, self._solver._colliders
+        solver, s, colliders = self._solver, self._solver.state, self._solver._colliders
         starts = shape_lists(solver)
         shape_list, features = (getattr(s, name).numpy().reshape(solver.group_count, -1) for name in starts)
         self._shapes, self._feature_shapes = (
@@ -101,7 +101,7 @@ class ShapeImpulses:
             if self._shapes:
                 self._add(0)
             return
-        s, run = solver._state, solver._opened
+        s, run = solver.state, solver.opened
         if self._feature_shapes:
             self._try_features(index)
             self._note()
@@ -141,7 +141,7 @@ class ShapeImpulses:
         if len(self._feature_shapes) < 2:
             return
         solver = self._solver
-        s, run = solver._state, solver._opened
+        s, run = solver.state, solver.opened
         grips, places = run.grips, self._note()
         kept = [(array, wp.clone(array)) for array in (s.feature_shapes, s.feature_due, s.feature_list)]
         s.shape_list.zero_()
@@ -151,7 +151,7 @@ class ShapeImpulses:
             s.feature_due.zero_()
             solver.step_parts(index, SHAPES)
             inputs = [*places[0], *places[1], own * self._count, self._lengths]
-            self._launches.launch(NOTE_LENGTHS[bool(solver._doubles.count)], self._count, inputs)
+            self._launches.launch(NOTE_LENGTHS[bool(solver.doubles.count)], self._count, inputs)
             for array, place in zip(*places, strict=True):
                 wp.copy(array, place)
         run.grips = grips
@@ -161,14 +161,14 @@ class ShapeImpulses:
     def add_bounds(self, layout: Layout, particles: Particles) -> None:
         """Add what shapes gave particles while rows were solved that press on them."""
         if self._shapes and particles.count:
-            inputs = [layout, particles, self._solver._opened.dt, self._ranks, self._count, self._total]
+            inputs = [layout, particles, self._solver.opened.dt, self._ranks, self._count, self._total]
             self._launches.launch(add_bounds, (self._solver.world_count, particles.count), inputs)
 
     def _places_now(self) -> tuple[list[wp.array], list[wp.array]]:
         """The particles' places, those that count, and room for what they were."""
-        number = wp.float64 if self._solver._doubles.count else wp.float32
+        number = wp.float64 if self._solver.doubles.count else wp.float32
         if number not in self._places:
-            arrays = [plain(array, number) for array in self._solver._doubles.arrays]
+            arrays = [plain(array, number) for array in self._solver.doubles.arrays]
             self._places[number] = arrays, [wp.empty_like(array) for array in arrays]
         return self._places[number]
 
@@ -182,8 +182,8 @@ class ShapeImpulses:
     def _add(self, rank: int, sharing: int = 1, own: int = 0) -> None:
         """Add what one shape, or its share of some, has moved since places were noted."""
         now, before = self._places_now()
-        inputs = [*now, *before, self._w, self._solver._opened.dt, sharing, own, self._lengths, rank, self._total]
-        self._launches.launch(ADD_MOVES[bool(self._solver._doubles.count)], self._count, inputs)
+        inputs = [*now, *before, self._w, self._solver.opened.dt, sharing, own, self._lengths, rank, self._total]
+        self._launches.launch(ADD_MOVES[bool(self._solver.doubles.count)], self._count, inputs)
 
     # -- what it gave
 

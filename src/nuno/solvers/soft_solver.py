@@ -113,7 +113,7 @@ class SoftSolver(ParticleSolver):
         plan: str = "auto",
     ) -> None:
         self._prepare(positions, device, gravity, frame_rate, lanes=plan != "grid")
-        self.topology, self._cell_size = topology, topology.cell_size
+        self.topology, self.cell_size = topology, topology.cell_size
         self._launches = RecordedLaunches(self.device, 1)
         values = material.resolved(self.world_count, topology.element_count)
         self._speed = wave_speed(values)
@@ -148,7 +148,7 @@ class SoftSolver(ParticleSolver):
 
         A world whose vertices are all on a line or at a point is shaken a little, always alike.
         """
-        super().set_state(loosened(np.asarray(positions, dtype=np.float64), self._cell_size), velocities)
+        super().set_state(loosened(np.asarray(positions, dtype=np.float64), self.cell_size), velocities)
 
     def set_colliders(self, colliders: Colliders | None) -> None:
         """The static shapes that the body meets; None for none."""
@@ -160,12 +160,12 @@ class SoftSolver(ParticleSolver):
         topology, worlds = self.topology, self.world_count
         state = SoftLanes() if self.lanes > 1 else SoftFloat()
         size = SoftSizes()
-        self._state, self._size = state, size
-        self._doubles = DoublePositions(self, SoftDoubleLanes if self.lanes > 1 else SoftDouble)
+        self.state, self._size = state, size
+        self.doubles = DoublePositions(self, SoftDoubleLanes if self.lanes > 1 else SoftDouble)
         mu, bulk = moduli(values)
         size.modulus = mu.shape[1]
         state.mu, state.bulk = (self._put(np.broadcast_to(m, (worlds, size.modulus))) for m in (mu, bulk))
-        self._topology = self._upload(shared=size.modulus == 1)
+        self.device_topology = self._upload(shared=size.modulus == 1)
         self._surface, self._far_surface = Sides(), FarSides()
         for surface in (self._surface, self._far_surface):
             put_sides(surface, topology, self.device, STRETCHED)
@@ -174,9 +174,9 @@ class SoftSolver(ParticleSolver):
         self.mass = np.repeat(topology.masses(values["density"]), worlds // len(values["density"]), axis=0)
         self._inverse_mass = (1.0 / self.mass).astype(np.float32)
         own = values["friction"] if friction is None else np.asarray(friction, float).reshape(-1, 1)
-        self._scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
+        self.scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
         for column, value in enumerate((values["air_drag"], own, values["damping"], np.zeros((1, 1)))):
-            self._scalars[:, column] = value[:, 0]
+            self.scalars[:, column] = value[:, 0]
         self._damped = bool(np.any(values["damping"] > 0))
         self._reply = viscous_reply(topology, 2.0 * mu * values["damping"], self._inverse_mass)
         self._allocate_particles()
@@ -207,7 +207,7 @@ class SoftSolver(ParticleSolver):
 
     def _pack_clusters(self) -> SimdClusters:
         """The clusters by groups of sixteen; a group that would be short repeats its last cluster."""
-        narrow, simd = self._topology, SimdClusters()
+        narrow, simd = self.device_topology, SimdClusters()
         rows, starts = [], [0]
         for first, last in pairwise(self.topology.clusters.offsets.tolist()):
             count = -(-(last - first) // LANES)
@@ -238,7 +238,7 @@ class SoftSolver(ParticleSolver):
         return simd
 
     def _advance(self, run: Settings, substeps: int) -> None:
-        doubles = self._doubles.bring(run)
+        doubles = self.doubles.bring(run)
         if self.plan == "grid":
             if self._grid is None:
                 self._grid = self._grid_plan()
@@ -248,30 +248,30 @@ class SoftSolver(ParticleSolver):
 
     def _launch_worlds(self, run: Settings, substeps: int, doubles: Any) -> None:
         """As all plans but "grid" do it: worlds by themselves, or sixteen at once on the CPU."""
-        states = [self._state] if doubles is None else [doubles, self._state]
+        states = [self.state] if doubles is None else [doubles, self.state]
         if self._cuda:
             name, threads = self._block_kernel(doubles is not None)
-            after = [self._size, run, self._shapes, substeps, threads]
+            after = [self._size, run, self.shapes, substeps, threads]
             launches = [(FAR, self._far_surface)] if substeps > 1 or not self._has_features else []
             launches += [(FEATURES, self._surface)] if self._has_features else []
             for kernels, surface in launches:
+                inputs = [*states, self.device_topology, surface, *after]
                 wp.launch(
-                    kernels[name], dim=self.group_count * threads, inputs=[*states, self._topology, surface, *after],
-                    device=self.device, block_dim=threads,
-                )  # fmt: skip
+                    kernels[name], dim=self.group_count * threads, inputs=inputs, device=self.device, block_dim=threads
+                )
         elif self.plan == "vector":
             if self._simd is None:
                 self._simd = self._pack_clusters()
-            inputs = [*states, self._topology, self._simd, self._surface, self._size, run, self._shapes, substeps]
+            inputs = [*states, self.device_topology, self._simd, self._surface, self._size, run, self.shapes, substeps]
             kernel = run_soft_simd if doubles is None else run_soft_double_simd
             self._launches.launch(kernel, 1, inputs)
         else:
             lanes, worlds = (run_soft_lanes, run_soft_double_lanes), (run_soft_worlds, run_soft_double_worlds)
             kernel = (lanes if self.lanes > 1 else worlds)[doubles is not None]
-            before = [*states, self._topology, self._surface, self._size]
+            before = [*states, self.device_topology, self._surface, self._size]
 
             def launch(group: int, piece: Settings, count: int) -> None:
-                inputs = [*before, piece, self._shapes, group, count]
+                inputs = [*before, piece, self.shapes, group, count]
                 wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
 
             run_groups(launch, kernel.module, self.group_count, run, substeps)
@@ -290,10 +290,10 @@ class SoftSolver(ParticleSolver):
     def _grid_plan(self) -> GridPlan:
         block_groups, blocks = self._block_groups()
         shared = wp.zeros(SHARED_FIGURES * self.world_count, dtype=float, device=self.device)
-        before, after = (self._topology, self._surface, self._size), (self._shapes, shared)
+        before, after = (self.device_topology, self._surface, self._size), (self.shapes, shared)
         kernels = run_soft_grid, run_soft_double_grid
         return GridPlan(
-            kernels, self._state, before, lambda _: after, self.device, self.world_count, block_groups, blocks, THREADS,
+            kernels, self.state, before, lambda _: after, self.device, self.world_count, block_groups, blocks, THREADS,
             self._launch_worlds,
         )  # fmt: skip
 

@@ -23,22 +23,22 @@ def load_particles(solver: ParticleSolver, worlds: np.ndarray, state: Mapping[st
         worlds: (k,) int, the worlds.
         state: What `ParticleSolver.save_state` gave, (k, ...) each.
     """
-    s, local = solver._state, np.asarray(state["local"])
-    if local.dtype == np.float64 and not solver._doubles.count:
-        solver._doubles.put(solver.local_positions())  # the other worlds' floats as they are
+    s, local = solver.state, np.asarray(state["local"])
+    if local.dtype == np.float64 and not solver.doubles.count:
+        solver.doubles.put(solver.local_positions())  # the other worlds' floats as they are
     for k, axis in enumerate("xyz"):
         for name in (axis, f"p{axis}"):
             put_rows(solver, getattr(s, name), worlds, local[..., k].astype(np.float32))
-            if solver._doubles.count:
-                put_rows(solver, solver._doubles.array(name), worlds, local[..., k].astype(np.float64))
+            if solver.doubles.count:
+                put_rows(solver, solver.doubles.array(name), worlds, local[..., k].astype(np.float64))
         put_rows(solver, getattr(s, f"v{axis}"), worlds, np.asarray(state["velocities"])[..., k])
     notes = np.pad(np.asarray(state["notes"]), ((0, 0), (0, NOTES - FASTEST)))
     put_rows(solver, s.notes, worlds, notes)
-    origin = np.asarray(state["origin"], dtype=solver._scalars.dtype)
-    if not np.array_equal(solver._scalars[worlds, ORIGIN : ORIGIN + 3], origin):
-        solver._scalars[worlds, ORIGIN : ORIGIN + 3] = origin
-        wp.copy(s.scalars, solver._put(solver._scalars))
-        if solver._grip_count:
+    origin = np.asarray(state["origin"], dtype=solver.scalars.dtype)
+    if not np.array_equal(solver.scalars[worlds, ORIGIN : ORIGIN + 3], origin):
+        solver.scalars[worlds, ORIGIN : ORIGIN + 3] = origin
+        wp.copy(s.scalars, solver._put(solver.scalars))
+        if solver.grip_count:
             set_grips(solver, solver._grips, worlds)
     if hasattr(solver, "guarded"):
         solver.guarded[worlds] = state.get("guarded", np.int32(0))
@@ -51,12 +51,12 @@ def load_particles(solver: ParticleSolver, worlds: np.ndarray, state: Mapping[st
 
 def set_grips(solver: ParticleSolver, grips: Any, worlds: np.ndarray) -> None:
     """Set what is held; in all worlds but some, what the grips bore in the last frame stays known."""
-    count = LOADS * max(1, solver._grip_count)
-    loads, before = solver._get(solver._state.grip_load, count).copy(), solver._grip_count
+    count = LOADS * max(1, solver.grip_count)
+    loads, before = solver.download(solver.state.grip_load, count).copy(), solver.grip_count
     solver.set_grips(grips)
-    if solver._grip_count == before:
+    if solver.grip_count == before:
         loads[worlds] = 0.0
-        wp.copy(solver._state.grip_load, solver._put(loads))
+        wp.copy(solver.state.grip_load, solver._put(loads))
 
 
 def put_rows(solver: ParticleSolver, array: wp.array, worlds: np.ndarray, values: np.ndarray) -> None:

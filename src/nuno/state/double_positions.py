@@ -43,7 +43,7 @@ class DoublePositions:
     @property
     def arrays(self) -> list[wp.array]:
         """x, y and z, those that count."""
-        state = self._state if self.count else self._solver._state
+        state = self._state if self.count else self._solver.state
         return [state.x, state.y, state.z]
 
     def array(self, name: str) -> wp.array:
@@ -55,7 +55,7 @@ class DoublePositions:
         if self._solver.frame_rate * run.frame < self._rate:
             self.count = False
             return None
-        state, floats = self._made(), self._solver._state
+        state, floats = self._made(), self._solver.state
         for name in state._cls.vars:
             if name not in PLACES and getattr(state, name) is not getattr(floats, name):
                 setattr(state, name, getattr(floats, name))

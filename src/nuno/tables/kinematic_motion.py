@@ -109,7 +109,7 @@ class GroupPath(Path):
     @property
     def _path_batch(self) -> PathBatch:
         path_batch = self.kinematic_group.path_batch
-        assert path_batch is not None, "nothing follows the path before the first convoy"
+        assert path_batch is not None, "nothing follows the path before the first path batch"
         return path_batch
 
 

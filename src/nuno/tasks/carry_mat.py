@@ -25,7 +25,7 @@ from nuno.tasks.arm_tracks import ArmTracks
 from nuno.tasks.carry_plan import key_times, make_plan, motion_along, plan_motions, track_arms
 from nuno.tasks.carry_result import CarryResult, CarryTrial
 from nuno.tasks.carry_trials import CarryTrials, check_trunk, make_room, mat_size
-from nuno.validation import checked, finite_array, number
+from nuno.validation import LONGEST_WAIT, checked, finite_array, number
 from nuno.world.device import checked_device, found_device
 
 if TYPE_CHECKING:
@@ -155,7 +155,10 @@ def plan_arms(
         raise InvalidInputError(f"arms must be one of {SHAPES}, got {arms!r}")
     carrier = _robot(robot)
     distances, goal = finite_array("arm_distances", arm_distances, ("n",)), finite_array("walk", walk, (3,))
-    rest, span = number("settle", settle, above=0.1), number("seconds", seconds, above=0.1)
+    rest, span = (
+        number("settle", settle, above=0.1, high=LONGEST_WAIT),
+        number("seconds", seconds, above=0.1, high=LONGEST_WAIT),
+    )
     place = _hands_at(carrier, hands_at)
     if walks is not None and len(walks) != len(distances):
         raise InvalidInputError(f"walks must be {len(distances)}, one for each arm distance, got {len(walks)}")

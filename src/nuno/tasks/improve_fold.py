@@ -13,7 +13,7 @@ from nuno.estimate.imagined_fold import batched
 from nuno.materials import Cloth
 from nuno.search.minimise import Minimum, minimise
 from nuno.tasks.fold_motion import SETTLE, FoldMotion, world_without_robots
-from nuno.validation import count, number
+from nuno.validation import LONGEST_WAIT, count, number
 from nuno.world.world import World
 
 FARTHEST = 0.25
@@ -135,7 +135,7 @@ def improve_fold(
     world = world_without_robots(cloth)
     far = FARTHEST * float(motion.frame.size.max())
     names = [f"{side}{hand}" for hand in range(motion.hand_count) for side in "uv"]
-    trial = FoldTrials(motion, world, cloth.name, number("settle", settle, low=0.0), device)
+    trial = FoldTrials(motion, world, cloth.name, number("settle", settle, low=0.0, high=LONGEST_WAIT), device)
     before = motion.imagine(cloth, settle=settle)
     wrong = motion.corner_offsets(before).ravel()
     guesses = np.clip(-SHARES[:, None] * wrong, -far, far)

@@ -15,7 +15,7 @@ from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.materials import Cloth
 from nuno.tasks.cloth_frame import CORNERS, ClothFrame
 from nuno.tasks.fold_motion import FoldMotion, bent
-from nuno.validation import checked, finite_array, number
+from nuno.validation import LONGEST_WAIT, checked, finite_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -91,7 +91,7 @@ class TaughtFold:
         if not paths or not all(isinstance(hand, HandPath) for hand in paths):
             raise InvalidInputError(f"hands must be one or more HandPath, got {hands!r}")
         begin = min(float(hand.times[0]) for hand in paths)
-        end = max(float(hand.times[-1]) for hand in paths) + number("settle", settle, low=0.0)
+        end = max(float(hand.times[-1]) for hand in paths) + number("settle", settle, low=0.0, high=LONGEST_WAIT)
         fold = imagine_fold(world, cloth, paths, [material], begin=begin, end=end, reach=reach)
         return cls.of(fold, paths, frame)
 

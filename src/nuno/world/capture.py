@@ -43,7 +43,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
 
     Solvers are made before anything changes, so that a failure leaves the world as it was.
     """
-    bodies = {record.key: _known_body(record, snapshot, world) for record in snapshot.bodies}
+    bodies = {record.key: _recorded_body(record, snapshot, world) for record in snapshot.bodies}
     before = (world.gravity, world.frame_rate, world.substeps, world.world_count)
     same_settings = before[:3] == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
     world.gravity, world.frame_rate, world.substeps = snapshot.gravity, snapshot.frame_rate, snapshot.substeps
@@ -63,7 +63,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     world._time, world._clock_shift = snapshot.time, snapshot.clock_shift
     world._stepping.last = []  # what contacts and ties gave in the last frame was in another past
     for record in snapshot.bodies:
-        _fill(bodies[record.key], record)
+        _set_up(bodies[record.key], record)
         world._register(bodies[record.key])
     for record in snapshot.bodies:
         body = bodies[record.key]
@@ -114,8 +114,8 @@ def _grip_record(grip: Grip) -> GripRecord:
     return GripRecord(grip.key, grip.body.key, grip.spec, target, grip.offsets, grip.followed)
 
 
-def _known_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
-    known = world._known_bodies.get(record.key)
+def _recorded_body(record: BodyRecord, snapshot: Snapshot, world: Simulation) -> Body:
+    known = world._bodies_by_key.get(record.key)
     if known is not None and known._world in (None, world):
         return known
     if snapshot.from_file:
@@ -153,7 +153,7 @@ def _dynamics_for(
             return current
     as_recorded = Body(record.shape)
     as_recorded.key = body.key
-    _fill(as_recorded, record)
+    _set_up(as_recorded, record)
     return make_dynamics(as_recorded, own.material, own.state, own.friction, world)
 
 
@@ -174,7 +174,7 @@ def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:
     world._bodies.clear()
 
 
-def _fill(body: Body, record: BodyRecord) -> None:
+def _set_up(body: Body, record: BodyRecord) -> None:
     # A frame that is no body is not part of a snapshot: a body that follows one goes on following it.
     pose = (record.position, record.quaternion)
     outside = body._parent is not None and record.parent is None and record.dynamics is None
@@ -198,7 +198,7 @@ def _fill(body: Body, record: BodyRecord) -> None:
 
 
 def _restore_grip(record: GripRecord, bodies: dict[str, Body], world: Simulation) -> None:
-    grip = world._known_grips.get(record.key)
+    grip = world._grips_by_key.get(record.key)
     target = None if record.target is None else bodies[record.target]
     spec = _with_own_keys(record.spec, bodies)
     if grip is None:

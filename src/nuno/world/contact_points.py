@@ -106,7 +106,7 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
 
     world._bring_colliders()
     static = [other for other in world._bodies.values() if other._dynamics is None]
-    touched, _ = world._rules.colliders_of(body, static)
+    touching, _ = world._rules.colliders_of(body, static)
     found: list[tuple[Any, ...]] = []
     dynamics.prepare(world.time, 1.0 / world.frame_rate)
     points = dynamics.vertices(body)
@@ -115,8 +115,8 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
         if body in coupled.particles:
             known, contacts = coupled.shape_contacts(body)
             pressed |= known
-            found += [(points[k, i], n, force, touched[shape].name, k) for k, i, shape, n, force in contacts]
+            found += [(points[k, i], n, force, touching[shape].name, k) for k, i, shape, n, force in contacts]
     for shape, normals, forces in shape_forces(dynamics.solver, world.time):
         for k, i in zip(*np.nonzero((np.linalg.norm(normals, axis=-1) > 0.0) & ~pressed), strict=True):
-            found.append((points[k, i], normals[k, i], forces[k, i], touched[shape].name, k))
+            found.append((points[k, i], normals[k, i], forces[k, i], touching[shape].name, k))
     return found

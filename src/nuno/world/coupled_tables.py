@@ -242,8 +242,8 @@ def _limits(grip: Grip, worlds: int) -> np.ndarray:
 
 def _surface_rules(body: Body, solver: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance (worlds,) [m] that others keep from a body's triangles, and its contact compliance [m/N]."""
-    half = 0.5 * np.asarray(solver._scalars[:, THICKNESS])
+    half = 0.5 * np.asarray(solver.scalars[:, THICKNESS])
     if body.is_solid:  # which gives by itself
         return np.maximum(half, SKIN), np.zeros_like(half)
     # as half the thickness of a cell's area does
-    return half, half / (PRESSED * solver._cell_size**2)
+    return half, half / (PRESSED * solver.cell_size**2)

@@ -92,7 +92,7 @@ class Impacts:
                 # nor more than the fastest goes: what is not fast alone is not here, beside a world that is
                 apart = np.minimum(apart, np.linalg.norm(velocities, axis=-1).max(axis=1))
                 asked = np.nan_to_num(apart * frame / (WAY * _thickness(solver)), posinf=0.0)
-                self.substeps[k] = [_at_least(int(own[k]), float(least)) for least in asked]
+                self.substeps[k] = [_doubled(int(own[k]), float(least)) for least in asked]
         if self._guarded and all(own.all() for own in self._guarded.values()):
             # all would go again: they begin with what they would come to
             self._thorough[:] = True
@@ -161,7 +161,7 @@ def collides_with_itself(dynamics: Any) -> bool:
 def _thickness(solver: Any) -> np.ndarray:
     from nuno.state.cloth_state import THICKNESS
 
-    return np.maximum(solver._scalars[:, THICKNESS], 1e-6)
+    return np.maximum(solver.scalars[:, THICKNESS], 1e-6)
 
 
 def _fast_worlds(dynamics: Any) -> np.ndarray:
@@ -173,7 +173,7 @@ def _fast_worlds(dynamics: Any) -> np.ndarray:
     return np.asarray(fast | (deepest(solver) > DEEP * _thickness(solver)))
 
 
-def _at_least(own: int, asked: float) -> int:
+def _doubled(own: int, asked: float) -> int:
     """Return the body's own substeps, doubled as often as it takes, so that few different numbers come up."""
     count = own
     while count < min(asked, MOST):
@@ -219,10 +219,10 @@ def take_apart(body: Body, worlds: np.ndarray) -> None:
     if not len(worlds):
         return
     positions, faces, moved = solver.positions(), np.asarray(body.faces), {}
-    free = solver._inverse_mass_now(solver._state.w) > 0.0
+    free = solver.inverse_mass_now(solver.state.w) > 0.0
     for world in worlds.tolist():
         if np.isfinite(positions[world]).all():
-            moved[world], left = untangle(positions[world], faces, free[world], STEP * solver._cell_size)
+            moved[world], left = untangle(positions[world], faces, free[world], STEP * solver.cell_size)
             solver.guarded[world] = GUARDED + (WAIT if left else 0)
             solver.tangled[world] = solver.tangled[world] + 1 if left else 0
             if solver.tangled[world] >= TRIES:

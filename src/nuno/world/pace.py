@@ -29,7 +29,7 @@ class Pace:
         self._waiting = 0
         self._due = 0.0  # [s] of the real clock, when the next frame of a slowed run is due
         self._exempt: set[int] = set()  # threads whose frames are held up by nothing
-        self._told = False
+        self._warned = False
 
     @property
     def is_paused(self) -> bool:
@@ -44,7 +44,7 @@ class Pace:
     def pause(self) -> None:
         """Hold up all frames from now on."""
         with self._changed:
-            self._paused, self._permits, self._told = True, 0, False
+            self._paused, self._permits, self._warned = True, 0, False
 
     def resume(self) -> None:
         """Let frames go on."""
@@ -108,8 +108,8 @@ class Pace:
         """Wait for the next frame of a run; return whether it is to stop after that one."""
         while True:
             if self._paused and not self._permits:
-                if not self._told:
-                    self._told = True
+                if not self._warned:
+                    self._warned = True
                     logger.warning("the world is paused; its run goes on when the viewer's page or resume() lets it")
                 self._changed.wait()
                 continue

@@ -143,9 +143,9 @@ def _matched(world: Simulation, snapshot: Snapshot, at: WorldRows) -> dict[Body,
     records = {record.key: record for record in snapshot.bodies}
     if set(records) != set(world._bodies):
         extra = [body.name for key, body in world._bodies.items() if key not in records]
-        gone = [record.name for key, record in records.items() if key not in world._bodies]
+        lacking = [record.name for key, record in records.items() if key not in world._bodies]
         raise BodyStateError(
-            f"reset needs the bodies of the batch: the snapshot lacks {extra}, the batch lacks {gone}; save after "
+            f"reset needs the bodies of the batch: the snapshot lacks {extra}, the batch lacks {lacking}; save after "
             "bodies have come and gone, or restore the batch as a whole"
         )
     found = {}

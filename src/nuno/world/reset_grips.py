@@ -108,17 +108,17 @@ def set_merged_grips(
     """Let grips be what `merged_grips` gave."""
     from nuno.solvers.some_worlds import set_grips
 
-    led: dict[Any, list[Grip]] = {}
+    moved_grips: dict[Any, list[Grip]] = {}
     for grip, spec, offsets, followed in changed:
         if not grip.is_tie and (spec is not grip.spec or offsets is not grip.offsets):
-            led.setdefault(grip.body._dynamics, []).append(grip)
+            moved_grips.setdefault(grip.body._dynamics, []).append(grip)
         grip.spec, grip.offsets, grip.followed = spec, offsets, followed
     for record, spec in back:
-        grip = world._known_grips.get(record.key) or Grip(world._bodies[record.body], spec)
+        grip = world._grips_by_key.get(record.key) or Grip(world._bodies[record.body], spec)
         grip.key, grip.body = record.key, world._bodies[record.body]
         grip.target = None if record.target is None else world._bodies[record.target]
         grip.spec, grip.offsets, grip.followed = spec, record.offsets, record.followed
         world._hold(grip)
-    for dynamics in led:
+    for dynamics in moved_grips:
         if not dynamics.grips_changed:
             set_grips(dynamics.solver, [grip.spec for grip in dynamics.grips if not grip.is_tie], worlds)

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.validation import finite_array, flag, function, number
+from nuno.mesh.memory_limit import check_host_memory
+from nuno.validation import finite_array, flag, function, instant, number
 from nuno.world.advancing import Advancing
 from nuno.world.background import Background
 from nuno.world.progress import with_bar
@@ -58,6 +59,7 @@ class Running(Advancing):
                 is then; ``time`` and the bodies that follow paths go on some frames at a time only.
 
         Raises:
+            InvalidInputError: ``seconds`` is no time, or would set the clock beyond 1e9 s (32 years).
             BodyStateError: ``each_frame`` is given for a world that runs in the background, or this or another call
                 that changes the world comes from there.
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
@@ -69,10 +71,11 @@ class Running(Advancing):
             function("each_frame", each_frame)
         with self._change("run"):
             begin = self._time
+            finish = instant("seconds", begin + span)
         if self.is_running:
             if each_frame is not None:
                 raise BodyStateError("a world that runs in the background tells no frames; stop it first")
-            self._wait_until(begin + span)
+            self._wait_until(finish)
             return
         frames = span * self.frame_rate
         # the poses of what follows a path are laid out for so many frames
@@ -80,8 +83,8 @@ class Running(Advancing):
         chunk = min(most, math.gcd(*(watcher.frames for watcher in self._watchers)) or most)
         chunk = 1 if self.drivers else chunk  # they are asked frame by frame
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
-        ends = [begin + k * chunk / self.frame_rate for k in range(1, pieces)] + [begin + span]
-        for end in with_bar(ends, "simulating", progress):
+        for piece in with_bar(range(1, pieces + 1), "simulating", progress):
+            end = finish if piece == pieces else begin + piece * chunk / self.frame_rate
             while end - self._time > SOON:  # less is no time: the same instant
                 # a piece goes no further where the clock was set back meanwhile
                 last = min(end, self._time + 2.0 * chunk / self.frame_rate)
@@ -106,7 +109,8 @@ class Running(Advancing):
 
         Raises:
             BodyStateError: the body is static, or the world runs in the background.
-            InvalidInputError: times that do not increase, or that are over.
+            InvalidInputError: times that do not increase, that are over, or that the clock does not reach.
+            NotEnoughMemoryError: the vertices at all instants have no room.
             SimulationDiverged: a state stopped being finite; the world keeps the last good one.
         """
         with self._change("trace"):
@@ -120,6 +124,9 @@ class Running(Advancing):
                 raise InvalidInputError(
                     f"times must be one or more, increasing, from {self._time:g} s on, which is now; got {times!r}"
                 )
+            instant("times", float(instants[-1]))
+            needed = 3 * len(instants) * own.vertices.nbytes // 2  # float32, in pieces and as a whole
+            check_host_memory(f"a trace of {len(instants)} instants", needed, "trace fewer at a time")
             found = run_traced(self, own, instants)
         return found[:, 0] if self.world_count == 1 else found
 

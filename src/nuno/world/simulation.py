@@ -67,8 +67,8 @@ class Simulation:
         self._bodies: dict[str, Body] = {}
         # arrays of states that callers have views of
         self._views: weakref.WeakKeyDictionary[Dynamics, dict[str, Any]] = weakref.WeakKeyDictionary()
-        self._known_bodies: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
-        self._known_grips: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
+        self._bodies_by_key: weakref.WeakValueDictionary[str, Body] = weakref.WeakValueDictionary()
+        self._grips_by_key: weakref.WeakValueDictionary[str, Grip] = weakref.WeakValueDictionary()
         self._rules = ContactRules()
         self._colliders: dict[Any, Any] = {}
         self._collider_version = 0
@@ -185,7 +185,7 @@ class Simulation:
 
     def _register(self, body: Body) -> None:
         body._world = self
-        self._bodies[body.key] = self._known_bodies[body.key] = body
+        self._bodies[body.key] = self._bodies_by_key[body.key] = body
 
     def _detach(self, body: Body) -> None:
         assert body._dynamics is not None
@@ -200,7 +200,7 @@ class Simulation:
     def _hold(self, grip: Grip) -> None:
         assert grip.body._dynamics is not None
         grip._world = self
-        self._known_grips[grip.key] = grip
+        self._grips_by_key[grip.key] = grip
         grip.body._dynamics.grips.append(grip)
         grip.body._dynamics.grips_changed = True
         if grip.ignored:
@@ -250,13 +250,13 @@ class Simulation:
                 continue
             if static is None:
                 static = [b for b in self._bodies.values() if b._dynamics is None]
-            touched, friction = self._rules.colliders_of(body, static)
+            touching, friction = self._rules.colliders_of(body, static)
             key = (
-                *(b.key for b in touched),
+                *(b.key for b in touching),
                 *((name, np.asarray(mu).tobytes()) for name, mu in friction.items()),
             )
             if key not in self._colliders:
-                self._colliders[key] = make_colliders(touched, friction, self)
+                self._colliders[key] = make_colliders(touching, friction, self)
             dynamics.solver.set_colliders(self._colliders[key])
             dynamics.collider_version = self._collider_version
 

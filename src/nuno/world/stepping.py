@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.dynamics import SOON, touches_itself
+from nuno.solvers.resolution import warn_of_overloads
 from nuno.world.frame_runs import FrameRuns
 from nuno.world.impacts import Impacts, collides_with_itself, look_at, look_due, next_look
 from nuno.world.islands import Islands, find_islands
@@ -56,7 +57,7 @@ class Stepping:
             self._couplings.clear()
             self._version = world._collider_version
         self.last = []
-        apart = not self._may_meet(moving, rigid) and not (rigid and world._kinematic_bodies())
+        apart = not self._may_touch(moving, rigid) and not (rigid and world._kinematic_bodies())
         if apart:
             self._prepare(moving, time)
         looking = not world._quiet and any(collides_with_itself(body._dynamics) for body in moving)
@@ -66,8 +67,7 @@ class Stepping:
             if apart and not self.careful:
                 now = next_look(now, stop, world.frame_rate) if looking else stop
                 self._run_apart(moving, before, now - before)
-                if looking and look_due(before, now, world.frame_rate):
-                    look_at(moving)
+                self._look(moving, before, now, looking)
                 continue
             # the same instants whether a span is gone through at once or in pieces, and the same steps by itself or not
             duration = frame if stop - now > frame - SOON else stop - now
@@ -76,8 +76,15 @@ class Stepping:
                 self._prepare(moving, now)
             self._run_frame(moving, now, duration)
             now = stop if stop - now - duration < SOON else now + duration
-            if looking and look_due(before, now, world.frame_rate):
-                look_at(moving)
+            self._look(moving, before, now, looking)
+
+    def _look(self, moving: list[Body], before: float, now: float, crossings: bool) -> None:
+        """Look at cloths every few frames: whether some pass through themselves, or bear more than they can."""
+        if self._world._quiet or not look_due(before, now, self._world.frame_rate):
+            return
+        if crossings:
+            look_at(moving)
+        warn_of_overloads(moving, now)
 
     def _run_apart(self, moving: list[Body], time: float, duration: float, substeps: int | None = None) -> None:
         slots = []
@@ -97,7 +104,7 @@ class Stepping:
         for body in moving:
             body._dynamics.prepare(time, 1.0 / self._world.frame_rate)  # type: ignore[union-attr]
 
-    def _may_meet(self, moving: list[Body], rigid: list[Body]) -> bool:
+    def _may_touch(self, moving: list[Body], rigid: list[Body]) -> bool:
         """Return True if two bodies of different solvers could touch, a soft one itself, or any are tied."""
         if any(grip.is_tie for body in moving for grip in body._dynamics.grips):  # type: ignore[union-attr]
             return True
@@ -187,8 +194,8 @@ class Stepping:
         nothing = np.zeros((worlds, 3)), np.zeros((worlds, 3))
         if grip.is_tie:
             for coupled in self.last:
-                told = coupled.wrench(grip)
-                for sums, own in zip(nothing, told or (), strict=False):
+                borne = coupled.wrench(grip)
+                for sums, own in zip(nothing, borne or (), strict=False):
                     sums[coupled.kept[grip.body]] = own[coupled.kept[grip.body]]
             return nothing
         dynamics: Any = grip.body._dynamics

@@ -95,16 +95,16 @@ class World(Setting):
     def remove(self, body: Body | str) -> Body:
         """Take a body out of the world, detached in the shape that it has now, and return it."""
         with self._change("remove"):
-            gone = self._own(body)
-            if gone._dynamics is not None:
-                self._detach(gone)
+            removed = self._own(body)
+            if removed._dynamics is not None:
+                self._detach(removed)
             for other in self._attached():
-                for grip in [g for g in other.grips if g.target is gone]:
+                for grip in [g for g in other.grips if g.target is removed]:
                     self._drop_grip(grip)
-            del self._bodies[gone.key]
-            gone._world = gone._path = None
+            del self._bodies[removed.key]
+            removed._world = removed._path = None
             self._colliders_changed()
-        return gone
+        return removed
 
     def find(self, name: str) -> Body:
         """Return the body of that name.

@@ -227,17 +227,17 @@ def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
 
     near, far = run(0.6), run(8.0)
     np.testing.assert_array_equal(near.vertices, far.vertices)
-    assert near._dynamics.solver._state.feature_shapes.numpy()[0] == 0
-    assert run(0.36)._dynamics.solver._state.feature_shapes.numpy()[0] == 1
+    assert near._dynamics.solver.state.feature_shapes.numpy()[0] == 0
+    assert run(0.36)._dynamics.solver.state.feature_shapes.numpy()[0] == 1
 
 
 def awake_at_sharp_shapes(body):
     """Return the elements (k,) that a cloth's last substep looked at, edges before triangles, and how many it lists."""
     solver = body._dynamics.solver
     starts = solver._surface.feature_colour.numpy()
-    counts, wake = solver._state.feature_shapes.numpy()[1:], solver._state.feature_due.numpy()
+    counts, wake = solver.state.feature_shapes.numpy()[1:], solver.state.feature_due.numpy()
     places = np.concatenate([np.arange(a, a + k) for a, k in zip(starts[:-1], counts, strict=False)])
-    listed = solver._state.feature_list.numpy()[places]
+    listed = solver.state.feature_list.numpy()[places]
     return np.maximum(listed, -1 - listed)[wake[2 + places] <= wake[0]], len(places)
 
 

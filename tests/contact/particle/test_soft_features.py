@@ -225,7 +225,7 @@ def test_all_plans_meet_edges_alike(substeps):
         solver = SoftSolver(topology, soft(), start, 0 * start, substeps=substeps, plan=plan)
         solver.set_colliders(Colliders.from_bodies(shapes))
         solver.run(0.0, 0.3)
-        assert solver._state.feature_shapes.numpy()[0] > 0
+        assert solver.state.feature_shapes.numpy()[0] > 0
         ends.append(solver.positions())
     np.testing.assert_array_equal(ends[1], ends[0])
 
@@ -247,9 +247,9 @@ def test_the_kernels_of_cuda_take_turns():
     solver._reset_clock()
     gone = []
     for kernels, surface in ((FAR, solver._far_surface), (FEATURES, solver._surface)):
-        inputs = [solver._state, solver._topology, surface, solver._size, run, solver._shapes, 24 * substeps, 1]
+        inputs = [solver.state, solver.device_topology, surface, solver._size, run, solver.shapes, 24 * substeps, 1]
         wp.launch(kernels["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
-        gone.append(int(solver._state.reached.numpy()[0]))
+        gone.append(int(solver.state.reached.numpy()[0]))
     assert 0 < gone[0] < gone[1] == 24 * substeps
     assert gone[0] % substeps == 0
     np.testing.assert_array_equal(solver.positions(), other.positions())
@@ -257,8 +257,8 @@ def test_the_kernels_of_cuda_take_turns():
     for made in (solver, other):
         made.open(0.4, 1.0 / 60.0 / substeps, substeps)
     other.step_parts(0, ALL_PARTS)
-    run = solver._opened
-    inputs = [solver._state, solver._topology, solver._surface, solver._size, run, solver._shapes, 1, 1]
+    run = solver.opened
+    inputs = [solver.state, solver.device_topology, solver._surface, solver._size, run, solver.shapes, 1, 1]
     wp.launch(FEATURES["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
     np.testing.assert_array_equal(solver.positions(), other.positions())
 
@@ -274,8 +274,8 @@ def test_a_soft_body_far_from_the_rim_of_its_table_asks_for_nothing():
 
     near, far = run(0.5), run(8.0)
     np.testing.assert_array_equal(near.vertices, far.vertices)
-    assert near._dynamics.solver._state.feature_shapes.numpy()[0] == 0
-    assert run(0.14)._dynamics.solver._state.feature_shapes.numpy()[0] == 1
+    assert near._dynamics.solver.state.feature_shapes.numpy()[0] == 0
+    assert run(0.14)._dynamics.solver.state.feature_shapes.numpy()[0] == 1
 
 
 def test_small_shapes_alone_are_sharp():

@@ -57,7 +57,7 @@ def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) ->
     count = made.pair_counts[-1]
     assert count[0] <= size.vertex_triangle and count[1] <= size.edge_edge
     rows = made.candidate_pairs(len(positions) - 1)
-    return rows, float(made._scalars[-1, THICKNESS]) + margin
+    return rows, float(made.scalars[-1, THICKNESS]) + margin
 
 
 @pytest.mark.parametrize("thickness", [0.002, 0.004, 0.01])

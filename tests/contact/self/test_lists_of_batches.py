@@ -36,7 +36,7 @@ def test_a_block_lists_all_that_is_near(kind, scale):
         cloth = ClothTopology.mesh(cloth.rest[:, :2], cloth.faces)
     positions = cloth.rest + np.random.default_rng(3).normal(scale=scale, size=cloth.rest.shape)
     vertex_triangle, edge_edge, made = listed(cloth, positions, "cuda:0")
-    far = made._scalars[0, 3] + made.settings(0.0, 1e-3, 20).margin
+    far = made.scalars[0, 3] + made.settings(0.0, 1e-3, 20).margin
     n, m = len(positions), len(cloth.faces)
     i, f = np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
     found = trimesh.triangles.closest_point(positions[cloth.faces[f]], positions[i])

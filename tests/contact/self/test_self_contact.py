@@ -88,14 +88,14 @@ def test_a_substep_solves_all_pairs_in_reach(worlds: int) -> None:
     to the edges.
     """
     solver = lifted(PICKS[5 : 5 + worlds], 0.9)
-    state, faces = solver._state, solver.topology.faces
-    far = 1.1 * float(solver._scalars[0, THICKNESS])
-    count = solver._get(state.active_count, 2)
-    start = np.stack([solver._get(a, solver.particle_count) for a in (state.px, state.py, state.pz)], axis=-1)
+    state, faces = solver.state, solver.topology.faces
+    far = 1.1 * float(solver.scalars[0, THICKNESS])
+    count = solver.download(state.active_count, 2)
+    start = np.stack([solver.download(a, solver.particle_count) for a in (state.px, state.py, state.pz)], axis=-1)
     found = np.zeros(2, dtype=int)
     for k in range(worlds):
         x = start[k].astype(float)
-        rows = solver._get(state.active_triangle, 4 * solver._size.vertex_triangle)[k].reshape(-1, 4)[: count[k, 0]]
+        rows = solver.download(state.active_triangle, 4 * solver._size.vertex_triangle)[k].reshape(-1, 4)[: count[k, 0]]
         have = {(r[0], *sorted(r[1:])) for r in rows.tolist()}
         a, b, c = (x[faces[:, j]] for j in range(3))
         normal = np.cross(b - a, c - a)
@@ -104,7 +104,7 @@ def test_a_substep_solves_all_pairs_in_reach(worlds: int) -> None:
         near = np.argwhere(over & (vertex_triangle_distances(x, faces) < far))
         want = {(i, *sorted(faces[f].tolist())) for i, f in near.tolist() if i not in faces[f]}
         assert want <= have
-        rows = solver._get(state.active_edge, 4 * solver._size.edge_edge)[k].reshape(-1, 4)[: count[k, 1]]
+        rows = solver.download(state.active_edge, 4 * solver._size.edge_edge)[k].reshape(-1, 4)[: count[k, 1]]
         have = {tuple(sorted((tuple(sorted(r[:2])), tuple(sorted(r[2:]))))) for r in rows.tolist()}
         edges = near_edges(x, solver.topology.edges.vertices, far)
         assert edges <= have
@@ -116,10 +116,12 @@ def test_a_substep_solves_all_pairs_in_reach(worlds: int) -> None:
 def test_lists_hold_all_near_pairs(worlds: int) -> None:
     """Brute force over all pairs finds none within the thickness and the margin that is not listed."""
     solver = lifted(PICKS[5 : 5 + worlds], 0.7)
-    state, n, faces = solver._state, solver.particle_count, solver.topology.faces
+    state, n, faces = solver.state, solver.particle_count, solver.topology.faces
     edges = solver.topology.edges.vertices
-    far = float(solver._scalars[0, THICKNESS]) + solver.settings(0.0, 1e-3, 20).margin
-    listed = solver._get(state.reference, solver._size.reference)[:, : 3 * n].reshape(worlds, 3, n).transpose(0, 2, 1)
+    far = float(solver.scalars[0, THICKNESS]) + solver.settings(0.0, 1e-3, 20).margin
+    listed = (
+        solver.download(state.reference, solver._size.reference)[:, : 3 * n].reshape(worlds, 3, n).transpose(0, 2, 1)
+    )
     found = 0
     for k in range(worlds):
         x = listed[k].astype(float)

@@ -94,8 +94,8 @@ def find_crossed(
 
 def crossed_worlds(solver: Any) -> np.ndarray:
     """Return (worlds,) bool, where a cloth passes through itself, but for the rounding of floats."""
-    worlds, n, device, topology = solver.world_count, solver.particle_count, solver.device, solver._topology
-    point = pack_positions(solver._state, worlds, n, solver.lanes, device)
+    worlds, n, device, topology = solver.world_count, solver.particle_count, solver.device, solver.device_topology
+    point = pack_positions(solver.state, worlds, n, solver.lanes, device)
     face, start = topology.leaf_face, topology.leaf_face_start
     leaves = start.shape[0] - 1
     lower = wp.empty((worlds, face.shape[0] + leaves), dtype=wp.vec3, device=device)
