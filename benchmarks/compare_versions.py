@@ -1,0 +1,151 @@
+"""CPU seconds of five scenes, this version and another by turns, so that other work on the machine changes neither.
+
+    python benchmarks/compare_versions.py OTHER [--scenes picks hang ...] [--rounds 3] [--device cpu] [--json FILE]
+
+OTHER is the src folder of another checkout (git worktree add ../other COMMIT). Each run is a process of its own, which
+warms up for two frames. On CUDA the seconds are by the clock, as the processor waits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+HERE = Path(__file__).resolve().parents[1] / "src"
+
+
+def picks(device: str, worlds: int = 36) -> tuple[Any, float]:
+    """36 picks of a 30 x 30-cell cloth at 20 substeps, 3 s."""
+    import nuno
+
+    world = nuno.World(device=device, substeps=20)
+    world.add(nuno.box((1.2, 0.8, 0.04), name="table", position=(0, 0, 0.68)))
+    world.add(nuno.plane(name="floor"))
+    world.add(nuno.sheet((0.6, 0.6), cells=(30, 30), name="cloth", position=(0, 0, 0.702)))
+    futures = world.imagine(worlds)
+    cloth = futures.find("cloth")
+    futures.attach(cloth, nuno.Cloth(area_density=0.2, bending_rigidity=5e-5, air_drag=1.5, thickness=0.004))
+    line = np.linspace(0, 30, 6).round().astype(int)
+    vertices = np.array([j * 31 + i for j in line for i in line])[np.arange(worlds) % 36]
+    start = np.asarray(cloth.vertices)[0][vertices]
+    keys = np.stack([start, start + np.array([0, 0, 0.4])], axis=1)
+    futures.grip(cloth, vertices[:, None], to=nuno.Path((0.1, 1.6), keys, None, "minimum_jerk"))
+    return futures, 3.0
+
+
+def hang(device: str) -> tuple[Any, float]:
+    """A cloth of 32 x 32 cells by two corners, with self-contact, 3 s."""
+    import nuno
+
+    world = nuno.World(device=device)
+    cloth = world.add(nuno.sheet((1.0, 1.0), cells=(32, 32), position=(0, 0, 2.0)))
+    rail = world.add(nuno.box((0.02, 0.02, 0.02), position=(0, 0, 2.6)))
+    world.attach(cloth, nuno.Cloth(area_density=0.2))
+    world.grip(cloth, [0, 32], to=rail)
+    return world, 3.0
+
+
+def softcube(device: str) -> tuple[Any, float]:
+    """A soft cube of 10 x 10 x 10 cells that falls on a floor, 2 s."""
+    import nuno
+
+    world = nuno.World(device=device)
+    world.add(nuno.plane())
+    cube = world.add(nuno.soft_box((0.1, 0.1, 0.1), cells=(10, 10, 10), position=(0, 0, 0.15)))
+    world.attach(cube, nuno.Soft(youngs_modulus=5e4, density=1000.0))
+    return world, 2.0
+
+
+def boxes(device: str) -> tuple[Any, float]:
+    """A hundred rigid boxes that fall in stacks, 2 s."""
+    import nuno
+
+    world = nuno.World(device=device)
+    world.add(nuno.plane())
+    for k in range(100):
+        place = (0.13 * (k % 5), 0.13 * (k // 5 % 5), 0.1 + 0.12 * (k // 25))
+        world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=place)), nuno.Rigid(mass=1.0))
+    return world, 2.0
+
+
+def box_on_towel(device: str) -> tuple[Any, float]:
+    """A box of 1 kg on a towel on a table, 2 s."""
+    import nuno
+
+    world = nuno.World(device=device)
+    world.add(nuno.box((1.2, 0.8, 0.04), position=(0, 0, 0.68)))
+    towel = world.add(nuno.sheet((0.4, 0.4), cells=(20, 20), position=(0, 0, 0.702)))
+    world.attach(towel, nuno.Cloth(area_density=0.2))
+    world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=(0, 0, 0.756))), nuno.Rigid(mass=1.0))
+    return world, 2.0
+
+
+SCENES: dict[str, Callable[[str], tuple[Any, float]]] = {
+    made.__name__: made for made in (picks, hang, softcube, boxes, box_on_towel)
+}
+
+
+def run_one(scene: str, device: str) -> None:
+    """Print the seconds of one scene, with the version that is imported."""
+    import warp as wp
+
+    world, seconds = SCENES[scene](device)
+    for _ in range(2):
+        world.run(1.0 / 60.0, progress=False)
+    wp.synchronize()
+    clock = time.process_time if device == "cpu" else time.perf_counter
+    start = clock()
+    world.run(seconds, progress=False)
+    wp.synchronize()
+    print("seconds", clock() - start)
+
+
+def main() -> None:
+    """Run every scene with both versions by turns, and print medians and their ratio."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("other", type=Path)
+    parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        run_one(options.scenes[0], options.device)
+        return
+    if not (options.other / "nuno").is_dir():
+        sys.exit(f"no package nuno in {options.other}: give the src folder of another checkout")
+    spent: dict[str, tuple[list[float], list[float]]] = {scene: ([], []) for scene in options.scenes}
+    for scene, times in tqdm([(scene, spent[scene]) for _ in range(options.rounds) for scene in options.scenes]):
+        for source, own in zip((options.other, HERE), times, strict=True):
+            command = [sys.executable, __file__, str(options.other), "--one", "--scenes", scene]
+            environment = os.environ | {"PYTHONPATH": str(source.resolve())}
+            done = subprocess.run(
+                [*command, "--device", options.device], env=environment, capture_output=True, text=True
+            )  # fmt: skip
+            if done.returncode:
+                sys.exit(f"{scene} with {source} failed:\n{done.stderr}")
+            own.append(float(done.stdout.split("seconds")[-1]))
+    print(f"{'scene':14}{'before [s]':>12}{'now [s]':>12}{'ratio':>8}")
+    rows = []
+    for scene, (before, now) in spent.items():
+        rows.append({"scene": scene, "before_s": before, "now_s": now})
+        a, b = statistics.median(before), statistics.median(now)
+        print(f"{scene:14}{a:12.3f}{b:12.3f}{b / a:8.3f}")
+    if options.json:
+        options.json.write_text(json.dumps({"device": options.device, "rows": rows}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
