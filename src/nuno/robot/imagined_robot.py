@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
@@ -58,6 +60,12 @@ class ImaginedRobot:
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)
+        whole = self._is_whole() and self.balance is None
+        self._guards: list[MotionGuard] = []
+        for k, own in enumerate(self._motions if whole else []):
+            above = self._guards[0] if self._guards else original._guard
+            self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
+            own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
 
     def __repr__(self) -> str:
@@ -122,6 +130,9 @@ class ImaginedRobot:
             return
         span, self._before = end - start, list(self._states)
         servo = None if self.balance is not None or self._servo is None else self._serve
+        if span > 0.0:
+            for guard, own in zip(self._guards, self._motions, strict=False):
+                guard.before_frame(own, span)
         aims = [own.begin(end, span, servo) for own in self._motions]
         if span <= 0.0:
             return
@@ -146,6 +157,10 @@ class ImaginedRobot:
             for own in self._motions:
                 own.joints.take_step()
                 own.gait.end_frame()
+            self._states = [
+                state if guard.met is None else replace(state, collision=guard.met)
+                for guard, state in zip(self._guards, self._states, strict=True)
+            ]
             return
         q, v = self.balance.dynamics.read()
         torques = self.balance.dynamics.efforts_now()
@@ -172,6 +187,8 @@ class ImaginedRobot:
         self._states = list(states)
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
+        for guard in self._guards:
+            guard.forget()
         if self.balance is not None:
             self.balance.dynamics.joints = joints
 

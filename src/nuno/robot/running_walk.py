@@ -101,6 +101,11 @@ class RunningWalk(TimedMotion):
         """The footsteps and their times."""
         return self._schedule
 
+    @property
+    def known_until(self) -> float:
+        """The time of the last tick that is worked out [s]."""
+        return float(self.times[max(self._done - 1, 0)])
+
     def ensure(self, tick: int) -> None:
         """Work out all up to a tick, counted from the beginning of this walk, and the one after it.
 
