@@ -14,8 +14,8 @@ correlation of F over all that succeed in both. `--arms boxes` takes boxes aroun
 device may be on a machine without Pinocchio. `--warm` runs once more, now that all kernels are loaded.
 `--stiffness` instead clamps strips of the soft mat, 0.15 m free, and reads the bending rigidity off their sag: tip drop
 over reach H / W of a strip under its own weight against the elastica's (theta'' = -G (1 - s) cos theta, G = w L^3 / B).
-`--body weight` carries with a whole robot that has dynamics, one trial after the other, and `--body kinematic` with the
-same links going where they are sent; trials are appended to the `--json` file as they finish, and it goes on from there.
+`--body weight` carries with a whole robot that has dynamics, one trial after the other; `--body kinematic` with the
+same links going where they are sent. Trials are appended to the `--json` file, and it goes on from there.
 `--compare FILE FILE` says how alike two such files, or one and that of a batch, are.
 """
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.robot.collision import Collision, Unbalance
-from nuno.robot.sensors import Sensors, sole_corners
+from nuno.robot.sensors import Sensors
 from nuno.robot.support import convex_outline, distance_inside
 
 if TYPE_CHECKING:
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-EVERY = 6
+EVERY = 30
 """Frames from one look to the next."""
 ENOUGH = 3
 """Looks at a robot at rest, of two frames each, after which it is not looked at again until something moves."""
 TIPPING = 5e-3
 """[m] By which the zero moment point must be outside the soles to count."""
+LEVEL = 1e-3
+"""[m] By which the lowest sole may be above or below what is taken as the ground."""
 LIFTED = 5e-3
 """[m] Above the lowest corner of all soles, from where on a sole does not bear."""
 
@@ -43,11 +45,12 @@ class Burden:
         self._sensors = Sensors(links.robot, links)
         limits = links.robot.effort_limits
         self._limits = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
-        self._soles = {foot: sole_corners(own) for foot, own in links.robot.description.frames.items()
-                       if foot in links.robot.description.feet}  # fmt: skip
+        frames = links.robot.description.frames
+        sizes = [size for foot in links.robot.description.feet if (size := frames[foot].size) is not None]
+        self._inner = 0.4 * min((float(np.min(size)) for size in sizes), default=0.0)
         self._frames = 0
         self._still = 0  # looks since anything changed
-        self._last: tuple[frozenset[str], float] = (frozenset(), -np.inf)
+        self._last: tuple[frozenset[int], float] = (frozenset(), -np.inf)
         self._over: tuple[str, ...] = ()
         self._unbalanced: Unbalance | None = None
         self._told: set[str] = set()
@@ -55,7 +58,7 @@ class Burden:
     def after_frame(self, state: RobotState, met: Collision | None) -> RobotState:
         """Return a state with what was found of it after a frame, and what its motion would run into."""
         self._frames += 1
-        if self._frames % EVERY in (0, EVERY - 1):
+        if self._frames >= EVERY - 1:
             self._look(state)
         if met is None and not self._over and self._unbalanced is None:
             return state
@@ -65,31 +68,37 @@ class Burden:
         """Begin anew: the robot was put elsewhere."""
         self._last, self._over, self._unbalanced, self._still = (frozenset(), -np.inf), (), None, 0
 
+    def save(self) -> tuple[Any, ...]:
+        """Return what it has found, for ``load``."""
+        return self._frames, self._still, self._last, self._over, self._unbalanced
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Go on from what was found then."""
+        self._frames, self._still, self._last, self._over, self._unbalanced = saved
+
     def _look(self, state: RobotState) -> None:
         loaded = any(body.is_dynamic for body in self._links.world._bodies.values())
         moves = bool(state.v.any() or state.a.any())
         self._still = 0 if moves or loaded else self._still + 1
+        prepares = self._frames < EVERY
+        self._frames %= EVERY
         if self._still > 2 * ENOUGH:
             return
-        if self._frames % EVERY:
+        if prepares:
             self._sensors.follow_loads()  # a look takes what has changed since the frame before
             return
-        corners = self._corners()
-        if corners is not None:
-            self._sensors.ground = float(corners[:, 2].min())
         told = self._sensors.read(state)
-        over = frozenset(
-            name for name, torque, most in zip(self._robot.joint_names, np.abs(told.torques), self._limits, strict=True)
-            if torque > most
-        )  # fmt: skip
-        outside = -np.inf
-        if corners is not None:
-            bearing = corners[corners[:, 2] < corners[:, 2].min() + LIFTED, :2]
-            if len(bearing) > 2 and np.isfinite(told.zero_moment_point).all():
-                outside = -distance_inside(convex_outline(bearing), told.zero_moment_point)
+        soles = self._sensors.soles
+        if soles is not None and abs(float(soles[:, :, 2].min()) - self._sensors.ground) > LEVEL:
+            self._sensors.ground = float(soles[:, :, 2].min())
+            told = self._sensors.read(state)
+        over = frozenset(np.flatnonzero(np.abs(told.torques) > self._limits).tolist())
+        outside = -np.inf if soles is None else self._outside(soles, told.zero_moment_point)
         last, self._last = self._last, (over, outside)
-        self._over = tuple(name for name in self._robot.joint_names if name in over & last[0])
-        self._tell_torques(told.torques)
+        both = over & last[0]
+        self._over = tuple(self._robot.joint_names[k] for k in sorted(both)) if both else ()
+        if both:
+            self._tell_torques(told.torques)
         if min(outside, last[1]) <= TIPPING:
             self._unbalanced = None
         elif self._unbalanced is None:
@@ -114,8 +123,19 @@ class Burden:
             self._robot.name, ", ".join(new), self._robot.joint_names[most], abs(torques[most]), self._limits[most],
         )  # fmt: skip
 
-    def _corners(self) -> np.ndarray | None:
-        """Return all corners of the soles (k, 3) [m], None without feet."""
-        if not self._soles:
-            return None
-        return np.concatenate([self._robot.frame_pose(foot).to_world(own) for foot, own in self._soles.items()])
+    def _outside(self, soles: np.ndarray, point: np.ndarray) -> float:
+        """Return how far outside the hull of soles (feet, 4, 3) a point (2,) is [m]; -inf where it is well inside."""
+        if not np.isfinite(point).all():
+            return -np.inf
+        heights = soles[:, :, 2]
+        bearing = soles[heights.min(axis=1) < heights.min() + LIFTED]
+        # balls in the soles, and all that lies between two of them, are in the hull
+        middles = bearing[:, :, :2].mean(axis=1)
+        a, along = middles[0], middles[-1] - middles[0]
+        share = float(np.clip((point - a) @ along / max(along @ along, 1e-12), 0.0, 1.0))
+        away = point - a - share * along
+        if away @ away < self._inner**2:
+            return -np.inf
+        corners = bearing.reshape(-1, 3)
+        corners = corners[corners[:, 2] < corners[:, 2].min() + LIFTED, :2]
+        return -distance_inside(convex_outline(corners), point) if len(corners) > 2 else -np.inf

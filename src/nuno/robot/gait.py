@@ -311,7 +311,7 @@ class Gait:
             self._waiting = (self._waiting[0].copy(), self._waiting[1])
 
     def give_up(self, why: str, aborted: bool = False) -> None:
-        """Stop at once, wherever the feet are: the robot was put elsewhere, or (``aborted``) something is in the way."""
+        """Stop at once, wherever the feet are: the robot was put elsewhere, or (``aborted``) met something."""
         if aborted and self.goal is not None:
             self.goal.finish(GoalStatus.ABORTED, text=why)
         self._drop(why)

@@ -45,7 +45,7 @@ class ImaginedRobot:
     ) -> None:  # fmt: skip
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names
-        state, motion, self._servo = original.saved() if of is None else of[0].saved_of(of[1])
+        state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
         if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
@@ -65,6 +65,7 @@ class ImaginedRobot:
         for k, own in enumerate(self._motions if whole else []):
             above = self._guards[0] if self._guards else original._guard
             self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
+            self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
 
@@ -116,11 +117,12 @@ class ImaginedRobot:
             robot = self.original.actual
             return np.array([robot.angles_of(state.q) for state in self._states])
 
-    def saved_of(self, world: int) -> tuple[RobotState, Any, Any]:
-        """Return state, wanted motion and servo command of one world, as ``SimulatedRobot.saved`` does."""
+    def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any]:
+        """Return of one world what ``SimulatedRobot.saved`` does of the robot."""
         if not 0 <= world < len(self._motions):
             raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
-        return self._states[world], self._motions[world].save(), self._servo
+        found = self._guards[world].save() if self._guards else None
+        return self._states[world], self._motions[world].save(), self._servo, found
 
     # What the world asks of it
 
@@ -179,16 +181,17 @@ class ImaginedRobot:
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         joints = () if self.balance is None else self.balance.dynamics.joints
-        return list(self._states), [own.save() for own in self._motions], joints, self._servo
+        found = [guard.save() for guard in self._guards]
+        return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo = saved
+        states, motions, joints, self._servo, found = saved
         self._states = list(states)
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
-        for guard in self._guards:
-            guard.forget()
+        for guard, own in zip(self._guards, found, strict=True):
+            guard.load(own)
         if self.balance is not None:
             self.balance.dynamics.joints = joints
 

@@ -88,23 +88,27 @@ class _Pair:
                 best, point = float(found), np.array(self._result.getNearestPoint1())
         return best, point
 
-    def entry(self, until: float) -> tuple[float, np.ndarray] | None:
-        """Return when [s] the link is first too deep in the obstacle, before a time [s], and where (3,); else None."""
-        times, way = self.sweep.times, self.way
-        end = float(np.interp(until, times, way))
-        at, allowed = 0.0, DEEP
-        first = True
+    def allowed(self) -> float:
+        """Return how deep [m] the link may go: deeper where it is in the obstacle when the motion begins."""
+        return max(DEEP, DEEPER - self.distance(0, 0.0)[0])
+
+    def entry(self, allowed: float, first: int, last: int) -> tuple[int, np.ndarray] | None:
+        """Return after which time the link is first deeper than allowed in the obstacle, and where (3,); else None.
+
+        Args:
+            allowed: [m].
+            first: The number of the time to begin at.
+            last: Of the time to end at.
+        """
+        at, end = float(self.way[first]), float(self.way[last])
+        k = first
         while True:
-            k = min(int(np.searchsorted(way, at, side="right")) - 1, len(times) - 1)
-            last = k == len(times) - 1
-            step = 0.0 if last else float(way[k + 1] - way[k])
-            share = 0.0 if last or step <= 0.0 else (at - float(way[k])) / step
+            k = min(k + int(np.searchsorted(self.way[k + 1 : last + 1], at, side="right")), last)
+            step = 0.0 if k == last else float(self.way[k + 1] - self.way[k])
+            share = (at - float(self.way[k])) / step if step > 0.0 else 0.0
             found, point = self.distance(k, share)
-            if first:
-                allowed, first = max(DEEP, DEEPER - found), False
             if found < -allowed:
-                time = float(times[k]) if last else float(times[k] + share * (times[k + 1] - times[k]))
-                return (time, point) if time < until else None
+                return (k if share > 0.0 else max(k - 1, first)), point
             if at >= end:
                 return None
             at = min(at + max(found + allowed, LEAST), end)
@@ -112,22 +116,35 @@ class _Pair:
 
 def first_entry(
     sweep: Sweep, shapes: StaticShapes, world: int = 0
-) -> tuple[float, int, Obstacle, np.ndarray] | None:  # fmt: skip
-    """Return when [s] a link first goes too deep into an obstacle along a sweep, which, into which, and where (3,).
+) -> tuple[int, int, Obstacle, np.ndarray] | None:  # fmt: skip
+    """Return after which time a link first goes too deep into an obstacle, which, into which, and where (3,) [m].
+
+    Between that time and the next it goes too deep. A sweep that begins later, at the same times, finds the same.
 
     Args:
         sweep: The sweep.
         shapes: What stands in the world.
         world: Which of a batch.
     """
-    best: tuple[float, int, Obstacle, np.ndarray] | None = None
-    until = np.inf
+    best: tuple[int, int, Obstacle, np.ndarray] | None = None
+    last = len(sweep.times) - 1
     for obstacle in shapes.obstacles:
         poses = obstacle.poses(sweep.times, world)
         for link in _near(sweep, obstacle, *poses).tolist():
-            found = _Pair(sweep, link, obstacle, poses).entry(until)
-            if found is not None:
-                until, best = found[0], (found[0], link, obstacle, found[1])
+            pair = _Pair(sweep, link, obstacle, poses)
+            allowed = pair.allowed()
+            found = pair.entry(allowed, 0, last)
+            if found is None:
+                continue
+            # steps fall elsewhere where a sweep begins elsewhere: each span of time by itself decides
+            k, point = found
+            for own in range(max(k - 1, 0), min(k + 2, last)):
+                if (alone := pair.entry(allowed, own, own + 1)) is not None:
+                    k, point = own, alone[1]
+                    break
+            best, last = (k, link, obstacle, point), max(k, 1)
+            if k == 0:
+                return best
     return best
 
 

@@ -29,12 +29,12 @@ logger = logging.getLogger(__name__)
 COLLISIONS = ("stop", "warn", "ignore")
 FAR = 20.0
 """[s] That are looked ahead at once; a longer motion is looked at again on the way."""
-TURN = 0.1
-"""[rad; m] By which all joints together and the base may move from one pose of a sweep to the next."""
 AROUND = 2.5
 """[m] From the base, within which the next three steps may take a link."""
 ARM = 1.5
 """[m] By which a link moves at most for each radian of a joint, and more than a metre for each of the base."""
+SAME = object()
+"""Stands for the commands and shapes of now."""
 SOON = 1e-9
 """[s] Rounding of sums of frames."""
 
@@ -73,6 +73,7 @@ class MotionGuard:
         self._placements: Any = None
         self._told: set[tuple[str, str]] = set() if of is None else of._told
         self._key: Any = None
+        self._rests_since = -1  # the commands when nothing was left to do of them
         self._own: Any = None  # the commands after what was done here
         self._until = -np.inf  # the joints' clock up to which the way is known to be free
         self._acts = np.inf  # the clock at which joints are to stop
@@ -92,7 +93,22 @@ class MotionGuard:
 
     def forget(self) -> None:
         """Look anew before the next frame: the robot was put elsewhere."""
-        self._key, self._spare, self.met = None, 0.0, None
+        self._key = self._spare_key = self._own = self.met = None
+        self._spare, self._acts, self._until, self._rests_since = 0.0, np.inf, -np.inf, -1
+
+    def save(self) -> tuple[Any, ...]:
+        """Return what it has found, for ``load``."""
+        return self._acts, self._until, self.met, self._spare
+
+    def load(self, saved: tuple[Any, ...] | None) -> None:
+        """Go on from what was found when robot and world were as they are now; None begins anew.
+
+        So the robot stops in the same frame, whenever it was looked at.
+        """
+        self.forget()
+        if saved is not None:
+            self._acts, self._until, self.met, self._spare = saved
+            self._key = SAME
 
     def before_frame(self, motion: WantedMotion, span: float) -> None:
         """Look ahead where anything has changed, and stop what is about to run into something.
@@ -102,9 +118,14 @@ class MotionGuard:
             span: [s] of the frame that comes.
         """
         joints, gait = motion.joints, motion.gait
-        if self.mode == "ignore" or (not gait.is_walking and joints.is_resting):
+        if joints.commands == self._rests_since or self.mode == "ignore":
+            return
+        if gait.walk is None and joints.is_resting:
+            self._rests_since = joints.commands
             return
         key = (joints.commands, gait.walk, self._shapes().key())
+        if self._key is SAME:
+            self._key = key
         if key != self._key or joints.clock + span > self._until + SOON:
             self._look(motion, span)
             self._key = (joints.commands, gait.walk, key[2])
@@ -121,6 +142,8 @@ class MotionGuard:
         if self.mode == "ignore":
             return None
         key, after = self._shapes().key(), motion.aim.q
+        if self._spare_key is None:  # as it was loaded
+            self._spare_key = key
         self._spare -= ARM * float(np.abs(after - before).sum())
         if self._spare > 0.0 and key == self._spare_key:
             return None
@@ -213,7 +236,7 @@ class MotionGuard:
                 self.met = None
             return
         self.met = met
-        hit = clock + met.time - self._world.time
+        hit = clock + met.time - self._world.time  # that of a frame, after which it is too late
         if self.mode == "stop" and gait.walk is not None and gait.turn_back(hit, str(met), self._meets(motion, span)):
             self._tell(met, "the walk ends before that")
             self._until = -np.inf  # the way is another one
@@ -222,7 +245,7 @@ class MotionGuard:
         does = "the motion stops before that" if self.mode == "stop" else "and goes through it"
         self._tell(met, does)
         if self.mode == "stop":
-            self._acts = clock + span * np.floor((hit - clock) / span + SOON)
+            self._acts = hit
 
     def _angles(
         self, motion: WantedMotion, times: np.ndarray, walked: np.ndarray | None
@@ -243,11 +266,9 @@ class MotionGuard:
         """Return what the links run into; ``on_feet``: the base goes where its foot leaves it."""
         if not self._shapes().obstacles:
             return None
-        chosen = _chosen(angles, base)
-        angles, base = angles[chosen], base[chosen]
         if on_feet and (stood := motion.stance.ahead(angles)) is not None:
             base = stood
-        clock = self._world.time + times[chosen] - motion.joints.clock
+        clock = self._world.time + times - motion.joints.clock
         return self._first(self._sweep(motion, clock, angles, base))
 
     def _sweep(self, motion: WantedMotion, clock: np.ndarray, angles: np.ndarray, base: np.ndarray) -> Sweep:
@@ -266,8 +287,8 @@ class MotionGuard:
         found = first_entry(sweep, shapes, self._index)
         if found is None:
             return None
-        time, link, obstacle, point = found
-        return Collision(hulls.names[link], obstacle.body.name, time, point, int(hulls.joints[link]))
+        k, link, obstacle, point = found
+        return Collision(hulls.names[link], obstacle.body.name, float(sweep.times[k]), point, int(hulls.joints[link]))
 
     def _stop(self, motion: WantedMotion) -> None:
         """Let what takes the link there stop at once."""
@@ -291,12 +312,3 @@ class MotionGuard:
             '%r: %s; %s. Send it elsewhere, move the body, or let it pass with collisions="ignore" or '
             "world.ignore_contact(link, body)", self._robot.name, met, does,
         )  # fmt: skip
-
-
-def _chosen(angles: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Return which rows of angles (k, n) and poses of the base (k, 7) to look at, the first and the last with them."""
-    steps = np.abs(np.diff(angles, axis=0)).sum(axis=1) + np.abs(np.diff(base, axis=0)).sum(axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    share = np.floor(way / TURN)
-    kept = np.flatnonzero(np.diff(share) > 0.0)  # the last before each next share
-    return np.unique(np.concatenate([[0], kept, kept + 1, [len(angles) - 1]]))

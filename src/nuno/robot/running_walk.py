@@ -103,8 +103,8 @@ class RunningWalk(TimedMotion):
 
     @property
     def known_until(self) -> float:
-        """The time of the last tick that is worked out [s]."""
-        return float(self.times[max(self._done - 1, 0)])
+        """The time [s] up to which all is worked out, and the tick after it."""
+        return float(self.times[-1] if self._done == len(self.times) else self.times[max(self._done - 2, 0)])
 
     def ensure(self, tick: int) -> None:
         """Work out all up to a tick, counted from the beginning of this walk, and the one after it.

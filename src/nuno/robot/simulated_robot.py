@@ -351,11 +351,11 @@ class SimulatedRobot(SimulatedBody):
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
         joints = () if self.balance is None else self.balance.dynamics.joints
-        return self._state, self._motion.save(), joints, grippers, self._servo
+        return self._state, self._motion.save(), joints, grippers, self._servo, self._guard.save(), self._burden.save()
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, motion, joints, grippers, self._servo = saved
+        self._state, motion, joints, grippers, self._servo, guard, burden = saved
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.joints = joints
@@ -364,11 +364,12 @@ class SimulatedRobot(SimulatedBody):
         for name, gripper in self.grippers.items():
             gripper.load(grippers[name])
         self._readings = None
-        self._look_anew()
+        self._guard.load(guard)
+        self._burden.load(burden)
 
-    def saved(self) -> tuple[RobotState, Any, Any]:
-        """Return its state, what is wanted of it, and its servo command, for its copies in imagined worlds."""
-        return self._state, self._motion.save(), self._servo
+    def saved(self) -> tuple[RobotState, Any, Any, Any]:
+        """Return its state, what is wanted of it, its servo command, and what was found of its way, for its copies."""
+        return self._state, self._motion.save(), self._servo, self._guard.save()
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot:
         """Return the driver of this robot's copies in a batch that was imagined from its world."""
@@ -381,9 +382,9 @@ class SimulatedRobot(SimulatedBody):
         for other in futures.drivers:
             if getattr(other, "original", None) is self:
                 joints = () if self.balance is None else self.balance.dynamics.joints
-                state, motion, servo = other.saved_of(k)  # type: ignore[attr-defined]
+                state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-                self.load((state, motion, joints, grippers, servo))
+                self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))
                 self._motion.disown()
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:

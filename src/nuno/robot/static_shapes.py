@@ -68,6 +68,8 @@ class StaticShapes:
         self._made: dict[Body, tuple[Any, tuple[SolidPart, ...], np.ndarray, np.ndarray]] = {}
         self.obstacles: tuple[Obstacle, ...] = ()
         self._led: tuple[Obstacle, ...] = ()
+        self._number = 0
+        self._seen: list[tuple[Any, ...]] = [()]
 
     def key(self) -> tuple[Any, ...]:
         """Return what is another thing as soon as anything static is elsewhere, or bound elsewhere."""
@@ -75,10 +77,11 @@ class StaticShapes:
         if version != self._version:
             self._version = version
             self._renew()
-        return (version, *(own.body._path for own in self._led))
+        return (self._number, *(own.body._path for own in self._led))
 
     def _renew(self) -> None:
         found, made = [], {}
+        seen: list[tuple[Any, ...]] = []
         for body in self._world._bodies.values():
             is_other = body in self._own or getattr(body, "_links", None) is not None
             if is_other or body._dynamics is not None or body.shape.is_cloth or not body.group:
@@ -92,6 +95,14 @@ class StaticShapes:
                 low, high = corners.min(axis=0), corners.max(axis=0)
                 before = (body.shape, solid_parts(body.shape), 0.5 * (low + high), 0.5 * (high - low))
             made[body] = before
+            # a body that is moved has other arrays from then on, never other numbers in the same
+            where = () if body._path is not None else (body._position, body._quaternion)
+            seen.append((body, *before[1:], *where, touched.tobytes()))
             found.append(Obstacle(body, *before[1:], touched))
         self._made, self.obstacles = made, tuple(found)
         self._led = tuple(own for own in found if own.body._path is not None)
+        same = len(seen) == len(self._seen) and all(
+            len(a) == len(b) and all(x is y or (isinstance(x, bytes) and x == y) for x, y in zip(a, b, strict=True))
+            for a, b in zip(seen, self._seen, strict=True)
+        )
+        self._number, self._seen = self._number + (not same), seen

@@ -71,7 +71,7 @@ class TimedMotion(ABC):
         at = np.clip((times - float(self.times[0])) / self.dt, 0.0, len(self.times) - 1.0)
         tick = np.minimum(np.floor(at + 1e-9).astype(int), max(len(self.times) - 2, 0))
         share = np.clip(at - tick, 0.0, 1.0)[:, None]
-        self.ensure(min(int(tick.max()) + 1, len(self.times) - 1))
+        self.ensure(int(tick.max()))
         after = self.configurations[np.minimum(tick + 1, len(self.times) - 1)]
         found = (1.0 - share) * self.configurations[tick] + share * after
         found[:, 3:7] /= np.linalg.norm(found[:, 3:7], axis=1, keepdims=True)

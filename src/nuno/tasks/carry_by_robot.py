@@ -44,14 +44,14 @@ class CarryByRobot:
 
 
 def carry_by_robot(
-    robot: Humanoid, plan: CarryPlan, walk: int, offset: np.ndarray, *, dynamics: bool, goal: tuple[float, ...],
-    watch: Callable[[SimulatedRobot, Body, float], None] | None = None,
+    robot: Humanoid, plan: CarryPlan, walk: int, offset: np.ndarray, *, dynamics: bool,
+    goal: tuple[float, float, float], watch: Callable[[SimulatedRobot, Body, float], None] | None = None,
 ) -> CarryByRobot:  # fmt: skip
     """Let a robot carry a mat, and end the trial where it fails.
 
     The mat lies on the robot's own links, each the hulls of its collision shapes; ``carry`` has one hull a hand, and
-    arms that are led. The trial fails as there, and, with dynamics, also when the robot falls or a motor gives all that
-    it can for ``FULL_FOR``.
+    arms that are led. The trial fails as there, and, with dynamics, also when the robot falls or a motor gives all
+    that it can for ``FULL_FOR``.
 
     Args:
         robot: The robot, which is left as it was.
@@ -71,7 +71,8 @@ def carry_by_robot(
     driver = SimulatedRobot(carrier, world, links=carrier.enter(world, "joints"), dynamics=dynamics)
     for body in (body for arm in _arms(driver) for body in arm):
         if dynamics:
-            world.set_material(body, replace(body.material, friction=plan.friction))
+            assert body.material is not None
+            world.set_material(body, replace(body.material, friction=plan.friction))  # type: ignore[call-arg]
         else:
             body.friction = plan.friction
     mat = _laid(world, plan, walk, offset)
@@ -82,7 +83,7 @@ def carry_by_robot(
     for frame in range(plan.frames):
         if frame == begin:
             world.set_material(mat, plan.material)
-            driver.go_pos(*goal, wait=False)
+            driver.go_pos(goal[0], goal[1], goal[2], wait=False)
         driver.sleep(1.0 / FRAME_RATE)
         measure.look()
         if watch is not None:
