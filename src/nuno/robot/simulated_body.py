@@ -14,9 +14,11 @@ from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
+    from nuno.robot.burden import Burden
     from nuno.robot.gait import Gait
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
+    from nuno.robot.motion_guard import MotionGuard
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
 
@@ -29,6 +31,7 @@ class SimulatedBody(SimulatedSenses):
         joints: Its joints and controllers.
         gait: Its walks.
         balance: Its dynamics; None where its links are one body for each shape.
+        guard: Without dynamics, it keeps the links out of static shapes.
     """
 
     links: Links
@@ -37,11 +40,25 @@ class SimulatedBody(SimulatedSenses):
     balance: Balance | None
     wanted: Humanoid
     _motion: WantedMotion
+    guard: MotionGuard
+    _burden: Burden
 
     @property
     def is_dynamic(self) -> bool:
         """Return True if the links have dynamics."""
         return self.balance is not None and self.balance.dynamics.is_attached
+
+    @property
+    def collisions(self) -> str:
+        """The setting for motions through static shapes, without dynamics: "stop", "warn" or "ignore"."""
+        return self.guard.mode
+
+    @collisions.setter
+    def collisions(self, mode: str) -> None:
+        self.guard.check_mode(mode)
+        with self.world.lock:
+            self.guard.mode = mode
+            self._look_anew()
 
     def attach(self) -> None:
         """Give the links dynamics from where they are, at rest: masses, motors, contact and balance.
@@ -97,6 +114,11 @@ class SimulatedBody(SimulatedSenses):
 
     def _start_from(self, q: np.ndarray) -> None:
         self._motion.start_from(q, self.world.time)
+        self._look_anew()
         self._state = self._motion.aim
         if self.actual is not self.wanted:
             self.actual.move_to(self.wanted.angle_vector(), q[:7])
+
+    def _look_anew(self) -> None:
+        self.guard.forget()
+        self._burden.forget()
