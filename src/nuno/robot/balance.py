@@ -81,8 +81,9 @@ class Balance:
         else:
             acceleration, effort = found
             speed = now.v[6:]
-            gains = (*dynamics.soft, effort)
-            goal = robot.angles_of(now.q) + span * speed, speed + 0.5 * span * acceleration[6:]
+            goes = speed + 0.5 * span * acceleration[6:]
+            gains = (*dynamics.soft, effort + dynamics.overcome(goes))
+            goal = robot.angles_of(now.q) + span * speed, goes
         values = [np.array(part) for part in (*goal, *gains)]
         if servo is not None:
             law: Any = servo.command

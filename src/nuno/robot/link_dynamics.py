@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
-from nuno.joints.joint_drives import Motor
+from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Rigid
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
@@ -31,6 +31,8 @@ SETTLES = 0.03
 """[s] In which a motor that follows a velocity comes to it,"""
 HOLDS = 0.1
 """[s] and to its position."""
+RUBS = 5e-3
+"""[rad/s or m/s] From which on a motor overcomes all of its joint's friction."""
 
 
 class LinkDynamics:
@@ -39,7 +41,9 @@ class LinkDynamics:
     Each joint of the model carries one rigid body, with the mass, centre of mass and inertia of all links that are
     fixed to it. The joints are hinges and sliders with the model's limits; a motor in each exerts
     ``stiffness (wanted - position) + damping (wanted velocity - velocity) + effort`` up to the effort limit, anew in
-    every substep. Links of one robot pass through each other. A robot without feet keeps its base where it is.
+    every substep. Joints rub and are damped as the model says. The effort limit is one of what arrives: a motor gives
+    what friction takes besides. Links of one robot pass through each other. A robot without feet keeps its base where
+    it is.
 
     Args:
         links: One body for each joint (``robot.enter(world, "joints")``).
@@ -50,6 +54,8 @@ class LinkDynamics:
         damping: (n,) likewise [N m s/rad; N s/m].
         soft: Stiffness and damping of motors that exert given efforts and follow velocities softly, (n,) each.
         efforts: (n,) the most that they exert [N m; N], infinite where the model has no limit.
+        joint_friction: (n,) up to which joints stick, and that brakes them as they move [N m; N]; as they are attached.
+        joint_damping: (n,) of what brakes them by their velocity [N m s/rad; N s/m]; likewise.
         joints: The joints while attached, in the order of ``joint_names``.
 
     Raises:
@@ -68,6 +74,8 @@ class LinkDynamics:
         self.stiffness = np.where(np.isfinite(self.efforts), self.efforts / FULL_EFFORT, inertia * 1e4)
         self.damping = 2.0 * np.sqrt(self.stiffness * inertia)
         self.soft = inertia / SETTLES / HOLDS, inertia / SETTLES
+        self.joint_friction = np.array(model.upperDryFrictionLimit[6:])
+        self.joint_damping = np.array(model.damping[6:])
         self._is_free = bool(self.robot.description.feet)
 
     @property
@@ -111,6 +119,7 @@ class LinkDynamics:
                 bodies[j - 1], bodies[int(model.parents[j]) - 1], point=placements[j].translation,
                 axis=placements[j].rotation @ axis, limits=None if turns else (lower[n], upper[n]),
                 position=angles[n] if is_slide else (angles[n] + np.pi) % (2.0 * np.pi) - np.pi, max_force=BEARS,
+                friction=self.joint_friction[n], spring=Spring(0.0, damping=self.joint_damping[n]),
             ))  # fmt: skip
         self.joints = tuple(joints)
         nothing = np.zeros(len(angles))
@@ -134,11 +143,15 @@ class LinkDynamics:
         effort: np.ndarray,
     ) -> None:  # fmt: skip
         """Set all motors: (n,) each, or (worlds, n)."""
+        most = self.efforts + self.joint_friction
         for n, joint in enumerate(self.joints):
             joint.motor = Motor(
-                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], self.efforts[n],
-                effort[..., n],
-            )  # fmt: skip
+                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], most[n], effort[..., n]
+            )
+
+    def overcome(self, velocities: np.ndarray) -> np.ndarray:
+        """Return what friction and damping take of joints that go at velocities [rad/s; m/s], of (n,) each."""
+        return self.joint_friction * np.clip(velocities / RUBS, -1.0, 1.0) + self.joint_damping * velocities
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
