@@ -1,8 +1,6 @@
 """Links with dynamics: closed forms of joints that rub and are damped, of tumbling, of slopes and of statics."""
 
 import numpy as np
-import pinocchio as pin
-import pytest
 
 import nuno
 from nuno.robot.link_dynamics import LinkDynamics

@@ -1,0 +1,213 @@
+"""Robots with dynamics against MuJoCo: ``python benchmarks/robot_against_mujoco.py [step lift walk] [--json FILE]``.
+
+Talos, the same URDF in both, on the CPU; MuJoCo is ``pip install mujoco``.
+
+- step: several joints are sent elsewhere by motors with the same gains, base fixed and afloat. Joint angles over 2 s.
+- lift: it stands on a floor with 2.5 kg in each hand and bends both elbows. The same balance commands both.
+- walk: it walks 0.3 m on a floor. Joint torques of both, the same balance again.
+
+CPU seconds are processor time of this program a simulated second, in turns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from robot_in_mujoco import MujocoRobot
+
+import nuno
+from nuno.robot.link_dynamics import LinkDynamics
+from nuno.robot.robot_state import RobotState
+
+FRAME = 1.0 / 60.0
+WAYS = {
+    "arm_left_2_joint": 0.4, "arm_left_6_joint": 0.3, "arm_right_4_joint": -0.5, "torso_1_joint": 0.3,
+    "head_1_joint": -0.2, "leg_left_4_joint": 0.4, "leg_right_3_joint": -0.3,
+}  # fmt: skip
+"""[rad] How far joints are sent."""
+RATE, RATIO = 20.0, 0.7
+"""[rad/s] Of the motors' oscillation with the joint's own inertia, and its damping ratio."""
+ARMS = ("arm_left_7_link", "arm_right_7_link")
+LOAD = 2.5
+"""[kg] In each hand."""
+BENDS = -0.6
+"""[rad] By which elbows bend."""
+GROUPS = {"hips and knees": "leg_.*_[1234]_", "ankles": "leg_.*_[56]_", "trunk and head": "torso|head", "arms": "arm"}
+
+
+def fixed_or_free(afloat: bool) -> nuno.Humanoid:
+    """Return Talos with its grippers half open; with a base that stays where it is, it has no feet to its knowledge."""
+    talos = nuno.Humanoid("talos")
+    talos.angle_vector({"gripper_left_joint": -0.5, "gripper_right_joint": -0.5})
+    if afloat:
+        return talos
+    own = nuno.Humanoid(talos.description.urdf)
+    own.angle_vector(talos.angle_vector())
+    return own
+
+
+def step_response(
+    afloat: bool, substeps: int, friction: str, *, seconds: float = 2.0, gravity: Any = (0.0, 0.0, 0.0)
+) -> dict[str, Any]:
+    """Return how far joints of both are from each other, over the joints' ranges, and what a simulated second costs."""
+    robot = fixed_or_free(afloat)
+    world = nuno.World(device="cpu", gravity=gravity, substeps=substeps)
+    dynamics = LinkDynamics(robot.enter(world, "joints"))
+    n = len(robot.joint_names)
+    if friction == "none":
+        dynamics.joint_friction, dynamics.joint_damping = np.zeros(n), np.zeros(n)
+    dynamics.efforts = np.full(n, 1e4)  # no limit is met
+    dynamics.attach()
+    start, wanted = robot.angle_vector(), robot.angle_vector()
+    for name, way in WAYS.items():
+        wanted[robot.joint_index(name)] += way
+    inertia = np.array(pin.crba(robot.model, robot.model.createData(), robot.configuration())).diagonal()[6:]
+    command = (wanted, np.zeros(n), RATE**2 * inertia, 2.0 * RATIO * RATE * inertia, np.zeros(n))
+    theirs = MujocoRobot(robot, FRAME / substeps, gravity, afloat=afloat, friction=friction)
+    dynamics.drive(*command)
+    theirs.drive(*command)
+    angles: dict[str, list[np.ndarray]] = {"nuno": [], "mujoco": []}
+    spent: dict[str, list[float]] = {"nuno": [], "mujoco": []}
+    for _ in range(round(seconds * 60)):
+        begun = time.process_time()
+        world.step()
+        middle = time.process_time()
+        theirs.advance(substeps)
+        spent["mujoco"].append(time.process_time() - middle)
+        spent["nuno"].append(middle - begun)
+        angles["nuno"].append(robot.angles_of(dynamics.read()[0][0]))
+        angles["mujoco"].append(theirs.angles())
+    lower, upper = robot.joint_limits
+    apart = np.abs(np.array(angles["nuno"]) - np.array(angles["mujoco"]))
+    share = (apart / (upper - lower)).max(axis=0)
+    far = np.abs(np.array(angles["mujoco"]) - start).max()
+    return {
+        "base": "afloat" if afloat else "fixed", "friction": friction, "substeps": substeps,
+        "apart_rad": float(apart.max()), "apart_of_range": float(share.max()),
+        "joint": robot.joint_names[int(share.argmax())], "way_rad": float(far),
+        **{f"{name}_cpu": 60.0 * statistics.median(own) for name, own in spent.items()},
+    }  # fmt: skip
+
+
+class Puppet:
+    """Talos in MuJoCo under Nuno's balance: what is wanted comes from a robot without dynamics."""
+
+    def __init__(self, load: float, substeps: int = 10, friction: str = "soft") -> None:
+        self.world = nuno.World(device="cpu", substeps=substeps)
+        robot = nuno.Humanoid("talos")
+        self.links = robot.copy().enter(self.world, "joints")
+        self.driver = nuno.SimulatedRobot(robot, self.world, links=self.links)
+        self.model = robot
+        hands = {link: (load, robot.frame_pose(f"{side}_hand").position) for side, link in sided()}
+        self.arms = {link: place for link, (_, place) in hands.items()}
+        self.body = MujocoRobot(robot, FRAME / substeps, floor=True, friction=friction, loads=hands if load else None)
+        self.body.limit(self.driver.balance.dynamics.efforts + self.driver.balance.dynamics.joint_friction)
+        self.load, self.substeps = load, substeps
+        self.in_hand = {link: robot.frame_pose(link).to_local(place) for link, place in self.arms.items()}
+        self.now = RobotState(0.0, *self.body.read(), np.zeros(robot.model.nv))
+        self.spent: list[float] = []
+
+    def external(self) -> Any:
+        """Return the weight of what the hands hold, as the balance takes it."""
+        model = self.model.model
+        found = pin.StdVec_Force()
+        found.extend([pin.Force.Zero()] * model.njoints)
+        if not self.load:
+            return found
+        data = model.createData()
+        pin.framesForwardKinematics(model, data, self.now.q)
+        for link, place in self.in_hand.items():
+            frame = model.frames[self.model.frame_index(link)]
+            pose = data.oMf[self.model.frame_index(link)]
+            weight = pin.Force(pose.rotation.T @ (0.0, 0.0, -9.81 * self.load), np.zeros(3))
+            weight.angular = np.cross(place, weight.linear)
+            found[frame.parentJoint] += frame.placement.act(weight)
+        return found
+
+    def step(self) -> None:
+        """Go on by a frame."""
+        self.world.step()
+        wanted = self.driver.state()
+        self.body.drive(*self.driver.balance.command(self.now, wanted, FRAME, None, self.external()))
+        begun = time.process_time()
+        self.body.advance(self.substeps)
+        self.spent.append(time.process_time() - begun)
+        q, v = self.body.read()
+        self.now = self.driver.balance.judge(self.now, wanted, q, v, self.body.torques(), self.world.time)
+
+
+def sided() -> tuple[tuple[str, str], ...]:
+    """Return sides and the links that hold."""
+    return tuple(zip(("left", "right"), ARMS, strict=True))
+
+
+class Held:
+    """Talos with dynamics in Nuno, on a floor."""
+
+    def __init__(self, load: float, substeps: int | None = None) -> None:
+        self.world = nuno.World(device="cpu", substeps=substeps)
+        self.world.add(nuno.plane(name="floor", friction=0.8))
+        self.driver = nuno.SimulatedRobot(nuno.Humanoid("talos"), self.world, dynamics=True)
+        self.loads = []
+        links = self.driver.links
+        for side, link in sided() if load else ():
+            place = self.driver.actual.frame_pose(f"{side}_hand").position
+            box = self.world.add(nuno.box((0.1, 0.1, 0.1), name=f"{side} load", position=place))
+            self.world.attach(box, nuno.Rigid(mass=load))
+            hand = links.bodies[links.names.index(link)]
+            for other in links.bodies:
+                self.world.ignore_contact(box, other)
+            nuno.fixed_joint(box, hand)
+            self.loads.append((box, hand))
+        self.spent: list[float] = []
+
+    @property
+    def now(self) -> RobotState:
+        """How it moves."""
+        return self.driver.state()
+
+    def step(self) -> None:
+        """Go on by a frame."""
+        begun = time.process_time()
+        self.world.step()
+        self.spent.append(time.process_time() - begun)
+
+
+def main() -> None:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", default=["step", "lift", "walk"])
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    found: dict[str, Any] = {}
+    if "step" in given.parts:
+        found["step"] = steps()
+    if given.json:
+        given.json.write_text(json.dumps(found, indent=1))
+
+
+def steps() -> list[dict[str, Any]]:
+    """Run and print all step responses."""
+    print("| base | friction | step [ms] | apart, of range | joint | [rad] | CPU s/s Nuno | MuJoCo |")
+    print("|---|---|---|---|---|---|---|---|")
+    rows = []
+    for afloat in (False, True):
+        for friction in ("none", "hard", "soft"):
+            for substeps in (10, 20, 40):
+                row = step_response(afloat, substeps, friction)
+                rows.append(row)
+                print(f"| {row['base']} | {friction} | {1000 * FRAME / substeps:.2f} | {row['apart_of_range']:.2%} | "
+                      f"{row['joint']} | {row['apart_rad']:.4f} of {row['way_rad']:.2f} | {row['nuno_cpu']:.2f} | "
+                      f"{row['mujoco_cpu']:.2f} |", flush=True)  # fmt: skip
+    return rows
+
+
+if __name__ == "__main__":
+    main()
