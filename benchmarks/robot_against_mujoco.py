@@ -37,7 +37,7 @@ RATE, RATIO = 20.0, 0.7
 ARMS = ("arm_left_7_link", "arm_right_7_link")
 LOAD = 2.5
 """[kg] In each hand."""
-BENDS = -0.6
+BENDS = -0.3
 """[rad] By which elbows bend."""
 GROUPS = {"hips and knees": "leg_.*_[1234]_", "ankles": "leg_.*_[56]_", "trunk and head": "torso|head", "arms": "arm"}
 
@@ -110,7 +110,7 @@ class Puppet:
         self.body = MujocoRobot(robot, FRAME / substeps, floor=True, friction=friction, loads=hands if load else None)
         self.body.limit(self.driver.balance.dynamics.efforts + self.driver.balance.dynamics.joint_friction)
         self.load, self.substeps = load, substeps
-        self.in_hand = {link: robot.frame_pose(link).to_local(place) for link, place in self.arms.items()}
+        self.in_hand = {link: robot.frame_pose(link).to_local([place])[0] for link, place in self.arms.items()}
         self.now = RobotState(0.0, *self.body.read(), np.zeros(robot.model.nv))
         self.spent: list[float] = []
 

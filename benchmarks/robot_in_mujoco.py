@@ -11,6 +11,7 @@ import numpy as np
 
 import nuno
 from nuno.robot.sensors import sole_corners
+from nuno.shapes import quaternion as quat
 
 FRICTION = 0.8
 """Coulomb's coefficient of soles and floor."""
@@ -122,8 +123,6 @@ def urdf_text(robot: nuno.Humanoid) -> str:
 
 def in_link(robot: nuno.Humanoid, link: str, place: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, Any]:
     """Return a pose of the world in a link's frame."""
-    from nuno.shapes import quaternion as quat
-
     own = robot.frame_pose(link)
     back = quat.inverse(np.asarray(own.quaternion))
     return quat.rotate(back, place - own.position), quat.multiply(back, quaternion)
@@ -134,8 +133,7 @@ def add_sole(spec: Any, robot: nuno.Humanoid, foot: str) -> None:
     frame = robot.description.frames[foot]
     half = sole_corners(frame)[-1]
     pose = robot.frame_pose(foot)
-    axis = nuno.Coordinates(pose.position, pose.quaternion)
-    middle = np.asarray(axis.to_world((0.0, 0.0, 0.5 * SOLE)))
+    middle = pose.to_world([(0.0, 0.0, 0.5 * SOLE)])[0]
     place, turn = in_link(robot, frame.link, middle, np.asarray(pose.quaternion))
     spec.body(frame.link).add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX, size=(half[0], half[1], 0.5 * SOLE), pos=place, quat=turn, mass=0.0,
@@ -148,3 +146,4 @@ def add_load(spec: Any, robot: nuno.Humanoid, link: str, mass: float, place: np.
     own, turn = in_link(robot, link, place, np.array((1.0, 0.0, 0.0, 0.0)))
     body = spec.body(link).add_body(name=f"{link}_load", pos=own, quat=turn)
     body.mass, body.inertia, body.explicitinertial = mass, np.full(3, mass * 0.01 / 6.0), True
+    body.ipos, body.iquat = np.zeros(3), (1.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Robots with dynamics against MuJoCo, where it is installed (``pip install mujoco``): the benchmark's own functions."""
+"""Robots with dynamics against MuJoCo, where it is installed (``pip install mujoco``), by the benchmark's functions."""
 
 import sys
 from pathlib import Path

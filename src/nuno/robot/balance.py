@@ -28,6 +28,8 @@ SINKS = 0.5
 """Share of the height of the wanted base, below which a robot has fallen."""
 SURE = 0.75
 """Share of the soles' friction that balance counts on: floors may have less."""
+NEARS = 0.2
+"""[s] In which a motor that overcomes friction is to come to where its joint is wanted."""
 FULL = 0.999
 """Share of its limit, from where on a motor gives all that it can."""
 
@@ -82,7 +84,8 @@ class Balance:
             acceleration, effort = found
             speed = now.v[6:]
             goes = speed + 0.5 * span * acceleration[6:]
-            gains = (*dynamics.soft, effort + dynamics.overcome(goes))
+            error = robot.angles_of(wanted.q) - robot.angles_of(now.q)
+            gains = (*dynamics.soft, effort + dynamics.overcome(wanted.v[6:] + error / NEARS))
             goal = robot.angles_of(now.q) + span * speed, goes
         values = [np.array(part) for part in (*goal, *gains)]
         if servo is not None:
