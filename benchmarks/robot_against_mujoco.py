@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import statistics
 import time
 from pathlib import Path
@@ -21,12 +22,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from robot_in_mujoco import MujocoRobot
+from standing_talos import FRAME, InEngine, InNuno
 
 import nuno
 from nuno.robot.link_dynamics import LinkDynamics
 from nuno.robot.robot_state import RobotState
 
-FRAME = 1.0 / 60.0
 WAYS = {
     "arm_left_2_joint": 0.4, "arm_left_6_joint": 0.3, "arm_right_4_joint": -0.5, "torso_1_joint": 0.3,
     "head_1_joint": -0.2, "leg_left_4_joint": 0.4, "leg_right_3_joint": -0.3,
@@ -34,7 +35,6 @@ WAYS = {
 """[rad] How far joints are sent."""
 RATE, RATIO = 20.0, 0.7
 """[rad/s] Of the motors' oscillation with the joint's own inertia, and its damping ratio."""
-ARMS = ("arm_left_7_link", "arm_right_7_link")
 LOAD = 2.5
 """[kg] In each hand."""
 BENDS = -0.3
@@ -96,90 +96,6 @@ def step_response(
     }  # fmt: skip
 
 
-class Puppet:
-    """Talos in MuJoCo under Nuno's balance: what is wanted comes from a robot without dynamics."""
-
-    def __init__(self, load: float, substeps: int = 10, friction: str = "soft") -> None:
-        self.world = nuno.World(device="cpu", substeps=substeps)
-        robot = nuno.Humanoid("talos")
-        self.links = robot.copy().enter(self.world, "joints")
-        self.driver = nuno.SimulatedRobot(robot, self.world, links=self.links)
-        self.model = robot
-        hands = {link: (load, robot.frame_pose(f"{side}_hand").position) for side, link in sided()}
-        self.arms = {link: place for link, (_, place) in hands.items()}
-        self.body = MujocoRobot(robot, FRAME / substeps, floor=True, friction=friction, loads=hands if load else None)
-        self.body.limit(self.driver.balance.dynamics.efforts + self.driver.balance.dynamics.joint_friction)
-        self.load, self.substeps = load, substeps
-        self.in_hand = {link: robot.frame_pose(link).to_local([place])[0] for link, place in self.arms.items()}
-        self.now = RobotState(0.0, *self.body.read(), np.zeros(robot.model.nv))
-        self.spent: list[float] = []
-
-    def external(self) -> Any:
-        """Return the weight of what the hands hold, as the balance takes it."""
-        model = self.model.model
-        found = pin.StdVec_Force()
-        found.extend([pin.Force.Zero()] * model.njoints)
-        if not self.load:
-            return found
-        data = model.createData()
-        pin.framesForwardKinematics(model, data, self.now.q)
-        for link, place in self.in_hand.items():
-            frame = model.frames[self.model.frame_index(link)]
-            pose = data.oMf[self.model.frame_index(link)]
-            weight = pin.Force(pose.rotation.T @ (0.0, 0.0, -9.81 * self.load), np.zeros(3))
-            weight.angular = np.cross(place, weight.linear)
-            found[frame.parentJoint] += frame.placement.act(weight)
-        return found
-
-    def step(self) -> None:
-        """Go on by a frame."""
-        self.world.step()
-        wanted = self.driver.state()
-        self.body.drive(*self.driver.balance.command(self.now, wanted, FRAME, None, self.external()))
-        begun = time.process_time()
-        self.body.advance(self.substeps)
-        self.spent.append(time.process_time() - begun)
-        q, v = self.body.read()
-        self.now = self.driver.balance.judge(self.now, wanted, q, v, self.body.torques(), self.world.time)
-
-
-def sided() -> tuple[tuple[str, str], ...]:
-    """Return sides and the links that hold."""
-    return tuple(zip(("left", "right"), ARMS, strict=True))
-
-
-class Held:
-    """Talos with dynamics in Nuno, on a floor."""
-
-    def __init__(self, load: float, substeps: int | None = None) -> None:
-        self.world = nuno.World(device="cpu", substeps=substeps)
-        self.world.add(nuno.plane(name="floor", friction=0.8))
-        self.driver = nuno.SimulatedRobot(nuno.Humanoid("talos"), self.world, dynamics=True)
-        self.loads = []
-        links = self.driver.links
-        for side, link in sided() if load else ():
-            place = self.driver.actual.frame_pose(f"{side}_hand").position
-            box = self.world.add(nuno.box((0.1, 0.1, 0.1), name=f"{side} load", position=place))
-            self.world.attach(box, nuno.Rigid(mass=load))
-            hand = links.bodies[links.names.index(link)]
-            for other in links.bodies:
-                self.world.ignore_contact(box, other)
-            nuno.fixed_joint(box, hand)
-            self.loads.append((box, hand))
-        self.spent: list[float] = []
-
-    @property
-    def now(self) -> RobotState:
-        """How it moves."""
-        return self.driver.state()
-
-    def step(self) -> None:
-        """Go on by a frame."""
-        begun = time.process_time()
-        self.world.step()
-        self.spent.append(time.process_time() - begun)
-
-
 def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -189,6 +105,10 @@ def main() -> None:
     found: dict[str, Any] = {}
     if "step" in given.parts:
         found["step"] = steps()
+    if "lift" in given.parts:
+        found["lift"] = lift()
+    if "walk" in given.parts:
+        found["walk"] = walk()
     if given.json:
         given.json.write_text(json.dumps(found, indent=1))
 
@@ -207,6 +127,111 @@ def steps() -> list[dict[str, Any]]:
                       f"{row['joint']} | {row['apart_rad']:.4f} of {row['way_rad']:.2f} | {row['nuno_cpu']:.2f} | "
                       f"{row['mujoco_cpu']:.2f} |", flush=True)  # fmt: skip
     return rows
+
+
+def bends(driver: nuno.SimulatedRobot) -> None:
+    """Send both elbows up, in 1.5 s."""
+    angles = driver.robot.angle_vector()
+    elbows = [f"arm_{side}_4_joint" for side in ("left", "right")]
+    driver.angle_vector({name: angles[driver.robot.joint_index(name)] + BENDS for name in elbows}, 1.5)
+
+
+def on_floor(robot: nuno.Humanoid, step: float, loads: Any) -> MujocoRobot:
+    """Return a robot in MuJoCo on a floor."""
+    return MujocoRobot(robot, step, floor=True, loads=loads)
+
+
+def statics(model: nuno.Humanoid, q: np.ndarray, load: float, places: Any) -> np.ndarray:
+    """Return the joint torques (n,) by which gravity and what the hands hold are borne, but for the feet."""
+    data = model.model.createData()
+    found = pin.computeGeneralizedGravity(model.model, data, q).copy()
+    pin.computeJointJacobians(model.model, data, q)
+    pin.updateFramePlacements(model.model, data)
+    for link, place in places.items():
+        frame = model.frame_index(link)
+        jacobian = pin.getFrameJacobian(model.model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        weight = np.array((0.0, 0.0, -9.81 * load))
+        found -= jacobian.T @ [*weight, *np.cross(data.oMf[frame].rotation @ place, weight)]
+    return found[6:]
+
+
+def lift() -> dict[str, Any]:
+    """Run and print how Talos lifts 5 kg in both."""
+    pair: dict[str, Any] = {"nuno": InNuno(LOAD), "mujoco": InEngine(on_floor, LOAD)}
+    model, places_in = pair["mujoco"].model, pair["mujoco"].places
+    states: dict[str, list[RobotState]] = {name: [] for name in pair}
+    places: dict[str, list[np.ndarray]] = {name: [] for name in pair}
+    for frame in range(300):
+        for name, own in pair.items():
+            if frame == 18:
+                bends(own.driver)
+            own.step()
+            states[name].append(own.now)
+            places[name].append(own.load_place())
+    arms = [k for k, name in enumerate(model.joint_names) if not name.startswith("leg")]
+    legs = [k for k, name in enumerate(model.joint_names) if name.startswith("leg")]
+    lower, upper = model.joint_limits
+    apart = np.abs([model.angles_of(a.q) - model.angles_of(b.q) for a, b in zip(*states.values(), strict=True)])
+    found: dict[str, Any] = {
+        "apart_of_range": float((apart / (upper - lower)).max()),
+        "joint": model.joint_names[int((apart / (upper - lower)).max(axis=0).argmax())],
+        "legs_apart": float(rms(states["nuno"][-1].torques[legs] - states["mujoco"][-1].torques[legs])),
+        "legs": float(rms(states["mujoco"][-1].torques[legs])),
+    }
+    print(f"angles apart: {found['apart_of_range']:.2%} of a range ({found['joint']}); legs' torques at rest: "
+          f"{found['legs_apart']:.2f} N m of {found['legs']:.1f} (root mean squares)")  # fmt: skip
+    print("| | lifted [m] | wander of a load [mm/s] | torques off statics | CPU s/s | of control | fallen |")
+    print("|---|---|---|---|---|---|---|")
+    for name, own in pair.items():
+        last, place = states[name][-1], np.array(places[name])
+        wanted = statics(model, last.q, LOAD, places_in)
+        row = {
+            "lifted": float(place[-1, 2] - place[17, 2]),
+            "wander": 1000.0 * float(np.linalg.norm(np.diff(place[-60:], axis=0), axis=1).sum()),
+            "off": float(np.abs(last.torques - wanted)[arms].max() / np.abs(wanted[arms]).max()),
+            "cpu": 60.0 * statistics.median(own.spent), "control": 60.0 * statistics.median(own.control),
+            "fallen": last.fallen,
+        }  # fmt: skip
+        found[name] = row
+        print(f"| {name} | {row['lifted']:.3f} | {row['wander']:.2f} | {row['off']:.2%} | {row['cpu']:.2f} | "
+              f"{row['control']:.2f} | {row['fallen']} |", flush=True)  # fmt: skip
+    return found
+
+
+def walk() -> dict[str, Any]:
+    """Run and print the joint torques of a walk in both."""
+    pair: dict[str, Any] = {"nuno": InNuno(0.0), "mujoco": InEngine(on_floor, 0.0)}
+    model = pair["mujoco"].model
+    states: dict[str, list[RobotState]] = {name: [] for name in pair}
+    for frame in range(1000):
+        for name, own in pair.items():
+            if frame == 18:
+                own.driver.go_pos(0.3, 0.0, 0.0, wait=False)
+            own.step()
+            states[name].append(own.now)
+        if frame > 30 and not any(own.driver.gait.is_walking for own in pair.values()):
+            break
+    torques = {name: np.array([state.torques for state in own[18:]]) for name, own in states.items()}
+    found: dict[str, Any] = {"seconds": len(torques["nuno"]) / 60.0}
+    for name, own in states.items():
+        found[name] = {"way": float(own[-1].q[0] - own[17].q[0]), "fallen": own[-1].fallen}
+        print(f"{name}: {found[name]['way']:.3f} m in {found['seconds']:.1f} s, fallen: {found[name]['fallen']}")
+    print("| joints | torque [N m] | apart [N m] | means of 0.1 s apart [N m] |")
+    print("|---|---|---|---|")
+    for group, pattern in GROUPS.items():
+        rows = [k for k, name in enumerate(model.joint_names) if re.match(pattern, name)]
+        off = (torques["nuno"] - torques["mujoco"])[:, rows]
+        whole = len(off) // 6 * 6
+        slow = off[:whole].reshape(-1, 6, len(rows)).mean(axis=1)
+        row = {"torque": rms(torques["mujoco"][:, rows]), "apart": rms(off), "slow_apart": rms(slow)}
+        found[group] = row
+        print(f"| {group} | {row['torque']:.2f} | {row['apart']:.2f} | {row['slow_apart']:.2f} |", flush=True)
+    return found
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 if __name__ == "__main__":
