@@ -1,8 +1,8 @@
 """A hand that presses a soft cube on a table, in Nuno and with the arm in MuJoCo; for `robot_against_mujoco.py`.
 
-Talos' base is fixed; motors of the same gains lead a plate below its right hand 25 mm into a cube of 0.1 m, 20 kPa. With
-the arm in MuJoCo the cube stays Nuno's: in each step the plate is where MuJoCo has it, and what the cube does to it is a
-force on the hand there.
+Talos' base is fixed; motors of the same gains lead a plate below its right hand 25 mm into a cube of 0.1 m, 20 kPa.
+With the arm in MuJoCo the cube stays Nuno's: in each step the plate is where MuJoCo has it, and what the cube does to
+it is a force on the hand there.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def inverse_force(robot: nuno.Humanoid, q: np.ndarray, torques: np.ndarray) -> n
     extra = torques - pin.computeGeneralizedGravity(model, data, q)[6:]
     jacobian = pin.computeFrameJacobian(model, data, q, frame_of_hand(robot), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
     found = -np.linalg.lstsq(jacobian[:, 6:][:, arm].T, extra[arm], rcond=None)[0][:3]
-    return found + (0.0, 0.0, 9.81 * MASS)  # less the plate's weight
+    return found + np.array((0.0, 0.0, 9.81 * MASS))  # less the plate's weight
 
 
 def summary(

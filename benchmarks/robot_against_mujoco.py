@@ -1,4 +1,4 @@
-"""Robots with dynamics against MuJoCo: ``python benchmarks/robot_against_mujoco.py [step lift press walk] [--json FILE]``.
+"""Robots with dynamics against MuJoCo: ``python benchmarks/robot_against_mujoco.py [step lift press walk]``.
 
 Talos, the same URDF in both, on the CPU; MuJoCo is ``pip install mujoco``.
 

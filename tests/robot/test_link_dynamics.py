@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import nuno
+from nuno.robot.description import robot_data
 from nuno.robot.link_dynamics import LinkDynamics
 
 G = 9.81
@@ -24,6 +25,7 @@ STIFF = 2.0 * G * 0.5
 """[N m/rad] Of the pendulum, by gravity."""
 INERTIA = 0.02 + 2.0 * 0.5**2
 """[kg m2] About its axis."""
+PANDA = "panda_description/urdf/panda.urdf"
 FEET = ("left", "right")
 
 
@@ -86,6 +88,27 @@ def test_a_joint_sticks_below_its_friction_and_goes_above(tmp_path):
         dynamics.drive(nothing, nothing, nothing + 1e-9, nothing, nothing + 2.0 * share)
         world.run(0.5)
         assert (float(dynamics.joints[0].position) > 1e-4) == goes
+
+
+def test_all_joints_read_at_once_are_what_each_tells():
+    """Positions and velocities to rounding, hinges and sliders, base free and fixed, one world and a batch."""
+    talos = nuno.Humanoid("talos")
+    for model in (talos, nuno.Humanoid(talos.description.urdf), nuno.Humanoid(robot_data() / PANDA)):
+        world = nuno.World(device="cpu")
+        dynamics = LinkDynamics(model.enter(world, "joints"))
+        dynamics.attach()
+        n = len(model.joint_names)
+        dynamics.drive(model.angle_vector(), np.full(n, 0.5), dynamics.stiffness, dynamics.damping, np.zeros(n))
+        world.run(0.1)
+        for read in (dynamics, dynamics.imagined(world.imagine(2))):
+            q, v = read.read()
+            for k, joint in enumerate(read.joints):
+                told = [model.angles_of(own)[k] for own in q]
+                np.testing.assert_allclose(told, np.broadcast_to(joint.position, len(q)), atol=1e-9)
+                np.testing.assert_allclose(v[:, 6 + k], joint.velocity, atol=1e-9)
+            base = read.bodies[0]
+            if base.is_dynamic:
+                np.testing.assert_allclose(q[:, :3], np.broadcast_to(base.pose()[0], (len(q), 3)), atol=1e-12)
 
 
 def momenta(model, q, v):
@@ -236,7 +259,7 @@ def test_at_rest_all_torques_are_those_of_inverse_dynamics(resting):
 
 
 def test_the_zero_moment_point_is_that_of_the_contact_forces(resting):
-    """Of the soles' contacts, and of inverse dynamics with the loads in the hands: within 1 mm, and the weight 0.2 %."""
+    """Of the soles' contacts, and of inverse dynamics with what the hands hold: within 1 mm; the weight: 0.2 %."""
     world, robot = resting
     found = soles(world, robot)
     force, moment = sum(own[1] for own in found), sum(own[2] for own in found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -139,6 +140,14 @@ class RigidScene:
             return body._dynamics.slot
         static = self.static.get(body.key)
         return None if static is None else static.slot
+
+    def motions(self, bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return places, turns, velocities and spins of rigid bodies' frames, (worlds, n, 3 or 4) each."""
+        own = [made for body in bodies if isinstance(made := body._dynamics, RigidDynamics)]
+        middles, turns, velocities, spins = self.solver.motions([made.slot for made in own])
+        centres = np.array([made.centre for made in own]).reshape(-1, 3)
+        arms = -quat.rotate(turns, np.broadcast_to(centres, middles.shape))
+        return middles + arms, turns, velocities + np.cross(spins, arms), spins
 
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""

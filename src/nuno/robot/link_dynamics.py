@@ -156,18 +156,50 @@ class LinkDynamics:
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
         robot, base, worlds = self.robot, self.bodies[0], self.world.world_count
-        place, turn = (np.atleast_2d(part) for part in base.pose())
+        moving = self.bodies if base.is_dynamic else self.bodies[1:]
+        places, turns, velocities, spins = self.world.rigid_motion(moving)
+        if not base.is_dynamic:
+            still = tuple(np.broadcast_to(part, (worlds, 1, len(np.ravel(part)))) for part in base.pose())
+            nothing = np.zeros((worlds, 1, 3))
+            places, turns, velocities, spins = (
+                np.concatenate(pair, axis=1)
+                for pair in zip((*still, nothing, nothing), (places, turns, velocities, spins), strict=True)
+            )
+        angles, rates = self._along(places, turns, velocities, spins)
         v = np.zeros((worlds, robot.model.nv))
-        v[:, 6:] = np.stack([np.broadcast_to(joint.velocity, (worlds,)) for joint in self.joints], axis=1)
-        if base.is_dynamic:
-            back = quat.inverse(turn)
-            spin = np.atleast_2d(base.angular_velocity)
-            arm = place - np.atleast_2d(base.centre_of_mass)
-            v[:, :3] = quat.rotate(back, np.atleast_2d(base.velocity) + np.cross(spin, arm))
-            v[:, 3:6] = quat.rotate(back, spin)
-        pose = np.broadcast_to(np.concatenate([place, np.roll(turn, -1, axis=1)], axis=1), (worlds, 7))
-        angles = np.stack([np.broadcast_to(joint.position, (worlds,)) for joint in self.joints], axis=1)
+        back = quat.inverse(turns[:, 0])
+        v[:, :3], v[:, 3:6] = quat.rotate(back, velocities[:, 0]), quat.rotate(back, spins[:, 0])
+        v[:, 6:] = rates
+        pose = np.concatenate([places[:, 0], np.roll(turns[:, 0], -1, axis=1)], axis=1)
         return np.stack([robot.configuration_of(a, own) for a, own in zip(angles, pose, strict=True)]), v
+
+    def _along(
+        self, places: np.ndarray, turns: np.ndarray, velocities: np.ndarray, spins: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions and velocities of the joints, (worlds, n) each, as they tell them themselves."""
+        model = self.robot.model
+        own = np.arange(1, len(self.joints) + 1)
+        other = np.array([int(model.parents[j]) - 1 for j in range(2, model.njoints)], dtype=int)
+        specs = [joint.spec for joint in self.joints]
+        place, turn, other_place, other_turn = (
+            np.stack([getattr(spec, name) for spec in specs], axis=1)
+            for name in ("place", "turn", "other_place", "other_turn")
+        )
+        its = quat.multiply(turns[:, other], other_turn)
+        point = places[:, own] + quat.rotate(turns[:, own], place)
+        other_point = places[:, other] + quat.rotate(turns[:, other], other_place)
+        axis = quat.rotate(its, np.broadcast_to((0.0, 0.0, 1.0), point.shape))
+        across = quat.multiply(quat.inverse(its), quat.multiply(turns[:, own], turn))
+        across = np.where(across[..., :1] < 0.0, -across, across)
+        slides = np.array([spec.kind == "slider" for spec in specs])
+        along = quat.rotate(quat.inverse(its), point - other_point)[..., 2]
+        speed = (
+            velocities[:, own] + np.cross(spins[:, own], point - places[:, own])
+            - velocities[:, other] - np.cross(spins[:, other], point - places[:, other])
+        )  # fmt: skip
+        motion = np.where(slides[:, None], speed, spins[:, own] - spins[:, other])
+        angles = np.where(slides, along, 2.0 * np.arctan2(across[..., 3], across[..., 0]))
+        return angles, np.einsum("wkx,wkx->wk", motion, axis)
 
     def efforts_now(self) -> np.ndarray:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
