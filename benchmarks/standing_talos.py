@@ -45,21 +45,23 @@ class InEngine:
         motors = self.driver.balance.dynamics
         self.body.limit(motors.efforts + motors.joint_friction)
         self.load, self.places = load, in_links(robot)
-        self.now = RobotState(0.0, *self.body.read(), np.zeros(robot.model.nv))
+        q, v = self.body.read()
+        self.now = RobotState(0.0, q, v, np.zeros(robot.model.nv), loads=self.loads(q))
         self.spent: list[float] = []
         self.control: list[float] = []
 
-    def external(self) -> Any:
+    def loads(self, q: np.ndarray) -> np.ndarray | None:
         """Return the weight of what the hands hold, as the balance takes it."""
         model = self.model.model
-        found = pin.StdVec_Force()
-        found.extend([pin.Force.Zero()] * model.njoints)
+        if not self.load:
+            return None
+        found = np.zeros((model.njoints, 6))
         data = model.createData()
-        pin.framesForwardKinematics(model, data, self.now.q)
+        pin.framesForwardKinematics(model, data, q)
         for link, place in self.places.items():
             frame, pose = model.frames[self.model.frame_index(link)], data.oMf[self.model.frame_index(link)]
             force = pose.rotation.T @ (0.0, 0.0, -9.81 * self.load)
-            found[frame.parentJoint] += frame.placement.act(pin.Force(force, np.cross(place, force)))
+            found[frame.parentJoint] += frame.placement.act(pin.Force(force, np.cross(place, force))).vector
         return found
 
     def load_place(self) -> np.ndarray:
@@ -71,13 +73,15 @@ class InEngine:
         self.world.step()
         begun = time.process_time()
         wanted = self.driver.state()
-        self.body.drive(*self.driver.balance.command(self.now, wanted, FRAME, None, self.external()))
+        self.body.drive(*self.driver.balance.command(self.now, wanted, FRAME, None))
         middle = time.process_time()
         self.body.advance(STEPS)
         self.spent.append(time.process_time() - middle)
         self.control.append(middle - begun)
         q, v = self.body.read()
-        self.now = self.driver.balance.judge(self.now, wanted, q, v, self.body.torques(), self.world.time)
+        self.now = self.driver.balance.judge(
+            self.now, wanted, q, v, self.body.torques(), self.world.time, self.loads(q)
+        )
 
 
 class InNuno:

@@ -206,10 +206,10 @@ class LinkDynamics:
         worlds = self.world.world_count
         return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
 
-    def loads(self) -> list[Any]:
-        """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.
+    def loads(self) -> list[np.ndarray | None]:
+        """Return what bodies that links hold did to each joint in the last frame, by world; None where none is held.
 
-        Of each world.
+        (joints, 6) each, force [N] and torque [N m] in the frames of Pinocchio's joints.
         """
         index = {body: k for k, body in enumerate(self.bodies)}
         others = [body for body in self.world.bodies if body not in index]
@@ -217,9 +217,8 @@ class LinkDynamics:
         worlds = self.world.world_count
         if not held:
             return [None] * worlds
-        found = [pin.StdVec_Force() for _ in range(worlds)]
-        for own in found:
-            own.extend([pin.Force.Zero()] * self.robot.model.njoints)
+        found: list[np.ndarray | None] = []
+        found += [np.zeros((self.robot.model.njoints, 6)) for _ in range(worlds)]
         for k, grip in held:
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
             place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
@@ -227,7 +226,8 @@ class LinkDynamics:
                 arm = held_points(grip, w).mean(axis=0) - place[w]
                 back = quat.inverse(turn[w])
                 moment = torque[w] + np.cross(arm, force[w])
-                own[k + 1] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
+                assert own is not None
+                own[k + 1] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
         return found
 
     def imagined(self, world: World) -> LinkDynamics:

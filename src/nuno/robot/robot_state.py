@@ -19,6 +19,8 @@ class RobotState:
         torques: (n,) float [N m; N], of the joints' motors, where the robot has dynamics; None else.
         fallen: Why and when the robot fell, where it has dynamics and did; None else.
         over_torque: Names of joints whose motors gave all that they can.
+        loads: (joints, 6) float [N, N m], what bodies that its links hold did to Pinocchio's joints in the last frame,
+            in their own frames, where the robot has dynamics and holds any; None else.
     """
 
     time: float
@@ -28,3 +30,4 @@ class RobotState:
     torques: np.ndarray | None = None
     fallen: str | None = None
     over_torque: tuple[str, ...] = ()
+    loads: np.ndarray | None = None
