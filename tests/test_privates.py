@@ -6,7 +6,7 @@ from pathlib import Path
 import nuno
 
 PACKAGE = Path(nuno.__file__).parent
-MOST = 602
+MOST = 601
 """So many are left, after branches that were counted apart; who makes them fewer lowers it, and nothing raises it."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,9 +71,11 @@ class Reading(Saving):
 
         Raises:
             BodyStateError: a body is static.
-            InvalidInputError: a body deforms.
+            InvalidInputError: a body deforms, or none that can be gone through is given.
         """
         with self._call():
+            if isinstance(bodies, str | Body) or not isinstance(bodies, Iterable):
+                raise InvalidInputError(f"bodies must be several, a list or tuple, got {type(bodies).__name__}")
             own = [self._own(body) for body in bodies]
             for body in own:
                 if not body.is_dynamic:
