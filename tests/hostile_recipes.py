@@ -327,7 +327,7 @@ CALLS = {
     "World.imagine": {"n": 2}, "World.masks": {"camera": lambda s: s.camera, "body": "towel"},
     "World.move": {"body": "table", "to": lambda s: s.path}, "World.push": {"body": "brick", "force": POINT},
     "World.remove": {"body": "towel"}, "World.reset": {"worlds": [0], "saved": lambda s: s.snapshot},
-    "World.segment": {"camera": lambda s: s.camera},
+    "World.rigid_motion": {"bodies": ["brick"]}, "World.segment": {"camera": lambda s: s.camera},
     "World.restore": {"saved": lambda s: s.snapshot}, "World.run": {"seconds": 0.0}, "World.save": {},
     "World.set_friction": {"a": "towel", "b": "table", "mu": 0.5},
     "World.set_material": {"body": "towel", "material": nuno.Cloth()},

@@ -89,3 +89,27 @@ def test_bad_commands_are_named(scene):
         futures.robot.angle_vector({"head_1_joint": np.zeros(3)})
     with pytest.raises(BodyStateError, match="one robot"):
         _ = nuno.World(device="cpu").robot
+
+
+def test_what_the_hands_hold_is_held_alike_in_every_world():
+    """A box fixed to a hand, an arm under way: the same bits in imagined worlds, and after a world is restored."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
+    box = world.add(nuno.box((0.1, 0.1, 0.1), position=robot.actual.frame_pose("left_hand").position))
+    world.attach(box, nuno.Rigid(mass=2.0))
+    for link in robot.links.bodies:
+        world.ignore_contact(box, link)
+    nuno.fixed_joint(box, robot.links.bodies[robot.links.names.index("arm_left_7_link")])
+    robot.angle_vector({"arm_left_4_joint": float(robot.angle_vector()[17]) - 0.2}, 0.3)
+    world.run(0.15)
+    loads = robot.state().loads
+    assert loads is not None and np.linalg.norm(loads[:, :3].sum(axis=0)) > 10.0
+    saved, futures = world.save(), world.imagine(2)
+    futures.run(0.2)
+    world.run(0.2)
+    once = robot.state()
+    world.restore(saved)
+    world.run(0.2)
+    for state in (*futures.robot.state(), robot.state()):
+        assert np.array_equal(state.q, once.q) and np.array_equal(state.v, once.v)

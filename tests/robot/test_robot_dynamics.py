@@ -78,6 +78,7 @@ def test_it_moves_as_pinocchio_says():
     model = nuno.Humanoid("talos")
     links = model.enter(world, "joints")
     dynamics = LinkDynamics(links)
+    dynamics.joint_friction = np.zeros(len(model.joint_names))
     dynamics.attach()
     start = model.angle_vector()
     wanted = start.copy()
@@ -95,7 +96,7 @@ def test_it_moves_as_pinocchio_says():
         world.step()
         for _ in range(round(1 / 60 / dt)):
             torque = np.zeros(inner.nv)
-            torque[6:] = stiffness * (wanted - model.angles_of(q)) - damping * v[6:]
+            torque[6:] = stiffness * (wanted - model.angles_of(q)) - (damping + dynamics.joint_damping) * v[6:]
             v = v + 1 / 60 / round(1 / 60 / dt) * pin.aba(inner, data, q, v, torque)
             q = pin.integrate(inner, q, 1 / 60 / round(1 / 60 / dt) * v)
     mine = dynamics.read()[0][0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -135,17 +136,26 @@ class RigidScene:
 
     def slot_of(self, world: Simulation, body: Body) -> int | None:
         """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
-        if isinstance(body._dynamics, RigidDynamics):
-            return body._dynamics.slot
+        own = _dynamics_of(body)
+        if own is not None:
+            return own.slot
         static = self.static.get(body.key)
         return None if static is None else static.slot
+
+    def motions(self, bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return places, turns, velocities and spins of rigid bodies' frames, (worlds, n, 3 or 4) each."""
+        own = [made for body in bodies if (made := _dynamics_of(body)) is not None]
+        middles, turns, velocities, spins = self.solver.motions([made.slot for made in own])
+        centres = np.array([made.centre for made in own]).reshape(-1, 3)
+        arms = -quat.rotate(turns, np.broadcast_to(centres, middles.shape))
+        return middles + arms, turns, velocities + np.cross(spins, arms), spins
 
     def slots_of(self, world: Simulation) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""
         slots = []
         for key, body in world._bodies.items():
-            own, static = body._dynamics, self.static.get(key)
-            slots.append(own.slot if isinstance(own, RigidDynamics) else -1 if static is None else static.slot)
+            own, static = _dynamics_of(body), self.static.get(key)
+            slots.append(own.slot if own is not None else -1 if static is None else static.slot)
         return slots
 
     def bring_static(self, body: Body) -> int:
@@ -343,6 +353,11 @@ def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
     # the same bits wherever the body is
     vertices = None if plain and body._deformed is None else body.local_vertices()
     return rigid_shape(body.shape, moves=moves, thickness=body.thickness, vertices=vertices, is_solid=body.is_solid)
+
+
+def _dynamics_of(body: Body) -> RigidDynamics | None:
+    own = body._dynamics
+    return own if isinstance(own, RigidDynamics) else None
 
 
 def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

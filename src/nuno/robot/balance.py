@@ -28,6 +28,8 @@ SINKS = 0.5
 """Share of the height of the wanted base, below which a robot has fallen."""
 SURE = 0.75
 """Share of the soles' friction that balance counts on: floors may have less."""
+NEARS = 0.2
+"""[s] In which a motor that overcomes friction is to come to where its joint is wanted."""
 FULL = 0.999
 """Share of its limit, from where on a motor gives all that it can."""
 
@@ -59,9 +61,7 @@ class Balance:
         self._warns = True
         self.is_on = True
 
-    def command(
-        self, now: RobotState, wanted: RobotState, span: float, servo: Servo | None, external: Any = None
-    ) -> list[np.ndarray]:
+    def command(self, now: RobotState, wanted: RobotState, span: float, servo: Servo | None) -> list[np.ndarray]:
         """Return what the motors are told for a frame: positions, velocities, stiffness, damping and effort (n,) each.
 
         Args:
@@ -69,20 +69,21 @@ class Balance:
             wanted: How it is to move at the end of the frame.
             span: [s] of the frame.
             servo: A torque law that some joints are under, or None.
-            external: What bodies that the links hold do to them, as Pinocchio takes it, or None.
         """
         dynamics, robot = self.dynamics, self._robot
         found = None
         if self.is_on and self._feet and now.fallen is None:
-            found = self._control.solve(now, wanted, self._standing(wanted.q), external)
+            found = self._control.solve(now, wanted, self._standing(wanted.q), _forces(now.loads))
         if found is None:
             gains = dynamics.stiffness, dynamics.damping, np.zeros(len(dynamics.joints))
             goal = robot.angles_of(wanted.q), wanted.v[6:]
         else:
             acceleration, effort = found
             speed = now.v[6:]
-            gains = (*dynamics.soft, effort)
-            goal = robot.angles_of(now.q) + span * speed, speed + 0.5 * span * acceleration[6:]
+            goes = speed + 0.5 * span * acceleration[6:]
+            error = robot.angles_of(wanted.q) - robot.angles_of(now.q)
+            gains = (*dynamics.soft, effort + dynamics.overcome(wanted.v[6:] + error / NEARS))
+            goal = robot.angles_of(now.q) + span * speed, goes
         values = [np.array(part) for part in (*goal, *gains)]
         if servo is not None:
             law: Any = servo.command
@@ -92,7 +93,14 @@ class Balance:
         return values
 
     def judge(
-        self, before: RobotState, wanted: RobotState, q: np.ndarray, v: np.ndarray, torques: np.ndarray, time: float
+        self,
+        before: RobotState,
+        wanted: RobotState,
+        q: np.ndarray,
+        v: np.ndarray,
+        torques: np.ndarray,
+        time: float,
+        loads: np.ndarray | None = None,
     ) -> RobotState:
         """Return the state of a robot that moves so after a frame: whether it fell, and which motors give all.
 
@@ -103,6 +111,7 @@ class Balance:
             v: (nv,) how it moves.
             torques: (n,) of its motors [N m; N].
             time: [s].
+            loads: What bodies that the links hold did to it, as `LinkDynamics.loads` tells, or None.
         """
         span, fallen = time - before.time, before.fallen
         a = (v - before.v) / span if span > 0.0 else np.zeros_like(v)
@@ -120,7 +129,7 @@ class Balance:
                 fallen = f"{why} at t = {time:.2f} s"
                 if self._warns:
                     logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
-        return RobotState(time, q, v, a, torques, fallen, over)
+        return RobotState(time, q, v, a, torques, fallen, over, loads)
 
     def imagined(self, world: World) -> Balance:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
@@ -137,3 +146,12 @@ class Balance:
     def _standing(self, q: np.ndarray) -> tuple[bool, ...]:
         heights = self._soles(q)
         return tuple(bool(height < heights.min() + STANDS) for height in heights)
+
+
+def _forces(loads: np.ndarray | None) -> Any:
+    """Return loads on joints as Pinocchio takes them."""
+    if loads is None:
+        return None
+    found = pin.StdVec_Force()
+    found.extend([pin.Force(own) for own in loads])
+    return found

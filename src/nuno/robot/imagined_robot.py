@@ -139,10 +139,9 @@ class ImaginedRobot:
         if span <= 0.0:
             return
         if self.balance is not None:
-            loads = self.balance.dynamics.loads()
             told = [
-                self.balance.command(state, aim, span, self._servo, load)
-                for state, aim, load in zip(self._states, aims, loads, strict=True)
+                self.balance.command(state, aim, span, self._servo)
+                for state, aim in zip(self._states, aims, strict=True)
             ]
             self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
             return
@@ -165,9 +164,9 @@ class ImaginedRobot:
             ]
             return
         q, v = self.balance.dynamics.read()
-        torques = self.balance.dynamics.efforts_now()
+        torques, loads = self.balance.dynamics.efforts_now(), self.balance.dynamics.loads()
         for w, own in enumerate(self._motions):
-            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
+            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time, loads[w])
             self._states[w] = state
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()

@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
-from nuno.joints.joint_drives import Motor
+from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Rigid
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
@@ -31,6 +31,8 @@ SETTLES = 0.03
 """[s] In which a motor that follows a velocity comes to it,"""
 HOLDS = 0.1
 """[s] and to its position."""
+RUBS = 5e-3
+"""[rad/s or m/s] From which on a motor overcomes all of its joint's friction."""
 
 
 class LinkDynamics:
@@ -39,7 +41,9 @@ class LinkDynamics:
     Each joint of the model carries one rigid body, with the mass, centre of mass and inertia of all links that are
     fixed to it. The joints are hinges and sliders with the model's limits; a motor in each exerts
     ``stiffness (wanted - position) + damping (wanted velocity - velocity) + effort`` up to the effort limit, anew in
-    every substep. Links of one robot pass through each other. A robot without feet keeps its base where it is.
+    every substep. Joints rub and are damped as the model says. The effort limit is one of what arrives: a motor gives
+    what friction takes besides. Links of one robot pass through each other. A robot without feet keeps its base where
+    it is.
 
     Args:
         links: One body for each joint (``robot.enter(world, "joints")``).
@@ -50,6 +54,8 @@ class LinkDynamics:
         damping: (n,) likewise [N m s/rad; N s/m].
         soft: Stiffness and damping of motors that exert given efforts and follow velocities softly, (n,) each.
         efforts: (n,) the most that they exert [N m; N], infinite where the model has no limit.
+        joint_friction: (n,) up to which joints stick, and that brakes them as they move [N m; N]; as they are attached.
+        joint_damping: (n,) of what brakes them by their velocity [N m s/rad; N s/m]; likewise.
         joints: The joints while attached, in the order of ``joint_names``.
 
     Raises:
@@ -68,6 +74,8 @@ class LinkDynamics:
         self.stiffness = np.where(np.isfinite(self.efforts), self.efforts / FULL_EFFORT, inertia * 1e4)
         self.damping = 2.0 * np.sqrt(self.stiffness * inertia)
         self.soft = inertia / SETTLES / HOLDS, inertia / SETTLES
+        self.joint_friction = np.array(model.upperDryFrictionLimit[6:])
+        self.joint_damping = np.array(model.damping[6:])
         self._is_free = bool(self.robot.description.feet)
 
     @property
@@ -111,6 +119,7 @@ class LinkDynamics:
                 bodies[j - 1], bodies[int(model.parents[j]) - 1], point=placements[j].translation,
                 axis=placements[j].rotation @ axis, limits=None if turns else (lower[n], upper[n]),
                 position=angles[n] if is_slide else (angles[n] + np.pi) % (2.0 * np.pi) - np.pi, max_force=BEARS,
+                friction=self.joint_friction[n], spring=Spring(0.0, damping=self.joint_damping[n]),
             ))  # fmt: skip
         self.joints = tuple(joints)
         nothing = np.zeros(len(angles))
@@ -134,37 +143,73 @@ class LinkDynamics:
         effort: np.ndarray,
     ) -> None:  # fmt: skip
         """Set all motors: (n,) each, or (worlds, n)."""
+        most = self.efforts + self.joint_friction
         for n, joint in enumerate(self.joints):
             joint.motor = Motor(
-                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], self.efforts[n],
-                effort[..., n],
-            )  # fmt: skip
+                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], most[n], effort[..., n]
+            )
+
+    def overcome(self, velocities: np.ndarray) -> np.ndarray:
+        """Return what friction and damping take of joints that go at velocities [rad/s; m/s], of (n,) each."""
+        return self.joint_friction * np.clip(velocities / RUBS, -1.0, 1.0) + self.joint_damping * velocities
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
         robot, base, worlds = self.robot, self.bodies[0], self.world.world_count
-        place, turn = (np.atleast_2d(part) for part in base.pose())
+        moving = self.bodies if base.is_dynamic else self.bodies[1:]
+        places, turns, velocities, spins = self.world.rigid_motion(moving)
+        if not base.is_dynamic:
+            still = tuple(np.broadcast_to(part, (worlds, 1, len(np.ravel(part)))) for part in base.pose())
+            nothing = np.zeros((worlds, 1, 3))
+            places, turns, velocities, spins = (
+                np.concatenate(pair, axis=1)
+                for pair in zip((*still, nothing, nothing), (places, turns, velocities, spins), strict=True)
+            )
+        angles, rates = self._along(places, turns, velocities, spins)
         v = np.zeros((worlds, robot.model.nv))
-        v[:, 6:] = np.stack([np.broadcast_to(joint.velocity, (worlds,)) for joint in self.joints], axis=1)
-        if base.is_dynamic:
-            back = quat.inverse(turn)
-            spin = np.atleast_2d(base.angular_velocity)
-            arm = place - np.atleast_2d(base.centre_of_mass)
-            v[:, :3] = quat.rotate(back, np.atleast_2d(base.velocity) + np.cross(spin, arm))
-            v[:, 3:6] = quat.rotate(back, spin)
-        pose = np.broadcast_to(np.concatenate([place, np.roll(turn, -1, axis=1)], axis=1), (worlds, 7))
-        angles = np.stack([np.broadcast_to(joint.position, (worlds,)) for joint in self.joints], axis=1)
+        back = quat.inverse(turns[:, 0])
+        v[:, :3], v[:, 3:6] = quat.rotate(back, velocities[:, 0]), quat.rotate(back, spins[:, 0])
+        v[:, 6:] = rates
+        pose = np.concatenate([places[:, 0], np.roll(turns[:, 0], -1, axis=1)], axis=1)
         return np.stack([robot.configuration_of(a, own) for a, own in zip(angles, pose, strict=True)]), v
+
+    def _along(
+        self, places: np.ndarray, turns: np.ndarray, velocities: np.ndarray, spins: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions and velocities of the joints, (worlds, n) each, as they tell them themselves."""
+        model = self.robot.model
+        own = np.arange(1, len(self.joints) + 1)
+        other = np.array([int(model.parents[j]) - 1 for j in range(2, model.njoints)], dtype=int)
+        specs = [joint.spec for joint in self.joints]
+        place, turn, other_place, other_turn = (
+            np.stack([getattr(spec, name) for spec in specs], axis=1)
+            for name in ("place", "turn", "other_place", "other_turn")
+        )
+        its = quat.multiply(turns[:, other], other_turn)
+        point = places[:, own] + quat.rotate(turns[:, own], place)
+        other_point = places[:, other] + quat.rotate(turns[:, other], other_place)
+        axis = quat.rotate(its, np.broadcast_to((0.0, 0.0, 1.0), point.shape))
+        across = quat.multiply(quat.inverse(its), quat.multiply(turns[:, own], turn))
+        across = np.where(across[..., :1] < 0.0, -across, across)
+        slides = np.array([spec.kind == "slider" for spec in specs])
+        along = quat.rotate(quat.inverse(its), point - other_point)[..., 2]
+        speed = (
+            velocities[:, own] + np.cross(spins[:, own], point - places[:, own])
+            - velocities[:, other] - np.cross(spins[:, other], point - places[:, other])
+        )  # fmt: skip
+        motion = np.where(slides[:, None], speed, spins[:, own] - spins[:, other])
+        angles = np.where(slides, along, 2.0 * np.arctan2(across[..., 3], across[..., 0]))
+        return angles, np.einsum("wkx,wkx->wk", motion, axis)
 
     def efforts_now(self) -> np.ndarray:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
         worlds = self.world.world_count
         return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
 
-    def loads(self) -> list[Any]:
-        """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.
+    def loads(self) -> list[np.ndarray | None]:
+        """Return what bodies that links hold did to each joint in the last frame, by world; None where none is held.
 
-        Of each world.
+        (joints, 6) each, force [N] and torque [N m] in the frames of Pinocchio's joints.
         """
         index = {body: k for k, body in enumerate(self.bodies)}
         others = [body for body in self.world.bodies if body not in index]
@@ -172,9 +217,8 @@ class LinkDynamics:
         worlds = self.world.world_count
         if not held:
             return [None] * worlds
-        found = [pin.StdVec_Force() for _ in range(worlds)]
-        for own in found:
-            own.extend([pin.Force.Zero()] * self.robot.model.njoints)
+        found: list[np.ndarray | None] = []
+        found += [np.zeros((self.robot.model.njoints, 6)) for _ in range(worlds)]
         for k, grip in held:
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
             place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
@@ -182,7 +226,8 @@ class LinkDynamics:
                 arm = held_points(grip, w).mean(axis=0) - place[w]
                 back = quat.inverse(turn[w])
                 moment = torque[w] + np.cross(arm, force[w])
-                own[k + 1] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
+                assert own is not None
+                own[k + 1] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
         return found
 
     def imagined(self, world: World) -> LinkDynamics:

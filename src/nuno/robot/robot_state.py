@@ -24,6 +24,8 @@ class RobotState:
             need more than that, by inverse dynamics with all that the links bear.
         unbalanced: Of a robot without dynamics, that its zero moment point is not under its soles; None where it is.
         collision: Of a robot without dynamics, what its motion would run into, or was stopped by; None for nothing.
+        loads: (joints, 6) float [N, N m], what bodies that its links hold did to Pinocchio's joints in the last frame,
+            in their own frames, where the robot has dynamics and holds any; None else.
     """
 
     time: float
@@ -35,3 +37,4 @@ class RobotState:
     over_torque: tuple[str, ...] = ()
     unbalanced: Unbalance | None = None
     collision: Collision | None = None
+    loads: np.ndarray | None = None

@@ -314,9 +314,7 @@ class SimulatedRobot(SimulatedBody):
             self.servo(None)
             aim = self._motion.begin(end, span)
         if self.balance is not None and self.is_dynamic:
-            loads = self.balance.dynamics.loads()[0]
-            command = self.balance.command(self._state, aim, span, self._servo, loads)
-            self.balance.dynamics.drive(*command)
+            self.balance.dynamics.drive(*self.balance.command(self._state, aim, span, self._servo))
             return
         self._state = aim
         if not (aim.q == before.q).all():
@@ -330,7 +328,8 @@ class SimulatedRobot(SimulatedBody):
         if self.balance is not None and self.is_dynamic:
             q, v = (values[0] for values in self.balance.dynamics.read())
             torques = self.balance.dynamics.efforts_now()[0]
-            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time)
+            loads = self.balance.dynamics.loads()[0]
+            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time, loads)
             angles = self.actual.angles_of(q)
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])

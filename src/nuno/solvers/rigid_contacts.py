@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from nuno.rigid.manifold import POINTS
@@ -26,6 +28,14 @@ class RigidContacts(RigidArrays):
     def velocity(self, slot: int) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] of the centre of mass and angular velocity [rad/s], (worlds, 3) each, world frame."""
         return self._read("velocity", slot).astype(float), self._read("spin", slot).astype(float)
+
+    def motions(self, slots: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return `pose` and `velocity` of several slots, read at once: (worlds, slots, 3 or 4) each."""
+        rows = []
+        for name in ("position", "rotation", "velocity", "spin"):
+            whole = getattr(self.state, name).numpy().reshape(self.world_count, self.state.capacity, -1)
+            rows.append(whole[:, list(slots)].astype(float))
+        return rows[0] + self.origin[:, None], np.roll(rows[1], 1, axis=-1), rows[2], rows[3]
 
     def contacts_of(self, slot: int, world: int = 0) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
         """Return what touches a body: (slot of the other, points (n, 3) [m], normals (n, 3), forces (n, 3) [N]).

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import ParticleDynamics
-from nuno.errors import BodyStateError
+from nuno.errors import BodyStateError, InvalidInputError
+from nuno.materials import Rigid
 from nuno.validation import flag
 from nuno.world.saving import Saving
 
@@ -60,6 +62,29 @@ class Reading(Saving):
             np.add.at(total, found.worlds, found.forces)
             force: Any = wp.array(total, dtype=wp.vec3, device=self.device)
             return force
+
+    def rigid_motion(self, bodies: Sequence[Body | str]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return where dynamic rigid bodies are and how they move, read at once: (worlds, bodies, 3 or 4) each.
+
+        Positions [m] and quaternions (w, x, y, z) are those of ``body.pose()``, the velocities [m/s] those of that
+        position, beside angular velocities [rad/s] in the world's frame.
+
+        Raises:
+            BodyStateError: a body is static.
+            InvalidInputError: a body deforms, or none that can be gone through is given.
+        """
+        with self._call():
+            if isinstance(bodies, str | Body) or not isinstance(bodies, Iterable):
+                raise InvalidInputError(f"bodies must be several, a list or tuple, got {type(bodies).__name__}")
+            own = [self._own(body) for body in bodies]
+            for body in own:
+                if not body.is_dynamic:
+                    raise BodyStateError(f"{body.name!r} is static; its pose() and path say where it is")
+                if not isinstance(body.material, Rigid):
+                    raise InvalidInputError(f"{body.name!r} deforms; state() tells its vertices")
+            if self._rigid is None:
+                return tuple(np.zeros((self.world_count, 0, k)) for k in (3, 4, 3, 3))  # type: ignore[return-value]
+            return self._rigid.motions(own)
 
     def state(self, body: Body | str, copy: bool = True) -> dict[str, DeviceArray]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.
