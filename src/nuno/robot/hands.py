@@ -10,6 +10,7 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.materials import Rigid
 from nuno.robot.description import HandOnFrame
 from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
@@ -128,8 +129,7 @@ class Hand:
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
-                    rigid = body._dynamics is not None and body._dynamics.is_rigid
-                    ignored = self._shapes if rigid else None
+                    ignored = self._shapes if isinstance(body.material, Rigid) else None
                     self._grips.append(world.grip(body, where, to=self.body, ignore=ignored))
         return self.held
 
@@ -158,7 +158,7 @@ class Hand:
         local = frame.to_local(body.vertices)
         if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
             return False
-        rigid = body._dynamics is not None and body._dynamics.is_rigid
+        rigid = isinstance(body.material, Rigid)
         inside = np.flatnonzero(((local >= low) & (local <= high)).all(axis=1))
         if len(inside):
             return None if rigid else inside

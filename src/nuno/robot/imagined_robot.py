@@ -149,9 +149,13 @@ class ImaginedRobot:
             return
         q, v = self.balance.dynamics.read()
         torques = self.balance.dynamics.efforts_now()
-        for w, own in enumerate(self._motions):
-            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
-            self._states[w] = state
+        span = self.world.time - self._before[0].time
+        states = [
+            self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
+            for w, own in enumerate(self._motions)
+        ]
+        self._states = self.balance.dynamics.felt(states, span)
+        for own, state in zip(self._motions, self._states, strict=True):
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()
 

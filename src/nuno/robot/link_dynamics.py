@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,12 +16,15 @@ from nuno.joints.joint_drives import Motor
 from nuno.materials import Rigid
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
+from nuno.world.contact_points import frame_impulses
+from nuno.world.joint_loads import joint_loads
 from nuno.world.make_joints import hinge, slider
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.joints.grip import Grip
     from nuno.robot.links import Links
+    from nuno.robot.robot_state import RobotState
     from nuno.world.world import World
 
 FULL_EFFORT = 0.01
@@ -158,8 +162,26 @@ class LinkDynamics:
 
     def efforts_now(self) -> np.ndarray:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
-        worlds = self.world.world_count
-        return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
+        return joint_loads(self.world, self.joints)[1]
+
+    def felt(self, states: Sequence[RobotState], span: float) -> list[RobotState]:
+        """Return the states of the robot's copies with what joints bore and links touched over the last frame.
+
+        Args:
+            states: Of each world, where the robot is now.
+            span: [s] of the frame.
+        """
+        wrenches, _ = joint_loads(self.world, self.joints)
+        impulses = frame_impulses(self.world, self.bodies)
+        names, found = self.links.names, []
+        for w, state in enumerate(states):
+            contacts: dict[str, dict[str, np.ndarray]] = {}
+            for name, own in zip(names, impulses, strict=True):
+                for other, impulse in own.items():
+                    if impulse[w].any():
+                        contacts.setdefault(name, {})[other] = impulse[w] / span
+            found.append(replace(state, contacts=contacts, joint_wrenches=wrenches[w]))
+        return found
 
     def loads(self) -> list[Any]:
         """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.

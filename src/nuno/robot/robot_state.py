@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +20,10 @@ class RobotState:
         torques: (n,) float [N m; N], of the joints' motors, where the robot has dynamics; None else.
         fallen: Why and when the robot fell, where it has dynamics and did; None else.
         over_torque: Names of joints whose motors gave all that they can.
+        contacts: Where the robot has dynamics, what touched each link: by link and by the other body's name, the force
+            (3,) [N] on the link in the world's axes, the mean over the last frame.
+        joint_wrenches: (n, 6) float [N, N m], where the robot has dynamics, force and torque of what each joint carries
+            on the link before, about the joint and in the world's axes, the mean over the last frame; None else.
     """
 
     time: float
@@ -28,3 +33,5 @@ class RobotState:
     torques: np.ndarray | None = None
     fallen: str | None = None
     over_torque: tuple[str, ...] = ()
+    contacts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    joint_wrenches: np.ndarray | None = None

@@ -316,7 +316,9 @@ class SimulatedRobot(SimulatedBody):
         if self.balance is not None and self.is_dynamic:
             q, v = (values[0] for values in self.balance.dynamics.read())
             torques = self.balance.dynamics.efforts_now()[0]
-            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time)
+            before, aim = self._state, self._motion.aim
+            state = self.balance.judge(before, aim, q, v, torques, self.world.time)
+            self._state = self.balance.dynamics.felt((state,), state.time - before.time)[0]
             angles = self.actual.angles_of(q)
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
