@@ -1,7 +1,7 @@
 """Two fingers that press with given forces hold what is between them by friction alone, up to Coulomb's bound.
 
-A palm slides up and down; of two fingers one stays where it is in the palm, and the other slides towards it by a motor of
-limited force F. What they press stays where it is between them as long as 2 mu F > m (g + a), and slides else.
+A palm slides up and down; of two fingers one stays where it is in the palm, and the other slides towards it by a motor
+of limited force F. What they press stays where it is between them as long as 2 mu F > m (g + a), and slides else.
 """
 
 import numpy as np

@@ -132,6 +132,7 @@ class ImaginedRobot:
                 for state, aim, load in zip(self._states, aims, loads, strict=True)
             ]
             self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
+            self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
             return
         moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
         if moved:
@@ -167,7 +168,7 @@ class ImaginedRobot:
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
-        joints = () if self.balance is None else self.balance.dynamics.joints
+        joints = () if self.balance is None else self.balance.dynamics.save()
         return list(self._states), [own.save() for own in self._motions], joints, self._servo
 
     def load(self, saved: Any) -> None:
@@ -177,7 +178,7 @@ class ImaginedRobot:
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
         if self.balance is not None:
-            self.balance.dynamics.joints = joints
+            self.balance.dynamics.load(joints)
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot | None:
         """Return the copies of one world's robot in a batch that was imagined from that world; None without links."""

@@ -14,6 +14,7 @@ from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import Motor
 from nuno.materials import Rigid
+from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
 from nuno.world.contact_points import frame_impulses
@@ -55,6 +56,7 @@ class LinkDynamics:
         soft: Stiffness and damping of motors that exert given efforts and follow velocities softly, (n,) each.
         efforts: (n,) the most that they exert [N m; N], infinite where the model has no limit.
         joints: The joints while attached, in the order of ``joint_names``.
+        fingers: Fingers that slide.
 
     Raises:
         InvalidInputError: links that are not one for each joint.
@@ -73,6 +75,7 @@ class LinkDynamics:
         self.damping = 2.0 * np.sqrt(self.stiffness * inertia)
         self.soft = inertia / SETTLES / HOLDS, inertia / SETTLES
         self._is_free = bool(self.robot.description.feet)
+        self.fingers = FingerDynamics(links, self.efforts)
 
     @property
     def is_attached(self) -> bool:
@@ -91,16 +94,17 @@ class LinkDynamics:
         world, model, bodies = self.world, self.robot.model, self.links.bodies
         angles = self.robot.angle_vector()
         placements = self.robot.update().oMi
-        for k, body in enumerate(bodies):
+        for k, body in enumerate(bodies[: model.njoints - 1]):
             if k == 0 and not self._is_free:
                 continue
-            own = model.inertias[k + 1]
-            inertia = _possible(np.array(own.inertia), float(own.mass))
+            own = self.fingers.left(k + 1, model.inertias[k + 1])
+            inertia = possible_inertia(np.array(own.inertia), float(own.mass))
             world.attach(
                 body, Rigid(
                     mass=max(float(own.mass), 1e-3), inertia=inertia, centre_of_mass=own.lever, friction=self.friction
                 ),
             )  # fmt: skip
+        self.fingers.attach(self.friction)
         for k, body in enumerate(bodies):
             for other in bodies[:k]:
                 world.ignore_contact(body, other)
@@ -119,6 +123,7 @@ class LinkDynamics:
         self.joints = tuple(joints)
         nothing = np.zeros(len(angles))
         self.drive(angles, nothing, self.stiffness, self.damping, nothing)
+        self.lead_fingers(angles)
 
     def detach(self) -> None:
         """Take the dynamics away: the links stand still where they are, and their joints go.
@@ -131,7 +136,7 @@ class LinkDynamics:
         for body in self.links.bodies:
             if body.is_dynamic:
                 self.world.detach(body)
-        self.joints = ()
+        self.joints = self.fingers.joints = ()
 
     def drive(
         self, positions: np.ndarray, velocities: np.ndarray, stiffness: np.ndarray, damping: np.ndarray,
@@ -143,6 +148,14 @@ class LinkDynamics:
                 velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], self.efforts[n],
                 effort[..., n],
             )  # fmt: skip
+
+    def lead_fingers(self, wanted: np.ndarray) -> None:
+        """Lead fingers that slide for a frame, as all joints (n,) or (worlds, n) are wanted, after ``drive``.
+
+        The joints of their hands go where the fingers are.
+        """
+        for row, angle in self.fingers.lead(wanted).items():
+            self.joints[row].motor = Motor(0.0, angle, self.stiffness[row], self.damping[row], self.efforts[row])
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
@@ -198,34 +211,39 @@ class LinkDynamics:
         for own in found:
             own.extend([pin.Force.Zero()] * self.robot.model.njoints)
         for k, grip in held:
+            joint = self.links.joints[k]
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
-            place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
+            place, turn = (np.atleast_2d(part) for part in self.bodies[joint - 1].pose())
             for w, own in enumerate(found):
                 arm = held_points(grip, w).mean(axis=0) - place[w]
                 back = quat.inverse(turn[w])
                 moment = torque[w] + np.cross(arm, force[w])
-                own[k + 1] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
+                own[joint] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
         return found
 
     def imagined(self, world: World) -> LinkDynamics:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
         made = copy.copy(self)
         made.world, made.bodies = world, tuple(world.find(body.name) for body in self.bodies)
-        keys = {grip.key: grip for grip in _grips_of(made.bodies)}
-        made.joints = tuple(keys[joint.key] for joint in self.joints)  # type: ignore[misc]
+        keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(made.bodies)}
+        made.joints = tuple(keys[joint.key] for joint in self.joints)
+        made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
+
+    def save(self) -> tuple[Any, ...]:
+        """Return its joints and how hard its fingers press, for ``load``."""
+        fingers = self.fingers
+        return self.joints, fingers.joints, dict(fingers.forces), dict(fingers.closed)
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Become what it was when a snapshot was taken."""
+        self.joints, self.fingers.joints, forces, closed = saved
+        self.fingers.forces, self.fingers.closed = dict(forces), dict(closed)
 
 
 def _grips_of(bodies: Iterable[Body]) -> list[Grip]:
     """Return what holds bodies, joints included."""
     return [grip for body in bodies if body._dynamics is not None for grip in body._dynamics.grips]
-
-
-def _possible(inertia: np.ndarray, mass: float) -> np.ndarray:
-    """The nearest inertia that a mass can have: positive moments, none above the sum of the others."""
-    moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
-    spread = np.maximum(0.5 * moments.sum() - moments, 1e-9 + 1e-7 * mass)
-    return np.asarray(axes @ np.diag(spread.sum() - spread) @ axes.T)
 
 
 def _axis_of(joint: Any) -> tuple[bool, np.ndarray]:

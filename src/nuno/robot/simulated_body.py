@@ -15,8 +15,10 @@ from nuno.validation import checked
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.gait import Gait
+    from nuno.robot.hands import Hand
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
+    from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
 
@@ -28,12 +30,16 @@ class SimulatedBody(SimulatedSenses):
         links: Its links in the world.
         joints: Its joints and controllers.
         gait: Its walks.
+        hands: Its hands, by name.
+        grippers: What closes them, likewise.
         balance: Its dynamics; None where its links are one body for each shape.
     """
 
     links: Links
     joints: SimulatedJoints
     gait: Gait
+    hands: dict[str, Hand]
+    grippers: dict[str, SimulatedGripper]
     balance: Balance | None
     wanted: Humanoid
     _motion: WantedMotion
@@ -57,6 +63,8 @@ class SimulatedBody(SimulatedSenses):
             )
         with self.world.lock:
             self.balance.dynamics.attach()
+            for gripper in self.grippers.values():
+                gripper.press_again()
             self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
 
     def detach(self) -> None:
@@ -68,7 +76,10 @@ class SimulatedBody(SimulatedSenses):
         with self.world.lock:
             if self.balance is None or not self.is_dynamic:
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
+            pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
             self.balance.dynamics.detach()
+            for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
+                self.hands[name].close([body for body in bodies if body.is_dynamic])
             self._arrive_within(ARRIVED)
             self._start_from(self.actual.configuration())
 
