@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, RobotModelError
 from nuno.robot.pinocchio import pin
 from nuno.robot.placement import frame_called
 
@@ -81,7 +81,10 @@ def fingers_of(robot: Humanoid) -> tuple[Finger, ...]:
         for links in grasp.fingers:
             inertia, places = pin.Inertia.Zero(), []  # Pinocchio has a link's at the frame of the joint that fixes it
             for link in links:
-                own = model.frames[frame_called(model, link)]
+                number = frame_called(model, link)
+                if number >= model.nframes:
+                    raise RobotModelError(f"{robot.name!r} has no link {link!r} to be a finger of {name!r}")
+                own = model.frames[number]
                 if own.parentJoint != frame.parentJoint:
                     raise InvalidInputError(
                         f"the finger {link!r} of {name!r} moves with {model.names[own.parentJoint]!r}; only links that "
