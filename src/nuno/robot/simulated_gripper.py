@@ -81,7 +81,8 @@ class SimulatedGripper:
 
     def end_frame(self) -> None:
         """Take hold where the fingers have closed, and end the goal where they have come to rest."""
-        self.hand.feel()
+        if self._fingers is not None:
+            self.hand.feel()
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return
