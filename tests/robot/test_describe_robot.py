@@ -131,7 +131,7 @@ def test_a_single_arm(tmp_path):
         "rarm_controller": ("j1", "j2", "j3"), "rhand_controller": ("finger_l_joint", "finger_r_joint")
     }  # fmt: skip
     ri = nuno.SimulatedRobot(robot, nuno.World(device="cpu"))
-    assert ri.start_grasp("rarm") == [True]
+    assert ri.start_grasp("rarm") == [False]  # there is nothing to hold
     assert ri.angle_vector()[robot.joint_index("finger_l_joint")] == pytest.approx(0.0, abs=1e-3)
 
 

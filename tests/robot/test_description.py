@@ -93,7 +93,7 @@ def test_a_table_may_say_nothing_of_hands_legs_and_sensors(tmp_path):
         hands.right_hand = { low = [-0.1, -0.1, -0.1], high = [0.1, 0.1, 0.1] }
     """)
     robot = nuno.SimulatedRobot(nuno.Humanoid("stick", robots=tmp_path / "mine.toml"), nuno.World(device="cpu"))
-    assert robot.start_grasp() == [True] and robot.stop_grasp("rarm") == [True]
+    assert robot.start_grasp() == [False] and robot.stop_grasp("rarm") == [True]  # there is nothing to hold
     with pytest.raises(UnknownNameError, match="left_hand"):
         robot.start_grasp("larm")
     with pytest.raises(RobotModelError, match="no force sensors in its legs"):

@@ -129,7 +129,7 @@ class Balance:
                 fallen = f"{why} at t = {time:.2f} s"
                 if self._warns:
                     logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
-        return RobotState(time, q, v, a, torques, fallen, over, loads)
+        return RobotState(time, q, v, a, torques, fallen, over, loads=loads)
 
     def imagined(self, world: World) -> Balance:
         """Return the same for the copies of the links in a batch that was imagined from their world."""

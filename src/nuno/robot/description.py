@@ -80,6 +80,7 @@ class HandOnFrame:
         open: The joint's position when the hand is open [rad or m].
         closed: Likewise when the fingers meet.
         width: How far apart the open fingers are [m]; 0 of a hand without fingers.
+        fingers: Links of each finger that the model fixes to the hand, and that slides as the joint closes it.
     """
 
     low: np.ndarray
@@ -88,6 +89,7 @@ class HandOnFrame:
     open: float = 0.0
     closed: float = 0.0
     width: float = 0.0
+    fingers: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -220,12 +222,14 @@ def _hand(role: str, given: dict[str, Any]) -> HandOnFrame:
         raise InvalidInputError(f"the volume of {role!r} needs low below high, got {low} and {high}")
     joint = given.get("joint")
     opened, closed = (number(f"{role} {end}", given[end] if joint else 0.0) for end in ("open", "closed"))
-    return HandOnFrame(low, high, joint, opened, closed, number(f"{role} width", given.get("width", 0.0), low=0.0))
+    width = number(f"{role} width", given.get("width", 0.0), low=0.0)
+    fingers = tuple(_joints(f"fingers of {role}", links) for links in given.get("fingers", []))
+    return HandOnFrame(low, high, joint, opened, closed, width, fingers)
 
 
 def _joints(group: str, given: Any) -> tuple[str, ...]:
     if not isinstance(given, list) or not all(isinstance(joint, str) for joint in given):
-        raise InvalidInputError(f"the group {group!r} must be a list of joints, got {given!r}")
+        raise InvalidInputError(f"the group {group!r} must be a list of names, got {given!r}")
     return tuple(given)
 
 

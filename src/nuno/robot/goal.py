@@ -57,6 +57,7 @@ class Goal:
         code: How it ended, a ``ResultCode`` where it is a trajectory; None until then.
         text: What went wrong, "" where nothing did.
         feedback: What was last told of it, None before that.
+        holds: Of a hand's goal, whether the hand holds something; None until it ended, and where nobody told.
     """
 
     def __init__(self, asked: Any = None, name: str | None = None) -> None:
@@ -66,6 +67,7 @@ class Goal:
         self.code: int | None = None
         self.text = ""
         self.feedback: Any = None
+        self.holds: bool | None = None
 
     def __repr__(self) -> str:
         return f"<Goal {self.name!r}, {self.status.name.lower()}{f': {self.text}' if self.text else ''}>"
@@ -74,6 +76,7 @@ class Goal:
         """Return another goal of the same name that stands where this one stands."""
         made = Goal(self.asked, self.name)
         made.status, made.code, made.text, made.feedback = self.status, self.code, self.text, self.feedback
+        made.holds = self.holds
         return made
 
     @property

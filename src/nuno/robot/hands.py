@@ -10,18 +10,22 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.materials import Rigid
+from nuno.robot.closing_gap import closing_gap
 from nuno.robot.description import HandOnFrame
+from nuno.robot.fingers import CLOSING
 from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
 from nuno.shapes.surface import SurfacePoints
 from nuno.validation import checked, number
+from nuno.world.contact_points import frame_impulses
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
 
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
-FINGERS = 1
+FINGERS = CLOSING
 """The axis of a hand's frame along which its fingers close."""
 
 
@@ -32,6 +36,9 @@ class Hand:
     opens. A cloth or soft body is gripped by its vertices in the closing volume, or, where it is so coarse that none is
     in it, by the nearest points of its surface; a rigid body as a whole. The joint that shows the fingers closed moves
     on its own (``joint_angles``), as do fingers that hold by friction alone.
+
+    Where the robot has dynamics and the description tells the hand's fingers, nothing is gripped: the fingers press on
+    what is between them and hold it by friction, or do not (``presses``).
 
     Args:
         links: The robot's links in the world.
@@ -54,6 +61,8 @@ class Hand:
         self.body, self._offset = carrier(links, name)
         self._shapes = carried_by(links, self.body)
         self._grips: list[Grip] = []
+        self._fingers = [[links.bodies[k] for k in own] for own in links.finger_bodies.of_hand(name)]
+        self.pressed: tuple[Body, ...] = ()  # in the last frame, by all fingers
 
     def __repr__(self) -> str:
         held = ", ".join(body.name for body in self.held) or "nothing"
@@ -66,8 +75,28 @@ class Hand:
 
     @property
     def held(self) -> tuple[Body, ...]:
-        """The bodies that it holds."""
+        """The bodies that it holds: what it grips, or what all its fingers pressed on in the last frame."""
+        if self.presses:
+            return tuple(body for body in self.pressed if body in self.links.world.bodies)
         return tuple(grip.body for grip in self.grips)
+
+    @property
+    def presses(self) -> bool:
+        """Return True if it holds by its fingers' friction alone, and grips nothing."""
+        return bool(self._fingers) and self.body.is_dynamic
+
+    def feel(self) -> None:
+        """Take note of what the fingers pressed on in the frame that ended; nothing where the hand does not press."""
+        self.pressed = ()
+        if self.presses:
+            world = self.links.world
+            touched = frame_impulses(world, [body for own in self._fingers for body in own])
+            of_fingers, first = [], 0
+            for own in self._fingers:
+                of_fingers.append({name for found in touched[first : first + len(own)] for name in found})
+                first += len(own)
+            names = set.intersection(*of_fingers)
+            self.pressed = tuple(b for b in world.bodies if b.name in names and b not in self.links.bodies)
 
     @property
     def width(self) -> float:
@@ -110,7 +139,7 @@ class Hand:
     def close(self, bodies: Sequence[Body | str] | None = None, *, width: float | None = None) -> tuple[Body, ...]:
         """Grip what is in the closing volume, and return the bodies that are held: none where it is empty.
 
-        What the hand held before it lets go first.
+        What the hand gripped before it lets go first. A hand that ``presses`` grips nothing.
 
         Args:
             bodies: Dynamic bodies that it may take; None are all.
@@ -122,16 +151,42 @@ class Hand:
         world = self.links.world
         with world.lock:
             self.open()
+            if self.presses:
+                return self.held
             frame = Coordinates(*compose(self.body.pose(), self._offset))  # where the body is, not where it is sent
             others = [b for b in world.bodies if b.is_dynamic and b not in self.links.bodies]
             chosen = others if bodies is None else [world._own(b) for b in bodies]
             for body in chosen:
                 where = self._inside(body, frame, width)
                 if where is not False:
-                    rigid = body._dynamics is not None and body._dynamics.is_rigid
-                    ignored = self._shapes if rigid else None
+                    ignored = self._shapes if isinstance(body.material, Rigid) else None
                     self._grips.append(world.grip(body, where, to=self.body, ignore=ignored))
         return self.held
+
+    @checked
+    def gap(self, force: float = np.inf) -> float:
+        """Return how far apart the fingers stay [m] where they close on what is in the closing volume now.
+
+        By the shapes and materials of dynamic bodies; 0 where there is none.
+
+        Args:
+            force: With which they press [N]; no more than the joint's effort gives.
+        """
+        world, robot, joint = self.links.world, self.links.robot, self.description.joint
+        if joint is None:
+            return 0.0
+        own = self.description
+        limit = robot.effort_limits[robot.joint_index(joint)] * abs(own.closed - own.open) / max(own.width, 1e-9)
+        force = min(force, float(limit) if limit > 0.0 else np.inf)
+        with world.lock:
+            frame, found = Coordinates(*compose(self.body.pose(), self._offset)), 0.0
+            low, high = self.volume(self.width)
+            for body in world.bodies:
+                if body.is_dynamic and body not in self.links.bodies:
+                    local = frame.to_local(body.vertices)
+                    if not ((local.max(axis=0) < low).any() or (local.min(axis=0) > high).any()):
+                        found = max(found, closing_gap(body, local, low, high, FINGERS, force))
+        return min(found, self.width)
 
     def open(self) -> None:
         """Let go of everything: what was held moves on as if it had never been."""
@@ -158,7 +213,7 @@ class Hand:
         local = frame.to_local(body.vertices)
         if (local.max(axis=0) < low).any() or (local.min(axis=0) > high).any():
             return False
-        rigid = body._dynamics is not None and body._dynamics.is_rigid
+        rigid = isinstance(body.material, Rigid)
         inside = np.flatnonzero(((local >= low) & (local <= high)).all(axis=1))
         if len(inside):
             return None if rigid else inside

@@ -144,6 +144,7 @@ class ImaginedRobot:
                 for state, aim in zip(self._states, aims, strict=True)
             ]
             self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
+            self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
             return
         moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
         if moved:
@@ -165,9 +166,13 @@ class ImaginedRobot:
             return
         q, v = self.balance.dynamics.read()
         torques, loads = self.balance.dynamics.efforts_now(), self.balance.dynamics.loads()
-        for w, own in enumerate(self._motions):
-            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time, loads[w])
-            self._states[w] = state
+        span = self.world.time - self._before[0].time
+        states = [
+            self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time, loads[w])
+            for w, own in enumerate(self._motions)
+        ]
+        self._states = self.balance.dynamics.felt(states, span)
+        for own, state in zip(self._motions, self._states, strict=True):
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()
 
@@ -179,7 +184,7 @@ class ImaginedRobot:
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
-        joints = () if self.balance is None else self.balance.dynamics.joints
+        joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
         return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
 
@@ -192,7 +197,7 @@ class ImaginedRobot:
         for guard, own in zip(self._guards, found, strict=True):
             guard.load(own)
         if self.balance is not None:
-            self.balance.dynamics.joints = joints
+            self.balance.dynamics.load(joints)
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot | None:
         """Return the copies of one world's robot in a batch that was imagined from that world; None without links."""

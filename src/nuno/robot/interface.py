@@ -41,7 +41,7 @@ class RobotInterface(BaseInterface):
         Args:
             hand: Which.
             position: How far it is to be open, from 0 (closed) to 1.
-            effort: At most [N; N m for hinges].
+            effort: At most [N]: how hard the fingers press on what is between them.
         """
 
     @abstractmethod
@@ -87,23 +87,16 @@ class RobotInterface(BaseInterface):
         Raises:
             UnknownNameError: another arm.
         """
-        opening = number("pos", pos, low=0.0, high=1.0)
-        force = number("effort", effort, above=0.0)
-        if arm not in ARMS:
-            raise UnknownNameError("arm", arm, list(ARMS))
-        known = self.robot.description.hands
-        # a robot with one hand has "arms" too; one whose description names none may have them all the same
-        hands = [hand for hand in ARMS[arm] if arm != "arms" or hand in known or not known]
-        goals = [self.send_gripper(hand, opening, force) for hand in hands]
-        if not wait:
-            return []
-        self.wait_until(lambda: all(goal.is_done for goal in goals))
-        return [goal.succeeded or ignore_stall for goal in goals]
+        return [goal.succeeded or ignore_stall for goal in self._move_hands(arm, pos, effort, wait)]
 
     @checked
     def start_grasp(self, arm: str = "arms", effort: float = 25, wait: bool = True) -> list[bool]:
-        """Close a hand on what is in it; see ``move_gripper``. A hand that something stops has done its work."""
-        return self.move_gripper(arm, 0.0, effort, wait, ignore_stall=True)
+        """Close a hand on what is in it; see ``move_gripper``.
+
+        Returns:
+            Of each hand, whether it holds something now, False where it closed on nothing; empty without ``wait``.
+        """
+        return [goal.holds is True for goal in self._move_hands(arm, 0.0, effort, wait)]
 
     @checked
     def stop_grasp(self, arm: str = "arms", effort: float = 25, wait: bool = True) -> list[bool]:
@@ -169,6 +162,21 @@ class RobotInterface(BaseInterface):
         return point if wrt == "world" else quat.rotate(quat.inverse(turn), point - place)
 
     # Inside
+
+    def _move_hands(self, arm: str, pos: float, effort: float, wait: bool) -> list[Goal]:
+        """Send hands their goals, and return these once all have ended; none without ``wait``."""
+        opening = number("pos", pos, low=0.0, high=1.0)
+        force = number("effort", effort, above=0.0)
+        if arm not in ARMS:
+            raise UnknownNameError("arm", arm, list(ARMS))
+        known = self.robot.description.hands
+        # a robot with one hand has "arms" too; one whose description names none may have them all the same
+        hands = [hand for hand in ARMS[arm] if arm != "arms" or hand in known or not known]
+        goals = [self.send_gripper(hand, opening, force) for hand in hands]
+        if not wait:
+            return []
+        self.wait_until(lambda: all(goal.is_done for goal in goals))
+        return goals
 
     def _beyond(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Return what bears the foot beyond a sensor (3,) [N], at rest, and the foot's centre of mass (3,) [m]."""

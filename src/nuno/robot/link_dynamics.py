@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +14,18 @@ from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Rigid
+from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
+from nuno.world.contact_points import frame_impulses
+from nuno.world.joint_loads import joint_loads
 from nuno.world.make_joints import hinge, slider
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.joints.grip import Grip
     from nuno.robot.links import Links
+    from nuno.robot.robot_state import RobotState
     from nuno.world.world import World
 
 FULL_EFFORT = 0.01
@@ -57,6 +62,7 @@ class LinkDynamics:
         joint_friction: (n,) up to which joints stick, and that brakes them as they move [N m; N]; as they are attached.
         joint_damping: (n,) of what brakes them by their velocity [N m s/rad; N s/m]; likewise.
         joints: The joints while attached, in the order of ``joint_names``.
+        fingers: Fingers that slide.
 
     Raises:
         InvalidInputError: links that are not one for each joint.
@@ -77,6 +83,7 @@ class LinkDynamics:
         self.joint_friction = np.array(model.upperDryFrictionLimit[6:])
         self.joint_damping = np.array(model.damping[6:])
         self._is_free = bool(self.robot.description.feet)
+        self.fingers = FingerDynamics(links, self.efforts)
 
     @property
     def is_attached(self) -> bool:
@@ -95,16 +102,17 @@ class LinkDynamics:
         world, model, bodies = self.world, self.robot.model, self.links.bodies
         angles = self.robot.angle_vector()
         placements = self.robot.update().oMi
-        for k, body in enumerate(bodies):
+        for k, body in enumerate(bodies[: model.njoints - 1]):
             if k == 0 and not self._is_free:
                 continue
-            own = model.inertias[k + 1]
-            inertia = _possible(np.array(own.inertia), float(own.mass))
+            own = self.fingers.left(k + 1, model.inertias[k + 1])
+            inertia = possible_inertia(np.array(own.inertia), float(own.mass))
             world.attach(
                 body, Rigid(
                     mass=max(float(own.mass), 1e-3), inertia=inertia, centre_of_mass=own.lever, friction=self.friction
                 ),
             )  # fmt: skip
+        self.fingers.attach(self.friction)
         for k, body in enumerate(bodies):
             for other in bodies[:k]:
                 world.ignore_contact(body, other)
@@ -124,6 +132,7 @@ class LinkDynamics:
         self.joints = tuple(joints)
         nothing = np.zeros(len(angles))
         self.drive(angles, nothing, self.stiffness, self.damping, nothing)
+        self.lead_fingers(angles)
 
     def detach(self) -> None:
         """Take the dynamics away: the links stand still where they are, and their joints go.
@@ -136,7 +145,7 @@ class LinkDynamics:
         for body in self.links.bodies:
             if body.is_dynamic:
                 self.world.detach(body)
-        self.joints = ()
+        self.joints = self.fingers.joints = ()
 
     def drive(
         self, positions: np.ndarray, velocities: np.ndarray, stiffness: np.ndarray, damping: np.ndarray,
@@ -152,6 +161,15 @@ class LinkDynamics:
     def overcome(self, velocities: np.ndarray) -> np.ndarray:
         """Return what friction and damping take of joints that go at velocities [rad/s; m/s], of (n,) each."""
         return self.joint_friction * np.clip(velocities / RUBS, -1.0, 1.0) + self.joint_damping * velocities
+
+    def lead_fingers(self, wanted: np.ndarray) -> None:
+        """Lead fingers that slide for a frame, as all joints (n,) or (worlds, n) are wanted, after ``drive``.
+
+        The joints of their hands go where the fingers are.
+        """
+        for row, angle in self.fingers.lead(wanted).items():
+            most = self.efforts[row] + self.joint_friction[row]
+            self.joints[row].motor = Motor(0.0, angle, self.stiffness[row], self.damping[row], most)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
@@ -203,8 +221,26 @@ class LinkDynamics:
 
     def efforts_now(self) -> np.ndarray:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
-        worlds = self.world.world_count
-        return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
+        return joint_loads(self.world, self.joints)[1]
+
+    def felt(self, states: Sequence[RobotState], span: float) -> list[RobotState]:
+        """Return the states of the robot's copies with what joints bore and links touched over the last frame.
+
+        Args:
+            states: Of each world, where the robot is now.
+            span: [s] of the frame.
+        """
+        wrenches, _ = joint_loads(self.world, self.joints)
+        impulses = frame_impulses(self.world, self.bodies)
+        names, found = self.links.names, []
+        for w, state in enumerate(states):
+            contacts: dict[str, dict[str, np.ndarray]] = {}
+            for name, own in zip(names, impulses, strict=True):
+                for other, impulse in own.items():
+                    if impulse[w].any():
+                        contacts.setdefault(name, {})[other] = impulse[w] / span
+            found.append(replace(state, contacts=contacts, joint_wrenches=wrenches[w]))
+        return found
 
     def loads(self) -> list[np.ndarray | None]:
         """Return what bodies that links hold did to each joint in the last frame, by world; None where none is held.
@@ -220,35 +256,40 @@ class LinkDynamics:
         found: list[np.ndarray | None] = []
         found += [np.zeros((self.robot.model.njoints, 6)) for _ in range(worlds)]
         for k, grip in held:
+            joint = self.links.joints[k]
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
-            place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
+            place, turn = (np.atleast_2d(part) for part in self.bodies[joint - 1].pose())
             for w, own in enumerate(found):
                 arm = held_points(grip, w).mean(axis=0) - place[w]
                 back = quat.inverse(turn[w])
                 moment = torque[w] + np.cross(arm, force[w])
                 assert own is not None
-                own[k + 1] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
+                own[joint] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
         return found
 
     def imagined(self, world: World) -> LinkDynamics:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
         made = copy.copy(self)
         made.world, made.bodies = world, tuple(world.find(body.name) for body in self.bodies)
-        keys = {grip.key: grip for grip in _grips_of(made.bodies)}
-        made.joints = tuple(keys[joint.key] for joint in self.joints)  # type: ignore[misc]
+        keys: dict[str, Any] = {grip.key: grip for grip in _grips_of(made.bodies)}
+        made.joints = tuple(keys[joint.key] for joint in self.joints)
+        made.fingers = self.fingers.imagined(world, made.bodies, keys)
         return made
+
+    def save(self) -> tuple[Any, ...]:
+        """Return its joints and how hard its fingers press, for ``load``."""
+        fingers = self.fingers
+        return self.joints, fingers.joints, dict(fingers.forces), dict(fingers.closed)
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Become what it was when a snapshot was taken."""
+        self.joints, self.fingers.joints, forces, closed = saved
+        self.fingers.forces, self.fingers.closed = dict(forces), dict(closed)
 
 
 def _grips_of(bodies: Iterable[Body]) -> list[Grip]:
     """Return what holds bodies, joints included."""
     return [grip for body in bodies if body._dynamics is not None for grip in body._dynamics.grips]
-
-
-def _possible(inertia: np.ndarray, mass: float) -> np.ndarray:
-    """The nearest inertia that a mass can have: positive moments, none above the sum of the others."""
-    moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
-    spread = np.maximum(0.5 * moments.sum() - moments, 1e-9 + 1e-7 * mass)
-    return np.asarray(axes @ np.diag(spread.sum() - spread) @ axes.T)
 
 
 def _axis_of(joint: Any) -> tuple[bool, np.ndarray]:

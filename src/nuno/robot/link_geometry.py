@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import MeshError
+from nuno.robot.fingers import fingers_of
 from nuno.robot.pinocchio import pin
 from nuno.robot.placement import quaternion_of
 from nuno.shapes import quaternion as quat
@@ -25,7 +26,7 @@ logger = logging.getLogger(__name__)
 SIMPLE = 2e-3
 """[m] By how much the hulls of links that move dynamically may be smaller than the links' own."""
 SOLE = 1e-4
-"""[m] Likewise of feet, which tilt by that much over their length."""
+"""[m] Likewise of feet, which tilt by that much over their length, and of fingers."""
 BARE = 0.01
 """[m] Radius of what stands for a joint that carries no shape; it touches nothing."""
 
@@ -72,16 +73,22 @@ class Geometry:
         return self._collision_shapes if meshes == "collision" else self._visual_shapes
 
     def of_joints(self) -> tuple[LinkShape, ...]:
-        """Return one shape for each joint, the base's first: what it carries, in its own frame.
+        """Return one shape for each joint, the base's first, then one for each finger that slides.
 
-        A joint that carries no shape gets a small ball, called after the joint.
+        It is what the joint carries, in its own frame; a finger's is in the frame of the joint that carries the hand,
+        with open fingers. A joint that carries no shape gets a small ball, called after the joint.
         """
         robot, found = self._robot, []
         feet = {int(robot.model.frames[robot.frame_index(foot)].parentJoint) for foot in robot.description.feet}
-        for joint in range(1, robot.model.njoints):
-            own = [part for part in self._collision_shapes if part.joint == joint]
+        fingers = fingers_of(robot)
+        apart = {link for finger in fingers for link in finger.links}
+        groups: list[tuple[int, Any]] = [(joint, None) for joint in range(1, robot.model.njoints)]
+        for joint, finger in groups + [(finger.joint, finger) for finger in fingers]:
+            own = [part for part in self._collision_shapes if part.joint == joint and part.link not in apart]
+            if finger is not None:
+                own = [part for part in self._collision_shapes if part.link in finger.links]
             name = own[0].link if own else str(robot.model.names[joint])
-            smaller = SOLE if joint in feet else SIMPLE
+            smaller = SOLE if finger is not None or joint in feet else SIMPLE
             parts = tuple(_simple_part(part, smaller) for part in own)
             shape = Compound(parts) if own else Sphere(BARE)  # type: ignore[arg-type]
             color = own[0].color if own else (0.5, 0.5, 0.5)

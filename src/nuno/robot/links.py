@@ -8,6 +8,7 @@ import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.fingers import FingerBodies
 from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays
 from nuno.shapes import quaternion as quat
@@ -38,7 +39,8 @@ class Links:
         bodies: One for each shape; a name that the world has already gets a number.
         names: Of the links that those are the shapes of.
         joints: Pinocchio's indices of the joints that carry them.
-        are_joints: Whether there is one body for each joint.
+        are_joints: Whether there is one body for each joint; those of fingers that slide follow.
+        finger_bodies: Which bodies are fingers'; they go in and out with the hand's joint.
 
     Raises:
         InvalidInputError: other meshes, or a batch.
@@ -65,6 +67,7 @@ class Links:
         self.names = tuple(own.link for own in shapes)
         self._keys = tuple(body.key for body in self.bodies)
         self.joints: tuple[int, ...] = tuple(own.joint for own in shapes)
+        self.finger_bodies = FingerBodies(robot, self.names)
         self._rows = np.array(self.joints, dtype=int)
         self._offsets = np.array([own.position for own in shapes]).reshape(-1, 3)
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
@@ -84,22 +87,24 @@ class Links:
 
     @checked
     def offset_of(self, k: int) -> Pose:
-        """Return where the k-th body is in the frame of its joint."""
+        """Return where the k-th body is in the frame of its joint; a finger's, with an open hand."""
         return self._offsets[k], self._turns[k]
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
-        return self._poses_at(self._placements, self._joint_axes, self._joint_places)
+        return self._poses_at(self._placements, self._joint_axes, self._joint_places, self.robot)
 
     def poses_of(self, robot: Humanoid) -> tuple[np.ndarray, np.ndarray]:
         """Return where another robot of the same model has such shapes now, as ``poses`` does."""
         placements = robot.update().oMi.tolist()
-        return self._poses_at(placements, *placement_arrays(placements))
+        return self._poses_at(placements, *placement_arrays(placements), robot)
 
-    def _poses_at(self, placements: Any, axes: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        joints = self._rows
-        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], self._offsets)
+    def _poses_at(
+        self, placements: Any, axes: np.ndarray, origins: np.ndarray, robot: Humanoid
+    ) -> tuple[np.ndarray, np.ndarray]:
+        joints, offsets = self._rows, self.finger_bodies.offset(self._offsets, robot.angle_vector())
+        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], offsets)
         turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
         return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
 

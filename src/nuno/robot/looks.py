@@ -49,6 +49,9 @@ def looks_of(links: Links) -> list[Look]:
     for number, link in enumerate(links.names):
         by_link.setdefault(link, number)
         by_joint.setdefault(links.joints[number], number)
+    for finger, numbers in zip(links.finger_bodies.fingers, links.finger_bodies.bodies, strict=True):
+        for link in finger.links if numbers else ():
+            by_link.setdefault(link, numbers[0])
     frames = _joint_frames(robot)
     found = []
     for shape in robot.geometry.shapes("visual"):

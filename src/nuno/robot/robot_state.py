@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,6 +27,10 @@ class RobotState:
         collision: Of a robot without dynamics, what its motion would run into, or was stopped by; None for nothing.
         loads: (joints, 6) float [N, N m], what bodies that its links hold did to Pinocchio's joints in the last frame,
             in their own frames, where the robot has dynamics and holds any; None else.
+        contacts: Where the robot has dynamics, what touched each link: by link and by the other body's name, the force
+            (3,) [N] on the link in the world's axes, the mean over the last frame.
+        joint_wrenches: (n, 6) float [N, N m], where the robot has dynamics, force and torque of what each joint carries
+            on the link before, about the joint and in the world's axes, the mean over the last frame; None else.
     """
 
     time: float
@@ -38,3 +43,5 @@ class RobotState:
     unbalanced: Unbalance | None = None
     collision: Collision | None = None
     loads: np.ndarray | None = None
+    contacts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    joint_wrenches: np.ndarray | None = None

@@ -68,8 +68,11 @@ class Readings:
 class Sensors:
     """All sensors of a simulated robot.
 
-    The motion is given, and the forces follow from it by inverse dynamics, with what the bodies of the world do to the
-    links. Feet that stand share what the ground must do (``nuno.robot.ground``); where none stands, the base is held.
+    Without dynamics the motion is given, and the forces follow from it by inverse dynamics, with what the bodies of the
+    world do to the links. Feet that stand share what the ground must do (``nuno.robot.ground``); where none stands, the
+    base is held. With dynamics, wrenches, contacts and zero moment point follow from what the joints bore in the last
+    frame: whatever touches the robot wherever is in them. What a link before a wrist's sensor touches, of the joint
+    that carries both, counts as touching beyond it.
 
     Args:
         robot: The robot; its description tells the frames of the sensors.
@@ -104,6 +107,7 @@ class Sensors:
             self._external.append(pin.Force.Zero())
         self._acting = spatial_array(self._external)
         self._axes, self._places = placement_arrays(self._data.oMi)
+        self._borne = spatial_array(self._data.f)
         self._lacking = self._data.f[1].vector  # at the base, after ``rnea``
         self._stood: Soles | None = None  # the feet that stood last, most often where they stand now
         frames = robot.description.frames
@@ -151,6 +155,9 @@ class Sensors:
             )
         torques = pin.rnea(model, data, state.q, state.v, state.a)
         pin.updateGlobalPlacements(model, data)
+        if state.joint_wrenches is not None and state.torques is not None:
+            point, pressed = self._feel(state, state.joint_wrenches)
+            return self._told(state.time, self._all_read(state, state.torques, {}, point, pressed))
         self._acting[:] = 0.0
         base = self._axes[1]
         force, torque = base @ self._lacking[:3], base @ self._lacking[3:]
@@ -163,16 +170,8 @@ class Sensors:
             point = self._stand(standing, force, torque, pressed)
         if standing or loads:
             torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
-        read = {
-            "positions": self.robot.angles_of(state.q), "velocities": state.v[6:].copy(),
-            "torques": (torques[6:] if state.torques is None else state.torques).copy(), "contacts": pressed,
-            "zero_moment_point": np.full(2, np.nan) if point is None else point,
-        }  # fmt: skip
-        if self._imu is not None:
-            read["orientation"], read["angular_velocity"], read["specific_force"] = self._imu.read()
-        for name, sensor in self._wrenches.items():
-            read[name] = sensor.read(before.get(name, 0.0))
-        return self._told(state.time, read)
+        torques = torques[6:] if state.torques is None else state.torques
+        return self._told(state.time, self._all_read(state, torques, before, point, pressed))
 
     @property
     def soles(self) -> np.ndarray | None:
@@ -191,6 +190,47 @@ class Sensors:
         return RobotState(time, self.robot.configuration(), nothing, nothing)
 
     # -- forces
+
+    def _feel(self, state: RobotState, wrenches: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+        """Take what the joints truly bore for what inverse dynamics say, after ``rnea``.
+
+        Args:
+            state: How the robot moves.
+            wrenches: (n, 6) of its joints, as in the state.
+
+        Returns:
+            The zero moment point, None where no foot is touched, and how hard each foot presses [N].
+        """
+        data, model = self._data, self._model
+        self._borne[2:, :3] = -(wrenches[:, None, :3] @ self._axes[2:])[:, 0]
+        self._borne[2:, 3:] = -(wrenches[:, None, 3:] @ self._axes[2:])[:, 0]
+        pressed, force, torque = np.zeros(len(self._feet)), np.zeros(3), np.zeros(3)
+        for k, joint in enumerate(self._foot_joints.tolist()):
+            if self.links is None or self.links.names[self.links.joints.index(joint)] not in state.contacts:
+                continue
+            moved = model.inertias[joint] * data.a_gf[joint] + model.inertias[joint].vxiv(data.v[joint])
+            ground = moved.vector - self._borne[joint]  # beside its leg, a foot's motion has this cause
+            axes = self._axes[joint]
+            own = axes @ ground[:3]
+            pressed[k] = own[2]
+            force += own
+            torque += axes @ ground[3:] + moment(self._places[joint], own)
+        return (zero_moment_point(force, torque, self.ground) if pressed.any() else None), pressed
+
+    def _all_read(
+        self, state: RobotState, torques: np.ndarray, before: Mapping[str, Any], point: np.ndarray | None,
+        pressed: np.ndarray,
+    ) -> dict[str, Any]:  # fmt: skip
+        """Return what exact sensors tell, by channel, once all forces are known."""
+        read = {
+            "positions": self.robot.angles_of(state.q), "velocities": state.v[6:].copy(), "torques": torques.copy(),
+            "contacts": pressed, "zero_moment_point": np.full(2, np.nan) if point is None else point,
+        }  # fmt: skip
+        if self._imu is not None:
+            read["orientation"], read["angular_velocity"], read["specific_force"] = self._imu.read()
+        for name, sensor in self._wrenches.items():
+            read[name] = sensor.read(before.get(name, 0.0))
+        return read
 
     def _bear(self, loads: Sequence[Load], force: np.ndarray, torque: np.ndarray) -> dict[str, np.ndarray]:
         """Let loads act on the joints, and take them off what is lacking at the base.

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from nuno.robot.balance import Balance
     from nuno.robot.burden import Burden
     from nuno.robot.gait import Gait
+    from nuno.robot.hands import Hand
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.motion_guard import MotionGuard
+    from nuno.robot.simulated_gripper import SimulatedGripper
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
 
@@ -30,6 +32,8 @@ class SimulatedBody(SimulatedSenses):
         links: Its links in the world.
         joints: Its joints and controllers.
         gait: Its walks.
+        hands: Its hands, by name.
+        grippers: What closes them, likewise.
         balance: Its dynamics; None where its links are one body for each shape.
         guard: Without dynamics, it keeps the links out of static shapes.
     """
@@ -37,6 +41,8 @@ class SimulatedBody(SimulatedSenses):
     links: Links
     joints: SimulatedJoints
     gait: Gait
+    hands: dict[str, Hand]
+    grippers: dict[str, SimulatedGripper]
     balance: Balance | None
     wanted: Humanoid
     _motion: WantedMotion
@@ -74,6 +80,8 @@ class SimulatedBody(SimulatedSenses):
             )
         with self.world.lock:
             self.balance.dynamics.attach()
+            for gripper in self.grippers.values():
+                gripper.press_again()
             self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
 
     def detach(self) -> None:
@@ -85,7 +93,10 @@ class SimulatedBody(SimulatedSenses):
         with self.world.lock:
             if self.balance is None or not self.is_dynamic:
                 raise BodyStateError(f"{self.actual.name!r} has no dynamics")
+            pressed = {name: hand.held for name, hand in self.hands.items() if hand.presses}
             self.balance.dynamics.detach()
+            for name, bodies in pressed.items():  # what fingers pressed on is gripped from now on
+                self.hands[name].close([body for body in bodies if body.is_dynamic])
             self._arrive_within(ARRIVED)
             self._start_from(self.actual.configuration())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,8 +11,17 @@ from nuno.robot.hands import Hand
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
+if TYPE_CHECKING:
+    from nuno.robot.finger_dynamics import FingerDynamics
+
 PEAK = 1.5
 """Of the mean, the highest velocity on a cubic between two points of rest."""
+STILL = 1e-4
+"""[m] By which fingers that press move in a frame at most when they have come to rest,"""
+PATIENCE = 120
+"""and frames after which they count as resting all the same."""
+NEAR = 2e-3
+"""[m] How far from where they were to go fingers are that something stopped."""
 
 
 class SimulatedGripper:
@@ -20,58 +29,101 @@ class SimulatedGripper:
 
     The fingers move at up to their greatest velocity; what is between them when they are to close is held from
     when they have, and let go when they begin to open. A hand without joints does either at the end of the next frame.
+    A hand that presses holds by friction what stops its fingers.
 
     Args:
         hand: The hand.
         joints: The robot's joints, of which the fingers' are some.
+        fingers: The robot's fingers where they may have dynamics, or None.
+
+    Attributes:
+        effort: How hard the fingers are to press at most [N]; infinite before anybody said.
     """
 
-    def __init__(self, hand: Hand, joints: SimulatedJoints) -> None:
-        self.hand, self._joints = hand, joints
+    def __init__(self, hand: Hand, joints: SimulatedJoints, fingers: FingerDynamics | None = None) -> None:
+        self.hand, self._joints, self._fingers = hand, joints, fingers
         self.goal: Goal | None = None
+        self.effort = np.inf
         self._motion: Goal | None = None
         self._closes, self._width = False, hand.description.width
+        self._aim, self._last, self._waited = hand.description.width, hand.description.width, 0
         joint = hand.description.joint
         self._controller = next((name for name, own in joints.controllers.items() if joint in own.names), None)
 
-    def send(self, position: float) -> Goal:
-        """Let the hand open to ``position``, from 0 (closed) to 1, in place of what it does now."""
+    def send(self, position: float, effort: float = np.inf) -> Goal:
+        """Let the hand open to ``position``, from 0 (closed) to 1, in place of what it does now.
+
+        Args:
+            position: From 0 (closed) to 1.
+            effort: How hard the fingers press at most [N]; 0 is as hard as they can, as drivers take it that are told
+                nothing.
+        """
         if self.goal is not None:
             self.goal.finish(GoalStatus.PREEMPTED, text="another goal took its place")
         self.goal = Goal(position)
         self.goal.status = GoalStatus.ACTIVE
+        self.effort = effort = effort if effort > 0.0 else np.inf
+        if self._fingers is not None and self.hand.name in self._fingers.limits:
+            self._fingers.forces[self.hand.name] = min(effort, self._fingers.limits[self.hand.name])
+            self._fingers.closed[self.hand.name] = position == 0.0
         width = position * self.hand.description.width
-        if self.hand.width > 0.0:  # one that is closed already closes on what it closed on before
-            self._width = self.hand.width
         self._closes = width < self.hand.width or position == 0.0
+        # one that is closed already closes on what it closed on before
+        if self.hand.width > 0.0 and not (self._closes and self.hand.grips):
+            self._width = self.hand.width
+        self._aim, self._last, self._waited = width, self.hand.width, 0
         if not self._closes:
             self.hand.open()
+        if self._closes and not self.hand.presses:  # nothing would stop the fingers but what is known of it
+            width = max(width, min(self.hand.gap(effort), self.hand.width))
         self._motion = self._move(self.hand.joint_angles(width))
         return self.goal
 
     def end_frame(self) -> None:
         """Take hold where the fingers have closed, and end the goal where they have come to rest."""
+        if self._fingers is not None:
+            self.hand.feel()
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return
         if self._motion is not None and not self._motion.succeeded:
             goal.finish(GoalStatus.ABORTED, text=f"the fingers were stopped: {self._motion.text}")
             return
+        if self.hand.presses and self._is_moving():
+            return
         held = self.hand.close(width=self._width) if self._closes else ()
-        goal.feedback = tuple(body.name for body in held)
+        names = tuple(body.name for body in held)
+        goal.feedback, goal.holds = names, bool(held)
+        if self.hand.width > self._aim + NEAR:
+            goal.finish(GoalStatus.ABORTED, text=f"the fingers were stopped: {' and '.join(names) or 'too weak'}")
+            return
         goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
+
+    def press_again(self) -> None:
+        """Close anew on what the hand held before its robot was given dynamics: its fingers press on it now."""
+        if self.hand.presses and self.hand.grips:
+            self.hand.open()
+            self.send(0.0, self.effort)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        return self.goal, status, self._motion, self._closes, self._width, self.hand.grips
+        motion = self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort
+        return self.goal, status, motion, self.hand.grips, self.hand.pressed
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was."""
-        self.goal, status, self._motion, self._closes, self._width, grips = saved
+        self.goal, status, motion, grips, self.hand.pressed = saved
+        self._motion, self._closes, self._width, self._aim, self._last, self._waited, self.effort = motion
         if self.goal is not None:
             self.goal.status, self.goal.text = status
         self.hand._grips = list(grips)
+
+    def _is_moving(self) -> bool:
+        """Return True as long as the fingers move, up to a while."""
+        width, self._last = self._last, self.hand.width
+        self._waited += 1
+        return self._waited < 2 or (abs(width - self._last) > STILL and self._waited < PATIENCE)
 
     def _move(self, angles: dict[str, float]) -> Goal | None:
         if self._controller is None or not angles:

@@ -101,7 +101,8 @@ class SimulatedRobot(SimulatedBody):
         self._motion = WantedMotion(self.wanted, groups, world.time)
         self.joints, self.gait = self._motion.joints, self._motion.gait
         self.hands = hands_of(self.links)
-        self.grippers = {name: SimulatedGripper(hand, self.joints) for name, hand in self.hands.items()}
+        fingers = None if self.balance is None else self.balance.dynamics.fingers
+        self.grippers = {name: SimulatedGripper(hand, self.joints, fingers) for name, hand in self.hands.items()}
         self.sensors = Sensors(self.actual, self.links, models=sensors, seed=seed)
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
@@ -287,7 +288,9 @@ class SimulatedRobot(SimulatedBody):
             self.gait.cancel()
 
     def send_gripper(self, hand: str, position: float, effort: float) -> Goal:
-        """Open or close a hand; see ``RobotInterface``. The effort is not simulated: what is between them is held.
+        """Open or close a hand; see ``RobotInterface``.
+
+        The effort limits how hard fingers with dynamics press; without, what is between them is held.
 
         Raises:
             UnknownNameError: the robot has no such hand.
@@ -295,7 +298,7 @@ class SimulatedRobot(SimulatedBody):
         with self.world.lock:
             if hand not in self.grippers:
                 raise UnknownNameError("hand", hand, list(self.grippers))
-            return self.grippers[hand].send(position)
+            return self.grippers[hand].send(position, effort)
 
     # What the world asks of it
 
@@ -315,6 +318,7 @@ class SimulatedRobot(SimulatedBody):
             aim = self._motion.begin(end, span)
         if self.balance is not None and self.is_dynamic:
             self.balance.dynamics.drive(*self.balance.command(self._state, aim, span, self._servo))
+            self.balance.dynamics.lead_fingers(self.actual.angles_of(aim.q))
             return
         self._state = aim
         if not (aim.q == before.q).all():
@@ -328,8 +332,9 @@ class SimulatedRobot(SimulatedBody):
         if self.balance is not None and self.is_dynamic:
             q, v = (values[0] for values in self.balance.dynamics.read())
             torques = self.balance.dynamics.efforts_now()[0]
-            loads = self.balance.dynamics.loads()[0]
-            self._state = self.balance.judge(self._state, self._motion.aim, q, v, torques, self.world.time, loads)
+            loads, before, aim = self.balance.dynamics.loads()[0], self._state, self._motion.aim
+            state = self.balance.judge(before, aim, q, v, torques, self.world.time, loads)
+            self._state = self.balance.dynamics.felt((state,), state.time - before.time)[0]
             angles = self.actual.angles_of(q)
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
@@ -349,7 +354,7 @@ class SimulatedRobot(SimulatedBody):
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-        joints = () if self.balance is None else self.balance.dynamics.joints
+        joints = () if self.balance is None else self.balance.dynamics.save()
         return self._state, self._motion.save(), joints, grippers, self._servo, self.guard.save(), self._burden.save()
 
     def load(self, saved: Any) -> None:
@@ -357,7 +362,7 @@ class SimulatedRobot(SimulatedBody):
         self._state, motion, joints, grippers, self._servo, guard, burden = saved
         self._motion.load(motion)
         if self.balance is not None:
-            self.balance.dynamics.joints = joints
+            self.balance.dynamics.load(joints)
         if self.actual is not self.wanted:
             self.actual.move_to(self.actual.angles_of(self._state.q), self._state.q[:7])
         for name, gripper in self.grippers.items():
@@ -380,7 +385,7 @@ class SimulatedRobot(SimulatedBody):
         """Go on as the copy in one world of a batch does, which the robot's world has just become."""
         for other in futures.drivers:
             if getattr(other, "original", None) is self:
-                joints = () if self.balance is None else self.balance.dynamics.joints
+                joints = () if self.balance is None else self.balance.dynamics.save()
                 state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
                 self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))

@@ -68,19 +68,18 @@ class RigidContacts(RigidArrays):
             result.append((other, points, directions, pushes))
         return result
 
-    def impulses_of(self, slot: int) -> dict[int, np.ndarray]:
-        """Return what contacts gave a body in the last frame, (worlds, 3) [N s], by the slot of the other body.
+    def impulses(self) -> dict[int, dict[int, np.ndarray]]:
+        """Return what contacts gave bodies in the last frame, (worlds, 3) [N s], by slot and the slot of the other.
 
         One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
         impulse, met = self._entries("impulse"), self._entries("met")
-        owner = self.table.parts.slot.numpy()[:, None]
-        found: dict[int, np.ndarray] = {}
+        owner = self.table.parts.slot.numpy()
+        found: dict[int, dict[int, np.ndarray]] = {}
         for world, p, k in np.argwhere(impulse.any(axis=-1)):
-            a, b = int(owner[p, 0]), int(met[world, p, k])
-            if slot in (a, b):
-                other, sign = (b, 1.0) if slot == a else (a, -1.0)
-                total = found.setdefault(other, np.zeros((self.world_count, 3)))
+            a, b = int(owner[p]), int(met[world, p, k])
+            for one, other, sign in ((a, b, 1.0), (b, a, -1.0)):
+                total = found.setdefault(one, {}).setdefault(other, np.zeros((self.world_count, 3)))
                 total[world] += sign * impulse[world, p, k]
         return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -65,24 +66,51 @@ def contact_points(world: Simulation, body: Body, itself: bool = False) -> Conta
         if itself and isinstance(dynamics.material, Cloth):
             found += _on_itself(world, body, dynamics)
     else:
-        names = {slot: other.name for other, slot in zip(world._bodies.values(), _slots(world), strict=True)}
+        names = _names(world)
         for k in range(world.world_count):
             for slot, points, normals, forces in dynamics.solver.contacts_of(dynamics.slot, k):
                 found += [(*row, names.get(slot, ""), k) for row in zip(points, normals, forces, strict=True)]
-        by_slot = dynamics.solver.impulses_of(dynamics.slot)
-        impulses = {names[slot]: impulse for slot, impulse in by_slot.items() if slot in names}
-    for coupled in world._stepping.last:
+    for coupled in _coupled(world):
         found += coupled.contacts(body, itself)
-        for name, impulse in coupled.impulses(body).items():
-            impulses[name] = impulses.get(name, 0.0) + impulse
+    for name, impulse in frame_impulses(world, (body,))[0].items():
+        impulses[name] = impulses.get(name, 0.0) + impulse
     if world.world_count == 1:
         impulses = {name: impulse[0] for name, impulse in impulses.items()}
     return ContactPoints.joined(found, impulses)
 
 
-def _slots(world: Simulation) -> list[int]:
-    assert world._rigid is not None
-    return world._rigid.slots_of(world)
+def frame_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
+    """Return what contacts gave bodies in the last frame, by the other body's name, (worlds, 3) [N s] each.
+
+    As ``ContactPoints.impulses``, but read once for all, and of cloth and soft bodies with moving ones only. Nothing is
+    known of static bodies.
+    """
+    found: list[dict[str, np.ndarray]] = [{} for _ in bodies]
+    rigid: dict[int, Any] = {}
+    for k, body in enumerate(bodies):
+        if (dynamics := body._dynamics) is not None and dynamics.is_rigid:
+            rigid[k] = dynamics
+    if rigid:
+        names, by_slot = _names(world), next(iter(rigid.values())).solver.impulses()
+        for k, own in rigid.items():
+            touched = by_slot.get(own.slot, {})
+            found[k] = {names[slot]: impulse for slot, impulse in touched.items() if slot in names}
+    for coupled in _coupled(world):
+        for k, given in coupled.impulses(bodies).items():
+            for name, impulse in given.items():
+                found[k][name] = found[k].get(name, 0.0) + impulse
+    return found
+
+
+def _names(world: Simulation) -> dict[int, str]:
+    """Return the names of bodies by their slots among the rigid ones."""
+    rigid = world._rigid
+    assert rigid is not None
+    return {slot: other.name for other, slot in zip(world._bodies.values(), rigid.slots_of(world), strict=True)}
+
+
+def _coupled(world: Simulation) -> list[Any]:
+    return list(world._stepping.last)
 
 
 def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
@@ -111,7 +139,7 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
     dynamics.prepare(world.time, 1.0 / world.frame_rate)
     points = dynamics.vertices(body)
     pressed = np.zeros(points.shape[:2], dtype=bool)
-    for coupled in world._stepping.last:
+    for coupled in _coupled(world):
         if body in coupled.particles:
             known, contacts = coupled.shape_contacts(body)
             pressed |= known

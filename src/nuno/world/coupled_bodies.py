@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -138,6 +139,11 @@ class CoupledBodies(CoupledTables):
             return None
         return self.coupling.joint_wrenches()[2][:, self._joints.joints.index(joint)]
 
+    def joint_loads(self) -> tuple[dict[Grip, int], np.ndarray, np.ndarray]:
+        """Return where joints are in what follows: wrenches (worlds, joints, 6), and efforts (worlds, joints)."""
+        force, torque, axial = self.coupling.joint_wrenches()
+        return {joint: k for k, joint in enumerate(self._joints.joints)}, -np.concatenate([force, torque], -1), axial
+
     def contacts(self, body: Body, itself: bool = False) -> list[tuple[Any, ...]]:
         """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep.
 
@@ -155,12 +161,21 @@ class CoupledBodies(CoupledTables):
                 found += [(point, sign * normal, sign * force, body.name, world) for sign in (1.0, -1.0)]
         return found
 
-    def impulses(self, body: Body) -> dict[str, np.ndarray]:
-        """Return what contacts with each of the others gave a body in the last frame, (worlds, 3) [N s], by name."""
-        if body not in self.bodies:
+    def impulses(self, bodies: Sequence[Body]) -> dict[int, dict[str, np.ndarray]]:
+        """Return what contacts with each of the others gave bodies in the last frame, (worlds, 3) [N s], by name.
+
+        By the bodies' places among those; bodies that are not coupled are left out.
+        """
+        own = {body: k for k, body in enumerate(bodies)}
+        rows = [k for k, body in enumerate(self.bodies) if body in own]
+        if not rows:
             return {}
-        given = np.where(self.kept[body][:, None, None], self.coupling.impulses()[:, self.bodies.index(body)], 0.0)
-        return {other.name: given[:, k] for k, other in enumerate(self.bodies) if given[:, k].any()}
+        given, found = self.coupling.impulses(), {}
+        for row in rows:
+            body = self.bodies[row]
+            kept = np.where(self.kept[body][:, None, None], given[:, row], 0.0)
+            found[own[body]] = {self.bodies[k].name: kept[:, k] for k in np.flatnonzero(kept.any(axis=(0, 2)))}
+        return found
 
     def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
         """Return what shapes did to the particles of a body that others pressed on: see `Coupling.shape_contacts`."""

@@ -6,14 +6,17 @@ import time
 
 import numpy as np
 import pytest
+from lifter import cube_in, lifter_in
 from other_robot import SKEW, OtherRobot
 from wire_with import PATIENCE
 
+import nuno
 from nuno.errors import ConnectionLostError, NotConnectedError, RobotModelError, RobotTimeoutError
 from nuno.robot.goal import GoalStatus, ResultCode
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wire.client import WireRobot
 from nuno.robot.wire.names import Names
+from nuno.robot.wire.server import RobotServer
 
 
 def cut(robot):
@@ -238,3 +241,17 @@ def test_a_robot_whose_states_stop(other, join):
     time.sleep(0.05)
     with pytest.raises(RobotTimeoutError, match="no fresh joint state"):
         robot.angle_vector()
+
+
+def test_a_grasp_tells_whether_something_is_held(tmp_path):
+    """Through the wire as at the robot itself: False where the hand closed on nothing, True on a cube."""
+    world = nuno.World(device="cpu")
+    robot = lifter_in(tmp_path, world)
+    with RobotServer(robot, port=0, real_time_factor=None) as server:
+        with WireRobot(server.url, robot.robot, timeout=PATIENCE) as client:
+            assert client.start_grasp("rarm") == [False]
+            assert client.stop_grasp("rarm") == [True]
+            cube_in(world)
+            assert client.start_grasp("rarm") == [True]
+            assert client.move_gripper("rarm", 0.0) == [False]  # the cube keeps the fingers apart
+            assert client.move_gripper("rarm", 0.0, ignore_stall=True) == [True]

@@ -227,7 +227,7 @@ class Commands:
         goal = self.robot.send_gripper(hand, float(np.clip(position / width, 0.0, 1.0)), effort)
 
         def result(goal: Goal) -> Fields:
-            stalled = goal.status == GoalStatus.ABORTED
+            stalled = goal.status == GoalStatus.ABORTED if goal.holds is None else goal.holds
             return {"position": position, "effort": effort, "stalled": stalled, "reached_goal": goal.succeeded}
 
         return goal, result, lambda: None  # a hand that lets go, as its client is gone, would drop what it holds

@@ -84,6 +84,8 @@ def _finish(goal: Goal, sent: SentGoal) -> None:
     code = fields.get("error_code")
     text = str(fields.get("error_string") or fields.get("error_msg") or ("" if fields else values or ""))
     code = code if isinstance(code, int) else None
+    if isinstance(stalled := fields.get("stalled"), bool):
+        goal.holds = stalled
     ends = {SUCCEEDED: GoalStatus.SUCCEEDED, CANCELED: GoalStatus.PREEMPTED, ABORTED: GoalStatus.ABORTED}
     if not accepted:
         goal.finish(GoalStatus.REJECTED, ResultCode.INVALID_GOAL if code is None else code, text)

@@ -1,0 +1,167 @@
+"""What a robot with dynamics feels: contact forces of its links and wrenches of its wrists, against closed forms."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import nuno
+
+G = 9.81
+ELBOW = "arm_right_4_joint"
+HAND = "arm_right_7_link"
+
+
+@pytest.fixture(scope="module")
+def floor_world():
+    """A world with a floor and a standing Talos, as it is after 0.3 s; whoever uses it restores it."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
+    robot.sleep(0.3)
+    return world, robot, world.save()
+
+
+@pytest.fixture
+def standing(floor_world):
+    """The world and the robot of ``floor_world``, as they were."""
+    world, robot, saved = floor_world
+    world.restore(saved)
+    return world, robot
+
+
+def lower_hand(robot, angle=0.5):
+    """Send the right hand down by the elbow, and wait until it rests on what is there."""
+    k = robot.actual.joint_index(ELBOW)
+    robot.angle_vector({ELBOW: robot.angle_vector()[k] + angle}, 1.0)
+    robot.sleep(2.5)
+
+
+def table_under(robot, gap=0.03):
+    """Return a box 0.1 m high under the robot's right hand."""
+    hand = robot.links.bodies[robot.links.names.index(HAND)]
+    x, y = hand.vertices[:, :2].mean(axis=0)
+    return nuno.box(
+        (0.4, 0.3, 0.1), name="table", position=(float(x), float(y), hand.vertices[:, 2].min() - gap - 0.05)
+    )
+
+
+def touching(state):
+    """Return the sum of all contact forces (3,) [N]."""
+    return sum(force for own in state.contacts.values() for force in own.values())
+
+
+def linear_momentum(robot):
+    """Return the momentum (3,) [N s] of the whole robot."""
+    model, state = robot.actual.model, robot.state()
+    return np.array(pin.computeCentroidalMomentum(model, model.createData(), state.q, state.v))[:3]
+
+
+def pressing(robot, before):
+    """Return the force (3,) [N] that the world does to the right hand by its wrist's sensor, as it felt nothing before.
+
+    Args:
+        robot: The robot.
+        before: (3,) [N] in the world's axes, what the sensor felt when nothing touched the hand.
+    """
+    pose = robot.actual.frame_pose("right_wrist")
+    return pose.rotation @ robot.read().wrenches["right_wrist"][:3] - before
+
+
+def test_contacts_bear_the_robot(standing):
+    """At rest both soles touch the floor and nothing else does: together they bear its weight, within 0.1 %."""
+    world, robot = standing
+    world.run(0.3)
+    state = robot.state()
+    assert {link: set(own) for link, own in state.contacts.items()} == {
+        "leg_left_6_link": {"floor"}, "leg_right_6_link": {"floor"},
+    }  # fmt: skip
+    weight = robot.actual.mass * G
+    np.testing.assert_allclose(touching(state), (0.0, 0.0, weight), atol=1e-3 * weight)
+
+
+def test_contacts_are_what_moves_the_robot(standing):
+    """With both arms swinging: the sum of contact forces is m (a - g), frame by frame, within 0.5 % of the weight."""
+    world, robot = standing
+    wanted = robot.angle_vector()
+    for name in ("arm_left_2_joint", "arm_right_2_joint"):
+        wanted[robot.actual.joint_index(name)] += 0.5 if "left" in name else -0.5
+    robot.angle_vector(wanted, 0.4)
+    weight, moved, before = robot.actual.mass * G, 0.0, linear_momentum(robot)
+    for _ in range(24):
+        world.step()
+        now = linear_momentum(robot)
+        caused = (now - before) * world.frame_rate
+        np.testing.assert_allclose(touching(robot.state()), caused + np.array([0.0, 0.0, weight]), atol=5e-3 * weight)
+        moved, before = max(moved, np.linalg.norm(caused)), now
+    assert moved > 0.02 * weight  # else it would be statics again
+
+
+def test_a_wrist_reads_what_a_table_does_to_the_hand(standing):
+    """A hand that presses a static table stops there; its wrist reads the table's force, within 1 %.
+
+    Inverse dynamics with the feet alone would miss it.
+    """
+    world, robot = standing
+    pose = robot.actual.frame_pose("right_wrist")
+    free = pose.rotation @ robot.read().wrenches["right_wrist"][:3]
+    table = world.add(table_under(robot))
+    lower_hand(robot)
+    state = robot.state()
+    hand = robot.links.bodies[robot.links.names.index(HAND)]
+    assert hand.vertices[:, 2].min() > table.vertices[:, 2].max() - 1e-3
+    force = state.contacts[HAND]["table"]
+    assert set(state.contacts) == {HAND, "leg_left_6_link", "leg_right_6_link"} and force[2] > 20.0
+    np.testing.assert_allclose(pressing(robot, free), force, atol=0.01 * np.linalg.norm(force))
+    weight = robot.actual.mass * G
+    np.testing.assert_allclose(touching(state), (0.0, 0.0, weight), atol=1e-3 * weight)
+    assert state.fallen is None
+
+
+def test_a_wrist_reads_what_a_scale_shows(standing):
+    """A plate on a spring goes down by F / k under the hand, and the wrist reads F, within 2 %."""
+    world, robot = standing
+    pose = robot.actual.frame_pose("right_wrist")
+    free = pose.rotation @ robot.read().wrenches["right_wrist"][:3]
+    plate, stiffness, mass = world.add(table_under(robot)), 5000.0, 2.0
+    world.attach(plate, nuno.Rigid(mass=mass))
+    spring = nuno.Spring(stiffness, rest=mass * G / stiffness, damping=200.0)  # it bears the plate as it is
+    scale = nuno.slider(plate, None, axis=(0.0, 0.0, 1.0), spring=spring)
+    lower_hand(robot)
+    shown = -stiffness * scale.position
+    assert shown > 10.0
+    assert pressing(robot, free)[2] == pytest.approx(shown, rel=0.02)
+
+
+def test_zero_moment_point_of_contacts_is_that_of_inverse_dynamics(standing):
+    """Standing: within 1 mm of where the weight acts, the centre of mass' place on the floor."""
+    world, robot = standing
+    world.run(0.3)
+    state, model = robot.state(), robot.actual.model
+    centre = pin.centerOfMass(model, model.createData(), state.q)
+    np.testing.assert_allclose(robot.read().zero_moment_point, centre[:2], atol=1e-3)
+
+
+def test_feelings_are_restored_and_imagined(standing):
+    """A restored robot reads what it read, and a copy in an imagined world feels what the robot does, bit for bit."""
+    world, robot = standing
+    world.add(table_under(robot))
+    lower_hand(robot)
+    told, state, saved = robot.read(), robot.state(), world.save()
+    futures = world.imagine(2)
+    futures.run(0.1)
+    robot.sleep(0.1)
+    for copy in futures.robot.state():
+        np.testing.assert_array_equal(copy.joint_wrenches, robot.state().joint_wrenches)
+        np.testing.assert_array_equal(copy.contacts[HAND]["table"], robot.state().contacts[HAND]["table"])
+    world.restore(saved)
+    np.testing.assert_array_equal(robot.state().joint_wrenches, state.joint_wrenches)
+    for name, wrench in told.wrenches.items():
+        np.testing.assert_array_equal(robot.read().wrenches[name], wrench)
+
+
+def test_without_dynamics_nothing_is_felt():
+    """A robot that goes where it is sent is touched by nothing that is known; its readings follow from its motion."""
+    world = nuno.World(device="cpu")
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    world.step()
+    assert robot.state().contacts == {} and robot.state().joint_wrenches is None
