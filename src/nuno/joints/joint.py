@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -135,9 +135,7 @@ class Joint(Grip):
         Raises:
             BodyStateError: the joint was released.
         """
-        world = self._live()
-        with world.lock:
-            return self._given(world._stepping.effort(self))
+        return self._given(efforts_of([self])[:, 0])
 
     @property
     def limits(self) -> tuple[Any, Any]:
@@ -228,6 +226,13 @@ class Joint(Grip):
         velocity, spin = scene.solver.velocity(slot)
         middle, _ = scene.solver.pose(slot)
         return velocity + np.cross(spin, point - middle), spin
+
+
+def efforts_of(joints: Sequence[Joint]) -> np.ndarray:
+    """Return ``Joint.effort`` of joints of one world, (worlds, n)."""
+    world = joints[0]._live()
+    with world.lock:
+        return world._stepping.efforts(joints)
 
 
 def check_joined(body: Body, material: Any, world: Simulation) -> None:

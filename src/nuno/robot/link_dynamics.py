@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
-from nuno.joints.joint_drives import Motor
+from nuno.joints.joint_group import JointGroup
 from nuno.materials import Rigid
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
@@ -62,6 +62,7 @@ class LinkDynamics:
         self.links, self.robot, self.world, self.friction = links, links.robot, links.world, friction
         self.bodies = links.bodies
         self.joints: tuple[Joint, ...] = ()
+        self._group: JointGroup | None = None
         model, limits = self.robot.model, self.robot.effort_limits
         self.efforts = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
         inertia = np.array(pin.crba(model, model.createData(), self.robot.posture_configuration())).diagonal()[6:]
@@ -134,18 +135,14 @@ class LinkDynamics:
         effort: np.ndarray,
     ) -> None:  # fmt: skip
         """Set all motors: (n,) each, or (worlds, n)."""
-        for n, joint in enumerate(self.joints):
-            joint.motor = Motor(
-                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], self.efforts[n],
-                effort[..., n],
-            )  # fmt: skip
+        self._together().drive(positions, velocities, stiffness, damping, self.efforts, effort)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
         robot, base, worlds = self.robot, self.bodies[0], self.world.world_count
         place, turn = (np.atleast_2d(part) for part in base.pose())
         v = np.zeros((worlds, robot.model.nv))
-        v[:, 6:] = np.stack([np.broadcast_to(joint.velocity, (worlds,)) for joint in self.joints], axis=1)
+        angles, v[:, 6:] = self._together().read()
         if base.is_dynamic:
             back = quat.inverse(turn)
             spin = np.atleast_2d(base.angular_velocity)
@@ -153,13 +150,11 @@ class LinkDynamics:
             v[:, :3] = quat.rotate(back, np.atleast_2d(base.velocity) + np.cross(spin, arm))
             v[:, 3:6] = quat.rotate(back, spin)
         pose = np.broadcast_to(np.concatenate([place, np.roll(turn, -1, axis=1)], axis=1), (worlds, 7))
-        angles = np.stack([np.broadcast_to(joint.position, (worlds,)) for joint in self.joints], axis=1)
         return np.stack([robot.configuration_of(a, own) for a, own in zip(angles, pose, strict=True)]), v
 
     def efforts_now(self) -> np.ndarray:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
-        worlds = self.world.world_count
-        return np.stack([np.broadcast_to(joint.effort, (worlds,)) for joint in self.joints], axis=1)
+        return self._together().efforts()
 
     def loads(self) -> list[Any]:
         """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.
@@ -190,8 +185,16 @@ class LinkDynamics:
         made = copy.copy(self)
         made.world, made.bodies = world, tuple(world.find(body.name) for body in self.bodies)
         keys = {grip.key: grip for grip in _grips_of(made.bodies)}
+        made._group = None
         made.joints = tuple(keys[joint.key] for joint in self.joints)  # type: ignore[misc]
         return made
+
+    def _together(self) -> JointGroup:
+        """Return all joints as one group, made anew where they are others than before."""
+        group = self._group
+        if group is None or group.joints is not self.joints or not group.is_current():
+            group = self._group = JointGroup(self.joints)
+        return group
 
 
 def _grips_of(bodies: Iterable[Body]) -> list[Grip]:

@@ -49,7 +49,7 @@ class WantedMotion:
         """Return how the robot is to move at a time ``end`` [s], ``span`` [s] from now; ``end_frame`` takes that."""
         before, robot = self.aim, self.robot
         rows, given = None, None
-        self._kept = (before, robot._angles, robot._position, robot._quaternion)
+        self._kept = (before, *self._pose())
         if span <= 0.0:
             self.joints.step(0.0)
             return before
@@ -92,9 +92,7 @@ class WantedMotion:
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
-        robot = self.robot
-        pose = (robot._angles, robot._position, robot._quaternion)
-        return self.aim, pose, self.joints.save(), self.gait.save()
+        return self.aim, self._pose(), self.joints.save(), self.gait.save()
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; goals that came since are given up."""
@@ -108,6 +106,10 @@ class WantedMotion:
         for controller in self.joints.controllers.values():
             controller.goal = None if controller.goal is None else controller.goal.copy()
         self.gait.disown()
+
+    def _pose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        robot = self.robot
+        return robot._angles, robot._position, robot._quaternion
 
     def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
         self.robot._angles = angles

@@ -27,6 +27,15 @@ class RigidContacts(RigidArrays):
         """Velocity [m/s] of the centre of mass and angular velocity [rad/s], (worlds, 3) each, world frame."""
         return self._read("velocity", slot).astype(float), self._read("spin", slot).astype(float)
 
+    def motions_of(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return ``pose`` and ``velocity`` of slots (n,) at once, (worlds, n, ...) each."""
+        shape = (self.world_count, self.state.capacity)
+        place, turn, velocity, spin = (
+            getattr(self.state, name).reshape(shape).numpy()[:, slots].astype(float)
+            for name in ("position", "rotation", "velocity", "spin")
+        )
+        return place + self.origin[:, None], np.roll(turn, 1, axis=-1), velocity, spin
+
     def contacts_of(self, slot: int, world: int = 0) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
         """Return what touches a body: (slot of the other, points (n, 3) [m], normals (n, 3), forces (n, 3) [N]).
 
@@ -63,14 +72,21 @@ class RigidContacts(RigidArrays):
 
         One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
-        impulse, met = self._entries("impulse"), self._entries("met")
-        owner = self.table.parts.slot.numpy()[:, None]
         found: dict[int, np.ndarray] = {}
+        for (own, other), impulse in self.impulses_between().items():
+            if own == slot:
+                found[other] = impulse
+        return found
+
+    def impulses_between(self) -> dict[tuple[int, int], np.ndarray]:
+        """Return what contacts gave the first of two slots in the last frame, (worlds, 3) [N s], in either order."""
+        impulse, met = self._entries("impulse"), self._entries("met")
+        owner = self.table.parts.slot.numpy()
+        found: dict[tuple[int, int], np.ndarray] = {}
         for world, p, k in np.argwhere(impulse.any(axis=-1)):
-            a, b = int(owner[p, 0]), int(met[world, p, k])
-            if slot in (a, b):
-                other, sign = (b, 1.0) if slot == a else (a, -1.0)
-                total = found.setdefault(other, np.zeros((self.world_count, 3)))
+            pair = int(owner[p]), int(met[world, p, k])
+            for both, sign in ((pair, 1.0), (pair[::-1], -1.0)):
+                total = found.setdefault(both, np.zeros((self.world_count, 3)))
                 total[world] += sign * impulse[world, p, k]
         return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -132,11 +133,13 @@ class CoupledBodies(CoupledTables):
             return -force[:, k], -torque[:, k]
         return None
 
-    def effort(self, joint: Joint) -> np.ndarray | None:
-        """(worlds,), what acted along a joint's free direction in the last frame; None if it is not of these."""
-        if joint not in self._joints.joints:
-            return None
-        return self.coupling.joint_wrenches()[2][:, self._joints.joints.index(joint)]
+    def efforts(self, joints: Sequence[Joint]) -> tuple[list[int], np.ndarray]:
+        """Return which of some joints are of these (k,), and what acted along them in the last frame, (worlds, k)."""
+        own = {joint: n for n, joint in enumerate(self._joints.joints)}
+        rows = [k for k, joint in enumerate(joints) if joint in own]
+        if not rows:
+            return rows, np.zeros((self._world.world_count, 0))
+        return rows, self.coupling.joint_wrenches()[2][:, [own[joints[k]] for k in rows]]
 
     def contacts(self, body: Body, itself: bool = False) -> list[tuple[Any, ...]]:
         """Rows (point, normal, force, name of the other, world) of a body's contacts in the last substep.

@@ -8,6 +8,7 @@ each world keeps what comes of its own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -204,13 +205,14 @@ class Stepping:
         arms = np.where(held, now - np.where(held, now, 0.0).sum(axis=1, keepdims=True) / count, 0.0)
         return forces.sum(axis=1), np.cross(arms, forces).sum(axis=1)
 
-    def effort(self, joint: Joint) -> np.ndarray:
-        """(worlds,), what acted along a joint's free direction in the last frame; see ``Joint.effort``."""
-        total = np.zeros(self._world.world_count)
+    def efforts(self, joints: Sequence[Joint]) -> np.ndarray:
+        """(worlds, n), what acted along joints' free directions in the last frame; see ``Joint.effort``."""
+        total = np.zeros((self._world.world_count, len(joints)))
         for coupled in self.last:
-            own = coupled.effort(joint)
-            if own is not None:
-                total[coupled.kept[joint.body]] = own[coupled.kept[joint.body]]
+            rows, own = coupled.efforts(joints)
+            for column, k in enumerate(rows):
+                kept = coupled.kept[joints[k].body]
+                total[kept, k] = own[kept, column]
         return total
 
 
