@@ -126,10 +126,9 @@ class ImaginedRobot:
         if span <= 0.0:
             return
         if self.balance is not None:
-            loads = self.balance.dynamics.loads()
             told = [
-                self.balance.command(state, aim, span, self._servo, load)
-                for state, aim, load in zip(self._states, aims, loads, strict=True)
+                self.balance.command(state, aim, span, self._servo)
+                for state, aim in zip(self._states, aims, strict=True)
             ]
             self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
             return
@@ -147,11 +146,11 @@ class ImaginedRobot:
                 own.joints.take_step()
                 own.gait.end_frame()
             return
-        q, v = self.balance.dynamics.read()
-        torques = self.balance.dynamics.efforts_now()
+        ended = self.balance.ended(max(self.world.time - self._states[0].time, 1e-9))
         for w, own in enumerate(self._motions):
-            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
+            state = self.balance.judge(self._states[w], own.aim, *ended[w], self.world.time)
             self._states[w] = state
+            own.take_footing(state)
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from nuno.joints.joint_group import JointGroup
 from nuno.materials import Rigid
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
+from nuno.world.contact_points import contact_impulses
 from nuno.world.make_joints import hinge, slider
 
 if TYPE_CHECKING:
@@ -29,8 +31,32 @@ BEARS = 1e5
 """[N] Force that a joint bears across its axis."""
 SETTLES = 0.03
 """[s] In which a motor that follows a velocity comes to it,"""
+MOST_WEIGHT = 1.5
+"""Times its weight that a body which moves is taken to load a link with."""
 HOLDS = 0.1
 """[s] and to its position."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Forces of contacts on links, (3,) [N] by link.
+
+    Attributes:
+        all: Of all that touches them.
+        loads: Of bodies that move, up to some times their weight.
+    """
+
+    all: dict[str, np.ndarray]
+    loads: dict[str, np.ndarray]
+
+    def add(self, link: str, force: np.ndarray, most: Any) -> None:
+        """Add a force (3,) [N]; ``most`` is that of a load, None of what is no load."""
+        if not force.any():
+            return
+        self.all[link] = self.all.get(link, 0.0) + force
+        if most is not None:
+            share = min(1.0, float(np.min(most)) / float(np.linalg.norm(force)))
+            self.loads[link] = self.loads.get(link, 0.0) + share * force
 
 
 class LinkDynamics:
@@ -69,6 +95,7 @@ class LinkDynamics:
         self.stiffness = np.where(np.isfinite(self.efforts), self.efforts / FULL_EFFORT, inertia * 1e4)
         self.damping = 2.0 * np.sqrt(self.stiffness * inertia)
         self.soft = inertia / SETTLES / HOLDS, inertia / SETTLES
+        self._gravity = float(np.linalg.norm(links.world.gravity))
         self._is_free = bool(self.robot.description.feet)
 
     @property
@@ -156,28 +183,49 @@ class LinkDynamics:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
         return self._together().efforts()
 
-    def loads(self) -> list[Any]:
-        """Return what is held by links does to each joint, in its own frame, as Pinocchio takes it; None for nothing.
+    def contacts(self, seconds: float) -> list[Contacts]:
+        """Return the mean forces of contacts over a last frame of some seconds, of each world."""
+        found = [Contacts({}, {}) for _ in range(self.world.world_count)]
+        names = dict(zip(self.bodies, self.links.names, strict=True))
+        for (body, other), impulse in contact_impulses(self.world, self.bodies).items():
+            # what moves weighs on a link with its weight; more is a squeeze between the link and something else
+            most = MOST_WEIGHT * other.mass * self._gravity if other.is_dynamic and other not in names else None
+            for own, force in zip(found, impulse / seconds, strict=True):
+                own.add(names[body], force, most)
+        return found
 
-        Of each world.
+    def loads(self, pressing: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray | None]:
+        """Return what links carry does to each of Pinocchio's joints (njoints, 6) [N, N m], in its own frame.
+
+        Of each world; None for nothing.
+
+        Args:
+            pressing: Of each world, forces (3,) [N] at links' centres of mass, by link; what grips bear is added.
         """
         index = {body: k for k, body in enumerate(self.bodies)}
         others = [body for body in self.world.bodies if body not in index]
         held = [(index[grip.target], grip) for grip in _grips_of(others) if grip.target in index]
         worlds = self.world.world_count
-        if not held:
+        if not held and not any(pressing):
             return [None] * worlds
-        found = [pin.StdVec_Force() for _ in range(worlds)]
-        for own in found:
-            own.extend([pin.Force.Zero()] * self.robot.model.njoints)
+        found: list[np.ndarray | None] = []
+        tables = np.zeros((worlds, self.robot.model.njoints, 6))
+        found += list(tables)
         for k, grip in held:
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
             place, turn = (np.atleast_2d(part) for part in self.bodies[k].pose())
-            for w, own in enumerate(found):
+            for w, own in enumerate(tables):
                 arm = held_points(grip, w).mean(axis=0) - place[w]
                 back = quat.inverse(turn[w])
                 moment = torque[w] + np.cross(arm, force[w])
-                own[k + 1] += pin.Force(quat.rotate(back, force[w]), quat.rotate(back, moment))
+                own[k + 1] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
+        for w, forces in enumerate(pressing):
+            for name, pushes in forces.items():
+                k = self.links.names.index(name)
+                turn = np.atleast_2d(self.bodies[k].pose()[1])
+                local = quat.rotate(quat.inverse(turn[min(w, len(turn) - 1)]), pushes)
+                lever = self.robot.model.inertias[k + 1].lever
+                tables[w, k + 1] += np.concatenate([local, np.cross(lever, local)])
         return found
 
     def imagined(self, world: World) -> LinkDynamics:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from nuno.robot.footing import Footing
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +24,11 @@ class RobotState:
         torques: (n,) float [N m; N], of the joints' motors, where the robot has dynamics; None else.
         fallen: Why and when the robot fell, where it has dynamics and did; None else.
         over_torque: Names of joints whose motors gave all that they can.
+        contacts: By link, the force (3,) [N] of all that touches it, the mean over the last frame, where the robot has
+            dynamics; links that nothing touches are not in it.
+        loads: (njoints, 6) float [N, N m], what it carries does to each of Pinocchio's joints, in their own frames,
+            smoothed: balance reckons with it; None where it carries nothing.
+        footing: What its balance goes by: feet that bear, and the step that it makes where it was pushed.
     """
 
     time: float
@@ -28,3 +38,6 @@ class RobotState:
     torques: np.ndarray | None = None
     fallen: str | None = None
     over_torque: tuple[str, ...] = ()
+    contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
+    loads: np.ndarray | None = None
+    footing: Footing | None = None

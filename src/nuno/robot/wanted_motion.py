@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.robot.gait import Gait
+from nuno.robot.leg_motion import feet_put_down
 from nuno.robot.robot_state import RobotState
 from nuno.robot.simulated_joints import SimulatedJoints, joined
 from nuno.robot.stance import Stance
@@ -89,6 +90,32 @@ class WantedMotion:
         self.aim = RobotState(time, robot.configuration(), nothing, nothing)
         self.gait.give_up("the robot was put elsewhere")
         self.joints.put(robot.angle_vector())
+
+    def take_footing(self, state: RobotState) -> None:
+        """Let a walk end where the robot was pushed off it, and go on from where it has come to stand again."""
+        step = None if state.footing is None else state.footing.step
+        if step is None:
+            return
+        if self.gait.is_walking:
+            self.gait.interrupt()
+        if step.is_over:
+            self._stand_on(state)
+            self.gait.resume()
+
+    def _stand_on(self, state: RobotState) -> None:
+        """Be at rest on the feet where they are, legs and base; the other joints go on as they are wanted."""
+        robot, time = self.robot, self.aim.time
+        rows, angles = self.gait.rows, self.joints.positions.copy()
+        angles[rows] = robot.angles_of(state.q)[rows]
+        q = feet_put_down(robot, robot.configuration_of(angles, state.q[:7]))
+        robot.move_to(np.clip(robot.angles_of(q), *robot.joint_limits), q[:7])
+        self.joints.put_rows(rows, robot.angle_vector())
+        for name in self.gait.names:
+            self.joints.take_over(name)
+        nothing = np.zeros(robot.model.nv)
+        v = nothing.copy()
+        v[6:] = self.joints.velocities
+        self.aim = RobotState(time, robot.configuration(), v, nothing)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""

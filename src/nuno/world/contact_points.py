@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -71,13 +72,33 @@ def contact_points(world: Simulation, body: Body, itself: bool = False) -> Conta
                 found += [(*row, names.get(slot, ""), k) for row in zip(points, normals, forces, strict=True)]
         by_slot = dynamics.solver.impulses_of(dynamics.slot)
         impulses = {names[slot]: impulse for slot, impulse in by_slot.items() if slot in names}
-    for coupled in world._stepping.last:
+    for coupled in _coupled(world):
         found += coupled.contacts(body, itself)
         for name, impulse in coupled.impulses(body).items():
             impulses[name] = impulses.get(name, 0.0) + impulse
     if world.world_count == 1:
         impulses = {name: impulse[0] for name, impulse in impulses.items()}
     return ContactPoints.joined(found, impulses)
+
+
+def contact_impulses(world: Simulation, bodies: Sequence[Body]) -> dict[tuple[Body, Body], np.ndarray]:
+    """Return what contacts gave rigid bodies in the last frame, by body and what touched it, (worlds, 3) [N s]."""
+    found: dict[tuple[Body, Body], np.ndarray] = {}
+    own: list[Any] = [body._dynamics for body in bodies]
+    slots = {dynamics.slot for dynamics in own if dynamics is not None}
+    of_slot = dict(zip(_slots(world), world._bodies.values(), strict=True)) if slots else {}
+    for solver in {dynamics.solver for dynamics in own if dynamics is not None}:
+        for (slot, other), impulse in solver.impulses_between().items():
+            if slot in slots and other in of_slot:
+                found[of_slot[slot], of_slot[other]] = impulse
+    for coupled in _coupled(world):
+        for pair, impulse in coupled.impulses_of(bodies).items():
+            found[pair] = found.get(pair, 0.0) + impulse
+    return found
+
+
+def _coupled(world: Simulation) -> list[Any]:
+    return list(world._stepping.last)
 
 
 def _slots(world: Simulation) -> list[int]:
@@ -111,7 +132,7 @@ def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
     dynamics.prepare(world.time, 1.0 / world.frame_rate)
     points = dynamics.vertices(body)
     pressed = np.zeros(points.shape[:2], dtype=bool)
-    for coupled in world._stepping.last:
+    for coupled in _coupled(world):
         if body in coupled.particles:
             known, contacts = coupled.shape_contacts(body)
             pressed |= known

@@ -165,6 +165,17 @@ class CoupledBodies(CoupledTables):
         given = np.where(self.kept[body][:, None, None], self.coupling.impulses()[:, self.bodies.index(body)], 0.0)
         return {other.name: given[:, k] for k, other in enumerate(self.bodies) if given[:, k].any()}
 
+    def impulses_of(self, bodies: Sequence[Body]) -> dict[tuple[Body, Body], np.ndarray]:
+        """Return what contacts gave bodies of these in the last frame, by body and other, (worlds, 3) [N s] each."""
+        given = self.coupling.impulses()
+        pairs = [(self.bodies[a], self.bodies[b], a, b) for a, b in np.argwhere(given.any(axis=(0, 3)))]
+        chosen = set(bodies)
+        return {
+            (body, other): np.where(self.kept[body][:, None], given[:, a, b], 0.0)
+            for body, other, a, b in pairs
+            if body in chosen
+        }
+
     def shape_contacts(self, body: Body) -> tuple[np.ndarray, list[tuple[int, int, int, np.ndarray, np.ndarray]]]:
         """Return what shapes did to the particles of a body that others pressed on: see `Coupling.shape_contacts`."""
         known, found = self.coupling.shape_contacts(self.particles.index(body))
