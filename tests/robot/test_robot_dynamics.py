@@ -176,11 +176,12 @@ def test_restored_it_goes_on_bit_for_bit(standing):
     assert np.array_equal(once.q, again.q) and np.array_equal(once.v, again.v)
 
 
-@pytest.mark.parametrize("push", [(0.0, 10.0, 0.0), (10.0, 0.0, 0.0)])
+@pytest.mark.parametrize("push", [(0.0, 10.0, 0.0), (7.0, 0.0, 0.0)])
 def test_a_light_push_is_survived(standing, push):
-    """10 N s on the base: its centre of mass goes as far as a critically damped mass, J / (m e rate), and comes back.
+    """7 or 10 N s on the base: its centre of mass goes as far as a critically damped mass, J / (m e rate), and back.
 
-    Or less far, as trunk and posture are held besides: 0.7 to 1.1 of that.
+    Or less far, as trunk and posture are held besides: 0.7 to 1.1 of that. Ahead the zero moment point would have to
+    leave nine tenths of the soles from 8 N s on.
     """
     world, robot = standing
     _, start = momentum(robot)
@@ -189,7 +190,7 @@ def test_a_light_push_is_survived(standing, push):
     for _ in range(90):
         world.step()
         far = max(far, float(np.linalg.norm((momentum(robot)[1] - start)[:2])))
-    expected = 10.0 / (robot.actual.mass * np.e * Gains().centre_rate)
+    expected = np.linalg.norm(push) / (robot.actual.mass * np.e * Gains().centre_rate)
     assert 0.7 * expected < far < 1.1 * expected
     # soles have slid by that much
     assert np.linalg.norm((momentum(robot)[1] - start)[:2]) < 2.5e-3 and robot.state().fallen is None

@@ -76,8 +76,11 @@ class RigidArrays:
         return getattr(self.manifolds, name).reshape(self._entry_shape(name)).numpy()
 
     def _read(self, name: str, slot: int) -> np.ndarray:
-        array = getattr(self.state, name).reshape((self.world_count, self.state.capacity))
-        return array[:, slot].numpy()
+        array = getattr(self.state, name)
+        if self.device == "cpu":  # NumPy's view of all is made in a third of the time of Warp's of a part
+            values = array.numpy()
+            return values.reshape((self.world_count, self.state.capacity, *values.shape[1:]))[:, slot]
+        return array.reshape((self.world_count, self.state.capacity))[:, slot].numpy()
 
     def _write(self, name: str, slot: int, value: ArrayLike) -> None:
         self._write_to(getattr(self.state, name), slot, value)

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.robot.carried import Carried, carried_by, smoothed
 from nuno.robot.link_dynamics import LinkDynamics
-from nuno.robot.pinocchio import pin
-from nuno.robot.robot_state import RobotState
+from nuno.robot.robot_state import Contacts, RobotState
+from nuno.robot.stabiliser import Stabiliser
 from nuno.robot.whole_body import Gains, WholeBodyControl
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-STANDS = 1e-3
-"""[m] Above the lowest sole of the wanted posture, up to which a foot is to bear."""
 LEANS = np.cos(np.deg2rad(60.0))
 """Of the trunk's tilt, from where on a robot has fallen."""
 SINKS = 0.5
@@ -56,8 +55,11 @@ class Balance:
         self.dynamics = LinkDynamics(links, friction=friction)
         self._robot, self._world = robot, links.world
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
+        joints = [robot.model.frames[foot].parentJoint for foot in self._feet]
+        self._foot_links = [links.names[links.joints.index(joint)] for joint in joints]
         self._control = WholeBodyControl(robot, links.world.gravity, friction=SURE * friction, gains=gains)
         self._data = robot.model.createData()
+        self._stabiliser = Stabiliser(robot, links.world.gravity) if self._feet else None
         self._warns = True
         self.is_on = True
 
@@ -72,8 +74,8 @@ class Balance:
         """
         dynamics, robot = self.dynamics, self._robot
         found = None
-        if self.is_on and self._feet and now.fallen is None:
-            found = self._control.solve(now, wanted, self._standing(wanted.q), _forces(now.loads))
+        if self.is_on and self._stabiliser is not None and now.fallen is None:
+            found = self._control.solve(now, self._stabiliser.aims(now, wanted, now.time + span), now.loads)
         if found is None:
             gains = dynamics.stiffness, dynamics.damping, np.zeros(len(dynamics.joints))
             goal = robot.angles_of(wanted.q), wanted.v[6:]
@@ -93,15 +95,9 @@ class Balance:
         return values
 
     def judge(
-        self,
-        before: RobotState,
-        wanted: RobotState,
-        q: np.ndarray,
-        v: np.ndarray,
-        torques: np.ndarray,
-        time: float,
-        loads: np.ndarray | None = None,
-    ) -> RobotState:
+        self, before: RobotState, wanted: RobotState, q: np.ndarray, v: np.ndarray, torques: np.ndarray,
+        contacts: Contacts, wrenches: np.ndarray, loads: np.ndarray | None, time: float,
+    ) -> RobotState:  # fmt: skip
         """Return the state of a robot that moves so after a frame: whether it fell, and which motors give all.
 
         Args:
@@ -110,16 +106,19 @@ class Balance:
             q: (nq,) where it is.
             v: (nv,) how it moves.
             torques: (n,) of its motors [N m; N].
+            contacts: Forces on its links.
+            wrenches: (n, 6) [N, N m], what its joints bore, as ``RobotState.joint_wrenches``.
+            loads: (njoints, 6) [N, N m], what it carries did to the joints, in their own frames; None for nothing.
             time: [s].
-            loads: What bodies that the links hold did to it, as `LinkDynamics.loads` tells, or None.
         """
         span, fallen = time - before.time, before.fallen
         a = (v - before.v) / span if span > 0.0 else np.zeros_like(v)
         full = np.abs(torques) >= FULL * self.dynamics.efforts
         over = tuple(name for name, is_full in zip(self._robot.joint_names, full, strict=True) if is_full)
-        if fallen is None and self._feet:
+        footing, stabiliser = None, self._stabiliser
+        if fallen is None and stabiliser is not None:
             up = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)
-            ground = float(self._soles(wanted.q).min())
+            ground = stabiliser.ground(wanted.q)
             why = ""
             if up < LEANS:
                 why = f"its trunk leans by {np.rad2deg(np.arccos(np.clip(up, -1.0, 1.0))):.0f} degrees"
@@ -129,29 +128,30 @@ class Balance:
                 fallen = f"{why} at t = {time:.2f} s"
                 if self._warns:
                     logger.warning("%r fell: %s; robot.set_up() stands it up again", self._robot.name, fallen)
-        return RobotState(time, q, v, a, torques, fallen, over, loads=loads)
+        if fallen is None and stabiliser is not None and self.is_on and span > 0.0:
+            pressed = np.array([sum(f[2] for f in contacts.get(link, {}).values()) for link in self._foot_links])
+            load = self.load(before)
+            footing = stabiliser.footing(before, wanted, q, v, pressed, time, load)
+        return RobotState(
+            time, q, v, a, torques, fallen, over, loads=smoothed(before.loads, loads, span), contacts=contacts,
+            joint_wrenches=wrenches, footing=footing,
+        )  # fmt: skip
+
+    def load(self, state: RobotState) -> Carried | None:
+        """Return what a robot carries."""
+        gravity = float(np.linalg.norm(self._world.gravity))
+        return carried_by(self._robot, self._data, state.q, state.loads, gravity)
+
+    def ended(self, span: float) -> list[tuple[Any, Any, Any, Any, Any, Any]]:
+        """Return q, v, torques, contacts, joint wrenches and loads after a frame of ``span`` [s], of each world."""
+        dynamics = self.dynamics
+        q, v = dynamics.read()
+        contacts, wrenches = dynamics.felt(span)
+        loads = dynamics.loads([dynamics.pressing(own, self._foot_links) for own in contacts])
+        return list(zip(q, v, dynamics.efforts_now(), contacts, wrenches, loads, strict=True))
 
     def imagined(self, world: World) -> Balance:
         """Return the same for the copies of the links in a batch that was imagined from their world."""
         made = copy.copy(self)
         made.dynamics, made._warns = self.dynamics.imagined(world), False
         return made
-
-    def _soles(self, q: np.ndarray) -> np.ndarray:
-        """Return the heights of the soles' middles [m] in a configuration."""
-        pin.forwardKinematics(self._robot.model, self._data, q)
-        pin.updateFramePlacements(self._robot.model, self._data)
-        return np.array([self._data.oMf[foot].translation[2] for foot in self._feet])
-
-    def _standing(self, q: np.ndarray) -> tuple[bool, ...]:
-        heights = self._soles(q)
-        return tuple(bool(height < heights.min() + STANDS) for height in heights)
-
-
-def _forces(loads: np.ndarray | None) -> Any:
-    """Return loads on joints as Pinocchio takes them."""
-    if loads is None:
-        return None
-    found = pin.StdVec_Force()
-    found.extend([pin.Force(own) for own in loads])
-    return found

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import NunoError, WalkError
-from nuno.robot.footsteps import steps_of_velocity
+from nuno.robot.footsteps import middle_of, steps_of_velocity
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.preview_control import TICK
 from nuno.robot.robot_state import RobotState
@@ -76,8 +76,8 @@ class Gait:
 
     def __init__(self, robot: Humanoid, joints: SimulatedJoints) -> None:
         self._robot, self._joints = robot, joints
-        self._names = tuple(name for name in WALKING if name in joints.rows)
-        self.rows = np.concatenate([np.zeros(0, dtype=int), *(joints.rows[name] for name in self._names)])
+        self.names = tuple(name for name in WALKING if name in joints.rows)
+        self.rows = np.concatenate([np.zeros(0, dtype=int), *(joints.rows[name] for name in self.names)])
         self.goal: Goal | None = None
         self.walk: Walk | RunningWalk | None = None
         self._before: Walk | RunningWalk | None = None  # what holds until a changed walk begins
@@ -132,9 +132,12 @@ class Gait:
 
     def moves(self, controller: str) -> bool:
         """Return True if the walk has the joints of a controller."""
-        return self.walk is not None and controller in self._names
+        return self.walk is not None and controller in self.names
 
-    def plan(self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None) -> Walk | str:
+    def plan(
+        self, robot: Humanoid, x: float, y: float, yaw: float, seconds: float | None,
+        load: tuple[float, np.ndarray] | None = None,
+    ) -> Walk | str:  # fmt: skip
         """Return a walk from where a robot stands, or why there is none; nothing changes.
 
         Args:
@@ -143,11 +146,12 @@ class Gait:
             y: To the left [m].
             yaw: Counterclockwise [rad].
             seconds: In which it covers that [s]; None as it walks by itself.
+            load: What it carries, as ``plan_walk`` takes it.
         """
         try:
             if seconds is None:
-                return plan_walk(robot, x, y, yaw)
-            return plan_walk_velocity(robot, x / seconds, y / seconds, yaw / seconds, seconds)
+                return plan_walk(robot, x, y, yaw, load=load)
+            return plan_walk_velocity(robot, x / seconds, y / seconds, yaw / seconds, seconds, load=load)
         except NunoError as error:
             return str(error)
 
@@ -156,7 +160,7 @@ class Gait:
         if isinstance(walk, str):
             goal.finish(GoalStatus.REJECTED, text=walk)
             return
-        for name in self._names:
+        for name in self.names:
             self._joints.take_over(name)
         self.walk, self._before, self.goal, self._drive, self._cut = walk, None, goal, None, ""
         self._start = self._joints.clock - float(walk.times[0])
@@ -270,7 +274,7 @@ class Gait:
             return
         drive, self.walk = self._drive, None
         self._before = self._drive = None
-        for name in self._names:
+        for name in self.names:
             self._joints.take_over(name)
         assert self.goal is not None
         if drive is not None and self.goal.status == GoalStatus.ACTIVE and drive.now(self._joints.clock).any():
@@ -281,14 +285,27 @@ class Gait:
         if self._cut:
             self.goal.finish(GoalStatus.ABORTED, text=self._cut)
         self.goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
-        if self._waiting is not None:
-            (goal, place), self._waiting = self._waiting, None
-            x, y, yaw = standing_place(self._robot)
-            forward, left = place[0] - x, place[1] - y
-            c, s = math.cos(yaw), math.sin(yaw)
-            self.begin(
-                self.plan(self._robot, c * forward + s * left, c * left - s * forward, place[2] - yaw, None), goal
-            )
+        self.resume()
+
+    def interrupt(self) -> None:
+        """Stop at once, wherever the feet are: the robot was pushed. A walk to a place waits for ``resume``."""
+        goal, walk = self.goal, self.walk
+        if goal is not None and isinstance(walk, Walk) and self._waiting is None and goal.status == GoalStatus.ACTIVE:
+            x, y, yaw = middle_of(walk.feet[-1][:, [0, 1, 3]]).tolist()
+            self._waiting, self.goal = (goal, (x, y, yaw)), None
+        elif goal is not None:
+            goal.finish(GoalStatus.ABORTED, text="the robot was pushed off its walk")
+        self.walk = self._before = self._drive = None
+
+    def resume(self) -> None:
+        """Go to the place that waits, from where the robot stands."""
+        if self._waiting is None:
+            return
+        (goal, place), self._waiting = self._waiting, None
+        x, y, yaw = standing_place(self._robot)
+        forward, left = place[0] - x, place[1] - y
+        c, s = math.cos(yaw), math.sin(yaw)
+        self.begin(self.plan(self._robot, c * forward + s * left, c * left - s * forward, place[2] - yaw, None), goal)
 
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
@@ -314,7 +331,7 @@ class Gait:
         """Stop at once, wherever the feet are: the robot was put elsewhere, or (``aborted``) met something."""
         if aborted and self.goal is not None:
             self.goal.finish(GoalStatus.ABORTED, text=why)
-            for name in self._names:
+            for name in self.names:
                 self._joints.take_over(name)
         self._drop(why)
         self.walk = self._before = self._drive = None

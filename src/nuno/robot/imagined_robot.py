@@ -164,15 +164,13 @@ class ImaginedRobot:
                 for guard, state in zip(self._guards, self._states, strict=True)
             ]
             return
-        q, v = self.balance.dynamics.read()
-        torques, loads = self.balance.dynamics.efforts_now(), self.balance.dynamics.loads()
-        span = self.world.time - self._before[0].time
-        states = [
-            self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time, loads[w])
-            for w, own in enumerate(self._motions)
+        ended = self.balance.ended(max(self.world.time - self._before[0].time, 1e-9))
+        self._states = [
+            self.balance.judge(before, own.aim, *found, self.world.time)
+            for before, own, found in zip(self._states, self._motions, ended, strict=True)
         ]
-        self._states = self.balance.dynamics.felt(states, span)
         for own, state in zip(self._motions, self._states, strict=True):
+            own.take_footing(state)
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()
 

@@ -188,3 +188,26 @@ class LegFollower:
         elif k > 0:
             self._ahead = pin.difference(model, found[k - 1], found[k])
         self.count = k + 1
+
+
+def feet_put_down(robot: Humanoid, q: np.ndarray) -> np.ndarray:
+    """Return a configuration (nq,) near another, in which the soles are level, at one height and where they were.
+
+    The centre of mass is over the middle between them. Where the legs do not reach so, it is the other configuration.
+    """
+    model, legs = robot.model, LegMotion(robot, robot.model)
+    data = legs.data
+    pin.forwardKinematics(model, data, q)
+    soles = [pin.updateFramePlacement(model, data, frame).copy() for frame in legs.frames]
+    yaw = [float(np.arctan2(own.rotation[1, 0], own.rotation[0, 0])) for own in soles]
+    floor = float(np.mean([own.translation[2] for own in soles]))
+    feet = np.array([[*own.translation[:2], floor, turn] for own, turn in zip(soles, yaw, strict=True)])
+    centre = np.array(pin.centerOfMass(model, data, q))
+    centre[:2] = feet[:, :2].mean(axis=0)
+    upright = pin.rpy.matrixToRpy(data.oMi[1].rotation)
+    base = pin.rpy.rpyToMatrix(0.0, float(upright[1]), float(upright[2]))
+    targets = Targets(feet[None], centre[None], base[None], q[legs.others][None])
+    try:
+        return legs.solve(targets, 0, q.copy(), 0.0)
+    except WalkError:
+        return q

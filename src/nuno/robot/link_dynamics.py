@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.joints.grip import Grip
     from nuno.robot.links import Links
-    from nuno.robot.robot_state import RobotState
+    from nuno.robot.robot_state import Contacts
     from nuno.world.world import World
 
 FULL_EFFORT = 0.01
@@ -36,6 +35,8 @@ SETTLES = 0.03
 """[s] In which a motor that follows a velocity comes to it,"""
 HOLDS = 0.1
 """[s] and to its position."""
+MOST_WEIGHT = 1.5
+"""Times its weight that a body which moves is taken to load a link with."""
 RUBS = 5e-3
 """[rad/s or m/s] From which on a motor overcomes all of its joint's friction."""
 
@@ -223,49 +224,79 @@ class LinkDynamics:
         """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
         return joint_loads(self.world, self.joints)[1]
 
-    def felt(self, states: Sequence[RobotState], span: float) -> list[RobotState]:
-        """Return the states of the robot's copies with what joints bore and links touched over the last frame.
+    def felt(self, span: float) -> tuple[list[Contacts], np.ndarray]:
+        """Return what touched links and what joints bore over the last frame.
 
         Args:
-            states: Of each world, where the robot is now.
             span: [s] of the frame.
+
+        Returns:
+            Of each world, by link and by the other body's name, the force (3,) [N] on the link; and (worlds, n, 6) the
+            wrenches of `RobotState.joint_wrenches`.
         """
         wrenches, _ = joint_loads(self.world, self.joints)
-        impulses = frame_impulses(self.world, self.bodies)
-        names, found = self.links.names, []
-        for w, state in enumerate(states):
-            contacts: dict[str, dict[str, np.ndarray]] = {}
-            for name, own in zip(names, impulses, strict=True):
-                for other, impulse in own.items():
-                    if impulse[w].any():
-                        contacts.setdefault(name, {})[other] = impulse[w] / span
-            found.append(replace(state, contacts=contacts, joint_wrenches=wrenches[w]))
+        found: list[dict[str, dict[str, np.ndarray]]] = [{} for _ in range(self.world.world_count)]
+        for name, own in zip(self.links.names, frame_impulses(self.world, self.bodies), strict=True):
+            for other, impulse in own.items():
+                for contacts, given in zip(found, impulse, strict=True):
+                    if given.any():
+                        contacts.setdefault(name, {})[other] = given / span
+        return list(found), wrenches
+
+    def pressing(self, contacts: Contacts, feet: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return what bodies that move load links other than the feet with, (3,) [N] by link.
+
+        A body loads with its weight. What is more is a squeeze between the link and something else.
+
+        Args:
+            contacts: What touched the links in one world.
+            feet: Names of links that are left out.
+        """
+        gravity, own = float(np.linalg.norm(self.world.gravity)), set(self.bodies)
+        found: dict[str, np.ndarray] = {}
+        for link, touched in contacts.items():
+            for name, force in () if link in feet else touched.items():
+                other = self.world.find(name)
+                if other in own or not other.is_dynamic:
+                    continue
+                most = MOST_WEIGHT * float(np.min(other.mass)) * gravity
+                share = min(1.0, most / float(np.linalg.norm(force)))
+                found[link] = found.get(link, 0.0) + share * force
         return found
 
-    def loads(self) -> list[np.ndarray | None]:
-        """Return what bodies that links hold did to each joint in the last frame, by world; None where none is held.
+    def loads(self, pressing: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray | None]:
+        """Return what links carry does to each of Pinocchio's joints (joints, 6) [N, N m], in its own frame.
 
-        (joints, 6) each, force [N] and torque [N m] in the frames of Pinocchio's joints.
+        Of each world; None for nothing.
+
+        Args:
+            pressing: Of each world, forces (3,) [N] at links' centres of mass, by link; what grips bear is added.
         """
         index = {body: k for k, body in enumerate(self.bodies)}
         others = [body for body in self.world.bodies if body not in index]
         held = [(index[grip.target], grip) for grip in _grips_of(others) if grip.target in index]
-        worlds = self.world.world_count
-        if not held:
-            return [None] * worlds
-        found: list[np.ndarray | None] = []
-        found += [np.zeros((self.robot.model.njoints, 6)) for _ in range(worlds)]
+        if not held and not any(pressing):
+            return [None] * self.world.world_count
+        found = np.zeros((self.world.world_count, self.robot.model.njoints, 6))
         for k, grip in held:
-            joint = self.links.joints[k]
             force, torque = (np.atleast_2d(part) for part in grip.wrench)
-            place, turn = (np.atleast_2d(part) for part in self.bodies[joint - 1].pose())
             for w, own in enumerate(found):
-                arm = held_points(grip, w).mean(axis=0) - place[w]
-                back = quat.inverse(turn[w])
-                moment = torque[w] + np.cross(arm, force[w])
-                assert own is not None
-                own[joint] += np.concatenate([quat.rotate(back, force[w]), quat.rotate(back, moment)])
-        return found
+                self._add(own, k, w, held_points(grip, w).mean(axis=0), force[w], torque[w])
+        for w, forces in enumerate(pressing):
+            for name, push in forces.items():
+                k = self.links.names.index(name)
+                middle = np.atleast_2d(self.bodies[k].centre_of_mass)
+                self._add(found[w], k, w, middle[min(w, len(middle) - 1)], push, np.zeros(3))
+        return list(found)
+
+    def _add(self, loads: np.ndarray, k: int, world: int, point: Any, force: np.ndarray, torque: np.ndarray) -> None:
+        """Add a force [N] at a point [m] and a torque [N m] on link ``k`` to the loads (joints, 6) of a world."""
+        joint = self.links.joints[k]
+        place, turn = (np.atleast_2d(part) for part in self.bodies[joint - 1].pose())
+        row = min(world, len(place) - 1)
+        back = quat.inverse(turn[row])
+        moment = torque + np.cross(point - place[row], force)
+        loads[joint] += np.concatenate([quat.rotate(back, force), quat.rotate(back, moment)])
 
     def imagined(self, world: World) -> LinkDynamics:
         """Return the same for the copies of the links in a batch that was imagined from their world."""

@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nuno.robot.collision import Collision, Unbalance
+from nuno.robot.footing import Footing
+
+Contacts = Mapping[str, Mapping[str, np.ndarray]]
+"""By link and by the name of the other body, the force (3,) [N] on the link."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +29,13 @@ class RobotState:
             need more than that, by inverse dynamics with all that the links bear.
         unbalanced: Of a robot without dynamics, that its zero moment point is not under its soles; None where it is.
         collision: Of a robot without dynamics, what its motion would run into, or was stopped by; None for nothing.
-        loads: (joints, 6) float [N, N m], what bodies that its links hold did to Pinocchio's joints in the last frame,
-            in their own frames, where the robot has dynamics and holds any; None else.
+        loads: (joints, 6) float [N, N m], what the robot carries does to Pinocchio's joints, in their own frames,
+            smoothed: balance reckons with it. None without dynamics, and where it carries nothing.
         contacts: Where the robot has dynamics, what touched each link: by link and by the other body's name, the force
             (3,) [N] on the link in the world's axes, the mean over the last frame.
         joint_wrenches: (n, 6) float [N, N m], where the robot has dynamics, force and torque of what each joint carries
             on the link before, about the joint and in the world's axes, the mean over the last frame; None else.
+        footing: What its balance goes by: feet that bear, and the step that it makes where it was pushed.
     """
 
     time: float
@@ -45,3 +50,4 @@ class RobotState:
     loads: np.ndarray | None = None
     contacts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     joint_wrenches: np.ndarray | None = None
+    footing: Footing | None = None

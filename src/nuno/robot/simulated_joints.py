@@ -142,6 +142,14 @@ class SimulatedJoints:
         for name in self.controllers:
             self.cancel(name)
 
+    def put_rows(self, rows: np.ndarray, positions: np.ndarray) -> None:
+        """Be at rest in some joints (k,), at positions of all (n,); what moves them is to be told of it."""
+        now, nothing = [self.positions, self.velocities, self.accelerations], np.zeros(len(positions))
+        self.positions, self.velocities, self.accelerations = _with(
+            (now[0], now[1], now[2]), rows, (positions[rows], nothing[rows], nothing[rows])
+        )
+        self.desired = _with(self.desired, rows, (positions[rows], nothing[rows], nothing[rows]))
+
     def take_step(self, actual: Motion | None = None) -> None:
         """Take the step that was worked out last, and tell the goals of it.
 

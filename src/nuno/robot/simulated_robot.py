@@ -267,14 +267,21 @@ class SimulatedRobot(SimulatedBody):
             if self.gait.is_walking:
                 self.gait.change(goal, x, y, yaw, seconds)
                 return goal
-            standing = self.wanted.copy()
-        walk = self.gait.plan(standing, x, y, yaw, seconds)  # the world goes on meanwhile
+            standing, load = self.wanted.copy(), self._load()
+        walk = self.gait.plan(standing, x, y, yaw, seconds, load)  # the world goes on meanwhile
         with self.world.lock:
             if self.gait.is_walking:
                 goal.finish(GoalStatus.REJECTED, text="another walk was begun meanwhile")
             else:
                 self.gait.begin(walk, goal)
         return goal
+
+    def _load(self) -> Any:
+        """Return what the robot carries as ``plan_walk`` takes it, None without dynamics."""
+        if self.balance is None or not self.is_dynamic:
+            return None
+        carried = self.balance.load(self._state)
+        return None if carried is None else carried.seen_from(self.actual)
 
     def send_velocity(self, x: float, y: float, yaw: float, hold: float = 1.0) -> Goal:
         """Let the robot keep a velocity, the newest from each landing of a foot; see ``RobotInterface``."""
@@ -330,13 +337,11 @@ class SimulatedRobot(SimulatedBody):
         """Take the frame's motion as done."""
         actual = None
         if self.balance is not None and self.is_dynamic:
-            q, v = (values[0] for values in self.balance.dynamics.read())
-            torques = self.balance.dynamics.efforts_now()[0]
-            loads, before, aim = self.balance.dynamics.loads()[0], self._state, self._motion.aim
-            state = self.balance.judge(before, aim, q, v, torques, self.world.time, loads)
-            self._state = self.balance.dynamics.felt((state,), state.time - before.time)[0]
-            angles = self.actual.angles_of(q)
-            self.actual.move_to(angles, q[:7])
+            found = self.balance.ended(max(self.world.time - self._state.time, 1e-9))[0]
+            self._state = self.balance.judge(self._state, self._motion.aim, *found, self.world.time)
+            self._motion.take_footing(self._state)
+            angles = self.actual.angles_of(self._state.q)
+            self.actual.move_to(angles, self._state.q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
         else:
             self._state = self._burden.after_frame(self._state, self.guard.met)

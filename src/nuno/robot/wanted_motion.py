@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.robot.gait import Gait
+from nuno.robot.leg_motion import feet_put_down
 from nuno.robot.robot_state import RobotState
 from nuno.robot.simulated_joints import SimulatedJoints, joined
 from nuno.robot.stance import Stance
@@ -50,7 +51,7 @@ class WantedMotion:
         """Return how the robot is to move at a time ``end`` [s], ``span`` [s] from now; ``end_frame`` takes that."""
         before, robot = self.aim, self.robot
         rows, given = None, None
-        self._kept = (before, robot._angles, robot._position, robot._quaternion)
+        self._kept = (before, *self._pose())
         if span <= 0.0:
             self.joints.step(0.0)
             return before
@@ -91,11 +92,35 @@ class WantedMotion:
         self.gait.give_up("the robot was put elsewhere")
         self.joints.put(robot.angle_vector())
 
+    def take_footing(self, state: RobotState) -> None:
+        """Let a walk end where the robot was pushed off it, and go on from where it has come to stand again."""
+        step = None if state.footing is None else state.footing.step
+        if step is None:
+            return
+        if self.gait.is_walking:
+            self.gait.interrupt()
+        if step.is_over:
+            self._stand_on(state)
+            self.gait.resume()
+
+    def _stand_on(self, state: RobotState) -> None:
+        """Be at rest on the feet where they are, legs and base; the other joints go on as they are wanted."""
+        robot, time = self.robot, self.aim.time
+        rows, angles = self.gait.rows, self.joints.positions.copy()
+        angles[rows] = robot.angles_of(state.q)[rows]
+        q = feet_put_down(robot, robot.configuration_of(angles, state.q[:7]))
+        robot.move_to(np.clip(robot.angles_of(q), *robot.joint_limits), q[:7])
+        self.joints.put_rows(rows, robot.angle_vector())
+        for name in self.gait.names:
+            self.joints.take_over(name)
+        nothing = np.zeros(robot.model.nv)
+        v = nothing.copy()
+        v[6:] = self.joints.velocities
+        self.aim = RobotState(time, robot.configuration(), v, nothing)
+
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
-        robot = self.robot
-        pose = (robot._angles, robot._position, robot._quaternion)
-        return self.aim, pose, self.joints.save(), self.gait.save()
+        return self.aim, self._pose(), self.joints.save(), self.gait.save()
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; goals that came since are given up."""
@@ -109,6 +134,10 @@ class WantedMotion:
         for controller in self.joints.controllers.values():
             controller.goal = None if controller.goal is None else controller.goal.copy()
         self.gait.disown()
+
+    def _pose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        robot = self.robot
+        return robot._angles, robot._position, robot._quaternion
 
     def _put(self, angles: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> None:
         self.robot._angles = angles

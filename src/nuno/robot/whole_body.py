@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import MissingPackageError
+from nuno.robot.aims import Aims, FootAim
 from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensors import sole_corners
@@ -27,6 +28,14 @@ except ImportError as error:
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
 
+EDGE = 0.9
+"""Share of a sole that is counted on: on its very edge it would roll."""
+LEVEL = 2e-3
+"""[rad] By which a sole that stands may be tilted."""
+SINKS = 0.15
+"""[m/s] At which a foot goes down to ground that is lower than planned."""
+LEGS = 0.01
+"""Weight of the posture of legs, of that of other joints."""
 EQUAL = 5
 """DAQP's mark of a constraint that is an equality."""
 WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -38,11 +47,15 @@ class Gains:
 
     Attributes:
         centre, trunk, foot, posture, force: Weights.
+        catch, swing: Weights of the centre of mass along the ground and of the foot in the air, in a step that catches
+            the robot.
         centre_rate, trunk_rate, foot_rate, posture_rate: Of the double pole that errors follow [1/s].
         stand_rate: At which what moves of a standing foot is braked [1/s].
     """
 
     centre: float = 10.0
+    catch: float = 50.0
+    swing: float = 20.0
     trunk: float = 3.0
     foot: float = 100.0
     posture: float = 0.1
@@ -69,102 +82,101 @@ class WholeBodyControl:
     ) -> None:
         self._model = robot.model.copy()
         self._model.gravity.linear = np.array(gravity, dtype=float)
-        self._data, self._wanted = self._model.createData(), self._model.createData()
+        self._data = self._model.createData()
+        self._nothing = np.zeros(self._model.nv)
         self.gains = gains or Gains()
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
-        self._corners = [sole_corners(robot.description.frames[foot]) for foot in robot.description.feet]
+        self._corners = [EDGE * sole_corners(robot.description.frames[foot]) for foot in robot.description.feet]
         limits = robot.effort_limits
         self._efforts = np.where(np.isfinite(limits) & (limits > 0.0), limits, 1e9)
+        chains = [set(robot.model.supports[robot.model.frames[foot].parentJoint]) for foot in self._feet]
+        of_legs = {j for chain in chains for j in chain if sum(j in other for other in chains) == 1 and j > 1}
+        # feet and trunk say all of where a leg of six joints is
+        self._share = np.array([LEGS if n + 2 in of_legs else 1.0 for n in range(len(limits))])
         flat = friction / np.sqrt(2.0)
         self._pyramid = np.array([[1.0, 0, -flat], [-1.0, 0, -flat], [0, 1.0, -flat], [0, -1.0, -flat], [0, 0, -1.0]])
 
     def solve(
-        self, now: RobotState, wanted: RobotState, stands: tuple[bool, ...], external: Any = None
+        self, now: RobotState, aims: Aims, loads: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Return accelerations (nv,) of base and joints and torques (n,) of the joints, None where there are none.
 
         Args:
             now: How the robot moves.
-            wanted: How it is to move.
-            stands: Of each foot, whether it bears.
-            external: Forces on the joints in their own frames, as Pinocchio takes them, or None.
+            aims: What is wanted.
+            loads: (njoints, 6) [N, N m] on Pinocchio's joints in their own frames, or None.
         """
-        model, data, ref, gains = self._model, self._data, self._wanted, self.gains
-        nv = model.nv
-        none = np.zeros(nv)
+        model, data, gains = self._model, self._data, self.gains
+        nv, none = model.nv, self._nothing
         pin.computeJointJacobians(model, data, now.q)
         pin.centerOfMass(model, data, now.q, now.v, none)
-        drift = np.array(data.acom[0])
-        centre, centre_speed = np.array(data.com[0]), np.array(data.vcom[0])
+        drift, centre, speed = (np.array(own[0]) for own in (data.acom, data.com, data.vcom))
         centre_rows = np.array(pin.jacobianCenterOfMass(model, data, now.q))
         mass = np.array(pin.crba(model, data, now.q, pin.Convention.WORLD))
         mass = np.triu(mass) + np.triu(mass, 1).T
-        forced = () if external is None else (external,)
+        forced = () if loads is None else (pin.StdVec_Force([pin.Force(own) for own in loads]),)
         bias = np.array(pin.rnea(model, data, now.q, now.v, none, *forced))
         pin.forwardKinematics(model, data, now.q, now.v, none)
         pin.updateFramePlacements(model, data)
-        pin.centerOfMass(model, ref, wanted.q, wanted.v, wanted.a)
-        pin.forwardKinematics(model, ref, wanted.q, wanted.v, wanted.a)
-        pin.updateFramePlacements(model, ref)
 
-        rows: list[np.ndarray] = []
-        aims: list[np.ndarray] = []
-
-        def task(weight: float, jacobian: np.ndarray, aim: np.ndarray) -> None:
-            rows.append(np.sqrt(weight) * jacobian)
-            aims.append(np.sqrt(weight) * aim)
-
-        def back(rate: float, error: np.ndarray, speed: np.ndarray) -> np.ndarray:
-            return rate * rate * error + 2.0 * rate * speed
-
-        task(
-            gains.centre, centre_rows,
-            ref.acom[0] + back(gains.centre_rate, ref.com[0] - centre, ref.vcom[0] - centre_speed) - drift,
-        )  # fmt: skip
-        turn, turn_wanted = data.oMi[1].rotation, ref.oMi[1].rotation
-        across = turn.T @ turn_wanted
-        trunk = np.zeros((3, nv))
-        trunk[:, 3:6] = np.eye(3)
-        task(
-            gains.trunk, trunk,
-            across @ wanted.a[3:6] + back(gains.trunk_rate, pin.log3(across), across @ wanted.v[3:6] - now.v[3:6]),
-        )  # fmt: skip
-        posture = np.eye(nv)[6:]
-        error = pin.difference(model, now.q, wanted.q)[6:]
-        task(gains.posture, posture, wanted.a[6:] + back(gains.posture_rate, error, (wanted.v - now.v)[6:]))
+        tasks = np.zeros((6 + model.nv - 6 + 6 * len(self._feet), nv))
+        wanted = np.zeros(len(tasks))
+        weights = np.empty(len(tasks))
+        pull = _back(gains.centre_rate, aims.centre[0] - centre, aims.centre[1] - speed)
+        if aims.falls_freely:
+            pull[:2] = 0.0
+        tasks[:3], wanted[:3], weights[:3] = centre_rows, aims.centre[2] + pull - drift, gains.centre
+        if aims.falls_freely:
+            weights[:2] = gains.catch
+        error = pin.difference(model, now.q, aims.q)
+        across = pin.Quaternion(now.q[3:7]).toRotationMatrix().T @ pin.Quaternion(aims.q[3:7]).toRotationMatrix()
+        tasks[3:6, 3:6], weights[3:6] = np.eye(3), gains.trunk
+        wanted[3:6] = across @ aims.a[3:6] + _back(gains.trunk_rate, error[3:6], across @ aims.v[3:6] - now.v[3:6])
+        tasks[6:nv, 6:], weights[6:nv] = np.eye(nv - 6), gains.posture * self._share
+        wanted[6:nv] = aims.a[6:] + _back(gains.posture_rate, error[6:], (aims.v - now.v)[6:])
         touching: list[np.ndarray] = []
-        for frame, corners, bears in zip(self._feet, self._corners, stands, strict=True):
+        for k, (frame, corners, aim) in enumerate(zip(self._feet, self._corners, aims.feet, strict=True)):
+            row = slice(nv + 6 * k, nv + 6 * k + 6)
             own = np.array(pin.getFrameJacobian(model, data, frame, WORLD_AXES))
-            fall = pin.getFrameClassicalAcceleration(model, data, frame, WORLD_AXES).vector
-            speed = pin.getFrameVelocity(model, data, frame, WORLD_AXES).vector
-            place, place_wanted = data.oMf[frame], ref.oMf[frame]
-            error = np.concatenate([
-                place_wanted.translation - place.translation, pin.log3(place_wanted.rotation @ place.rotation.T),
-            ])  # fmt: skip
-            if bears:
-                lift = (place.rotation @ corners.T)[2] + place.translation[2]
-                touch = np.ptp(lift) < 2e-3 and abs(error[2]) < 2e-3
-                pull = np.zeros(6) if touch else error * (0, 0, 1, 1, 1, 0)
-                aim = 4.0 * gains.stand_rate * pull * gains.foot_rate - gains.stand_rate * speed
-                for corner in corners:
-                    arm = place.rotation @ corner
+            tasks[row], weights[row] = own, gains.swing if aims.falls_freely and not aim.bears else gains.foot
+            wanted[row] = self._foot(data, frame, aim)
+            if aim.bears:
+                for arm in corners @ data.oMf[frame].rotation.T:
                     touching.append(own[:3] - pin.skew(arm) @ own[3:])
-            else:
-                goal = pin.getFrameClassicalAcceleration(model, ref, frame, WORLD_AXES).vector
-                wants = pin.getFrameVelocity(model, ref, frame, WORLD_AXES).vector
-                aim = goal + back(gains.foot_rate, error, wants - speed)
-            task(gains.foot, own, aim - fall)
-        n, forces = nv, 3 * len(touching)
-        contact = np.concatenate(touching) if touching else np.zeros((0, nv))
-        tasks, aim_all = np.concatenate(rows), np.concatenate(aims)
-        hessian = np.zeros((n + forces, n + forces))
+        return self._minimised(np.sqrt(weights)[:, None] * tasks, np.sqrt(weights) * wanted, touching, mass, bias)
+
+    def _foot(self, data: Any, frame: int, aim: FootAim) -> np.ndarray:
+        """Return the acceleration (6,) that a foot is to have beside what the joints' velocities bring about."""
+        model, gains = self._model, self.gains
+        fall = pin.getFrameClassicalAcceleration(model, data, frame, WORLD_AXES).vector
+        speed = pin.getFrameVelocity(model, data, frame, WORLD_AXES).vector
+        place = data.oMf[frame]
+        error = np.empty(6)
+        error[:3] = aim.place.translation - place.translation
+        error[3:] = pin.log3(aim.place.rotation @ place.rotation.T)
+        if aim.bears:
+            pull = error * (0, 0, 0, 1, 1, 0) if np.abs(error[3:5]).max() > LEVEL else np.zeros(6)
+            found = 4.0 * gains.stand_rate * gains.foot_rate * pull - gains.stand_rate * speed
+        else:
+            found = aim.acceleration + _back(gains.foot_rate, error, aim.speed - speed)
+            if aim.sinks:
+                found[2] = -gains.stand_rate * (SINKS + speed[2])
+        return np.asarray(found - fall)
+
+    def _minimised(
+        self, tasks: np.ndarray, wanted: np.ndarray, touching: list[np.ndarray], mass: np.ndarray, bias: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return accelerations and torques that miss the tasks least; None where nothing fulfils the constraints."""
+        n, count = len(bias), len(touching)
+        contact = np.concatenate(touching) if touching else np.zeros((0, n))
+        hessian = np.zeros((n + 3 * count, n + 3 * count))
         hessian[:n, :n] = tasks.T @ tasks + 1e-6 * np.eye(n)
-        hessian[n:, n:] = gains.force * np.eye(forces)
-        linear = np.zeros(n + forces)
-        linear[:n] = -tasks.T @ aim_all
+        hessian[n:, n:] = self.gains.force * np.eye(3 * count)
+        linear = np.zeros(n + 3 * count)
+        linear[:n] = -tasks.T @ wanted
         motion = np.concatenate([mass, -contact.T], axis=1)
-        cones = np.zeros((5 * len(touching), n + forces))
-        for k in range(len(touching)):
+        cones = np.zeros((5 * count, n + 3 * count))
+        for k in range(count):
             cones[5 * k : 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
         constraints = np.concatenate([motion, cones])
         upper = np.concatenate([-bias[:6], self._efforts - bias[6:], np.zeros(len(cones))])
@@ -175,3 +187,7 @@ class WholeBodyControl:
         if flag <= 0:
             return None
         return np.asarray(found[:n]), np.asarray((motion @ found + bias)[6:])
+
+
+def _back(rate: float, error: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    return rate * rate * error + 2.0 * rate * speed
