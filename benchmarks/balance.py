@@ -144,6 +144,7 @@ def pushes(name: str, bar: Any) -> list[dict[str, Any]]:
     scene = Scene.of(name)
     scene.robot.sleep(0.5)
     saved, found = scene.world.save(), []
+    bounds = {degrees: capture_bound(scene.robot, degrees) for degrees in DIRECTIONS.values()}
     for direction, degrees in DIRECTIONS.items():
         results: dict[float, str] = {}
 
@@ -167,7 +168,7 @@ def pushes(name: str, bar: Any) -> list[dict[str, Any]]:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if survives(middle) else (low, middle)
         found.append({"robot": name, "direction": direction, "survived": survived, "limit": low, "falls_at": high,
-                      "capture_bound": capture_bound(scene.robot, degrees), "results": results})  # fmt: skip
+                      "capture_bound": bounds[degrees], "results": results})  # fmt: skip
     return found
 
 

@@ -125,10 +125,9 @@ def tumbling_talos():
     dynamics = LinkDynamics(model.enter(world, "joints"))
     dynamics.attach()
     spin, velocity = np.array((0.5, 2.0, 0.3)), np.array((0.3, -0.2, 1.0))
-    for k, body in enumerate(dynamics.bodies):
-        place = model.data.oMi[k + 1]
-        middle = place.rotation @ model.model.inertias[k + 1].lever + place.translation
-        world.set_velocity(body, velocity + np.cross(spin, middle - model.centre_of_mass), spin)
+    for body in dynamics.bodies:
+        arm = np.asarray(body.centre_of_mass) - model.centre_of_mass
+        world.set_velocity(body, velocity + np.cross(spin, arm), spin)
     return world, dynamics, velocity
 
 
