@@ -14,11 +14,15 @@ correlation of F over all that succeed in both. `--arms boxes` takes boxes aroun
 device may be on a machine without Pinocchio. `--warm` runs once more, now that all kernels are loaded.
 `--stiffness` instead clamps strips of the soft mat, 0.15 m free, and reads the bending rigidity off their sag: tip drop
 over reach H / W of a strip under its own weight against the elastica's (theta'' = -G (1 - s) cos theta, G = w L^3 / B).
+`--body weight` carries with a whole robot that has dynamics, one trial after the other; `--body kinematic` with the
+same links going where they are sent. Trials are appended to the `--json` file, and it goes on from there.
+`--compare FILE FILE` says how alike two such files, or one and that of a batch, are.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import multiprocessing
 import pathlib
@@ -32,6 +36,8 @@ import numpy as np
 import nuno
 from nuno.tasks import carry_mat as carrying
 from nuno.tasks.arm_tracks import ArmTracks
+from nuno.tasks.carry_by_robot import carry_by_robot
+from nuno.tasks.carry_plan import make_plan
 from nuno.tasks.carry_result import CarryResult
 
 TABLE_G = np.array([0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0])
@@ -82,6 +88,68 @@ def plan(arms: str, path: str | None, processes: int) -> tuple[ArmTracks, dict[s
     else:
         tracks = carrying.plan_arms("talos", arms=arms)
     return tracks, {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
+
+
+def with_body(tracks: ArmTracks, mat: str, body: str, path: pathlib.Path) -> None:
+    """Carry with a whole robot, and append each trial to a file of JSON lines as it ends."""
+    carried, material = carrying._mat(mat, None)
+    plan = make_plan(tracks, carried, material, hold="support", arm_friction=0.5)
+    ways = itertools.product(range(len(tracks.distances)), carrying.OFFSETS_X, carrying.OFFSETS_Y)
+    rows = [(float(tracks.distances[walk]), x, y, walk) for walk, x, y in ways]
+    done = {way_of(row) for row in read_lines(path)} if path.exists() else set()
+    robot = nuno.Humanoid(tracks.robot)
+    for distance, x, y, walk in rows:
+        if (round(distance, 4), x, y) in done:
+            continue
+        wall, busy = time.perf_counter(), time.process_time()
+        found = carry_by_robot(
+            robot, plan, walk, np.array([x, y]), dynamics=body == "weight", goal=carrying.WALK
+        )  # fmt: skip
+        said = {name: None if value != value else value for name, value in vars(found).items()}
+        said |= {"arm_distance": distance, "offset_x": x, "offset_y": y, "body": body}
+        said |= {"wall_s": time.perf_counter() - wall, "busy_s": time.process_time() - busy}
+        print(said, flush=True)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(said) + "\n")
+
+
+def read_lines(path: pathlib.Path) -> list[dict[str, Any]]:
+    """Read the trials of a file of JSON lines, or those in the result.json of a batch."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".json" and text.lstrip().startswith("{\n"):
+        trials: list[dict[str, Any]] = json.loads(text)["trials"]
+        return trials
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def way_of(row: dict[str, Any]) -> tuple[float, float, float]:
+    """Return the three parameters of a trial."""
+    return round(row["arm_distance"], 4), row["offset_x"], row["offset_y"]
+
+
+def compare_files(paths: list[str]) -> None:
+    """Print the trials that two files share, and how their orders by F agree."""
+    from scipy.stats import spearmanr
+
+    first, second = ({way_of(row): row for row in read_lines(pathlib.Path(path))} for path in paths)
+    shared = sorted(set(first) & set(second))
+    print("| arms, ahead, aside [m] | F | F | why |\n|---|---|---|---|")
+    for way in shared:
+        cells = [
+            f"{1000.0 * row['value']:.1f}" if row["value"] is not None else f"x {row['failed_at']:.1f}"
+            for row in (first[way], second[way])
+        ]
+        print(f"| {way[0]:.3f}, {way[1]:+.2f}, {way[2]:+.2f} | {cells[0]} | {cells[1]} | {second[way]['reason']} |")
+    values = np.array([[np.nan if own[way]["value"] is None else own[way]["value"] for way in shared]
+                       for own in (first, second)])  # fmt: skip
+    both = np.isfinite(values).all(axis=0)
+    agree = (np.isfinite(values[0]) == np.isfinite(values[1])).mean() if shared else np.nan
+    order = spearmanr(*values[:, both])[0] if both.sum() > 2 else np.nan
+    print(
+        f"{len(shared)} shared, carried {np.isfinite(values).sum(axis=1).tolist()}, success and failure agree in "
+        f"{100 * agree:.1f} %, Spearman {order:.3f} over {both.sum()}, F of the second "
+        f"{np.median(values[1, both] / values[0, both]):.2f} times the first's in the median"
+    )
 
 
 def default_substeps(mat: nuno.Body, material: Any) -> int:
@@ -152,17 +220,26 @@ def main() -> None:
     options.add_argument("--save-plans", help="a file to write plans to")
     options.add_argument("--plan-only", action="store_true")
     options.add_argument("--stiffness", action="store_true")
+    options.add_argument("--body", choices=("weight", "kinematic"), help="a whole robot, one trial after the other")
+    options.add_argument("--compare", nargs=2, metavar="FILE", help="two files of trials")
     options.add_argument("--out", help="folder for table and pictures")
     options.add_argument("--json", help="file for the numbers")
     asked = options.parse_args()
     if asked.stiffness:
         stiffness()
         return
+    if asked.compare:
+        compare_files(asked.compare)
+        return
     tracks, planning = plan(asked.arms, asked.plans, asked.processes)
     print(f"{len(tracks.distances)} walks and the arms along them: {planning}", flush=True)
     if asked.save_plans:
         tracks.save(asked.save_plans)
     if asked.plan_only:
+        return
+    if asked.body:
+        path = pathlib.Path(asked.json or f"carry-{asked.body}.jsonl")
+        with_body(tracks.of_walks(slice(None, None, asked.every)), asked.mat, asked.body, path)
         return
     given: dict[str, Any] = dict(
         robot=tracks.of_walks(slice(None, None, asked.every)), mat=asked.mat, hold=asked.hold, device=asked.device

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.errors import NunoError
+from nuno.errors import NunoError, WalkError
 from nuno.robot.footsteps import steps_of_velocity
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.preview_control import TICK
@@ -17,7 +18,7 @@ from nuno.robot.robot_state import RobotState
 from nuno.robot.running_walk import RunningWalk, landing_after, run_on, set_off
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.support import standing_place
-from nuno.robot.walk import Walk
+from nuno.robot.walk import TimedMotion, Walk
 from nuno.robot.walk_planner import MARGIN, WalkPlanner
 from nuno.robot.walking import continue_walk, plan_walk, plan_walk_velocity, stop_walk
 
@@ -54,6 +55,10 @@ class Drive:
         return self.velocity if clock < self.until - SOON else np.zeros(3)
 
 
+Looks = Callable[[RunningWalk, float], object]
+"""What a robot would run into on a walk from a time [s] of it on, None for nothing."""
+
+
 class Gait:
     """A walk, its goal, and how far it is. Times are of the joints' clock.
 
@@ -64,6 +69,9 @@ class Gait:
     Args:
         robot: The robot that walks.
         joints: Its joints, of which those of ``WALKING`` are the walk's.
+
+    Attributes:
+        looks: Asked before a velocity is taken, where not None.
     """
 
     def __init__(self, robot: Humanoid, joints: SimulatedJoints) -> None:
@@ -76,11 +84,51 @@ class Gait:
         self._drive: Drive | None = None
         self._start = 0.0  # when the walk's own time was 0
         self._waiting: tuple[Goal, Place] | None = None  # the next goal, for when the robot stands
+        self._cut = ""  # why the walk ends before its goal
+        self.looks: Looks | None = None
 
     @property
     def is_walking(self) -> bool:
         """Return True if the robot is under way."""
         return self.walk is not None
+
+    @property
+    def end(self) -> float:
+        """When the walk is over [s], of the joints' clock; of a velocity that is kept, as far as it is worked out."""
+        walk = self.walk
+        if walk is None:
+            return -math.inf
+        return self._start + (walk.known_until if isinstance(walk, RunningWalk) else float(walk.times[-1]))
+
+    def ahead(self, clock: np.ndarray) -> np.ndarray:
+        """Return the configurations (k, nq) of the walk under way at times (k,) [s]; nothing changes."""
+        assert self.walk is not None
+        t = clock - self._start
+        found = self.walk.sampled(np.minimum(t, self.end - self._start))
+        if self._before is not None and (first := t < self.walk.times[0]).any():
+            found[first] = self._before.sampled(t[first])
+        return found
+
+    def turn_back(self, hit: float, why: str, meets: Callable[[TimedMotion, float], object]) -> bool:
+        """Let the walk end before a time [s], as late as it safely can; return whether it does.
+
+        Args:
+            hit: The time, of the joints' clock.
+            why: What would happen then.
+            meets: What a robot on a walk would run into, from a time of it on; None for nothing.
+        """
+        walk, now = self.walk, self._next_tick()
+        if not isinstance(walk, Walk):
+            return False
+        landings = {walk.schedule.landing(k) * TICK for k in range(len(walk.schedule.steps))}
+        for time in (*sorted((t for t in landings if now < t < hit - self._start), reverse=True), now):
+            shorter = stop_walk(walk, time)
+            if meets(shorter, now) is None:
+                missed = float(np.linalg.norm(walk.configurations[-1][:2] - shorter.configurations[-1][:2]))
+                self._cut = f"{why}; the walk ends {missed:.2f} m before its goal"
+                self._before, self.walk = walk, shorter
+                return True
+        return False
 
     def moves(self, controller: str) -> bool:
         """Return True if the walk has the joints of a controller."""
@@ -110,7 +158,7 @@ class Gait:
             return
         for name in self._names:
             self._joints.take_over(name)
-        self.walk, self._before, self.goal, self._drive = walk, None, goal, None
+        self.walk, self._before, self.goal, self._drive, self._cut = walk, None, goal, None, ""
         self._start = self._joints.clock - float(walk.times[0])
         goal.status = GoalStatus.ACTIVE
 
@@ -127,7 +175,7 @@ class Gait:
             goal.finish(GoalStatus.REJECTED, text=str(error))
             return
         self._drop("another goal took its place")
-        self._before, self.walk, self.goal = self.walk, changed, goal
+        self._before, self.walk, self.goal, self._cut = self.walk, changed, goal, ""
         goal.status = GoalStatus.ACTIVE
 
     def drive(self, x: float, y: float, yaw: float, hold: float) -> Goal:
@@ -161,6 +209,8 @@ class Gait:
     def _set_off(self, goal: Goal, velocity: np.ndarray, until: float) -> None:
         try:
             walk: RunningWalk | str = set_off(WalkPlanner(self._robot, None, None, None, MARGIN, True), velocity)
+            if self.looks is not None and not isinstance(walk, str) and (met := self.looks(walk, 0.0)) is not None:
+                walk = str(met)
         except NunoError as error:
             walk = str(error)
         self.begin(walk, goal)
@@ -175,7 +225,12 @@ class Gait:
             velocity = self._drive.now(self._start + at * TICK)
             try:
                 if velocity.any() or not (isinstance(walk, RunningWalk) and walk.is_closing):
-                    walk = run_on(walk, at, velocity)
+                    changed = run_on(walk, at, velocity)
+                    if velocity.any() and self.looks is not None:
+                        met = self.looks(changed, at * TICK)
+                        if met is not None:  # as it is, the walk was found to be free
+                            raise WalkError(str(met))
+                    walk = changed
             except NunoError as error:  # the walk as it is has its end in it, too
                 if velocity.any():
                     logger.warning("the robot comes to rest, as it cannot walk on so: %s", error)
@@ -223,6 +278,8 @@ class Gait:
             return
         if self.goal.status == GoalStatus.PREEMPTING:
             self.goal.finish(GoalStatus.PREEMPTED, text="it was cancelled")
+        if self._cut:
+            self.goal.finish(GoalStatus.ABORTED, text=self._cut)
         self.goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
         if self._waiting is not None:
             (goal, place), self._waiting = self._waiting, None
@@ -236,11 +293,11 @@ class Gait:
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         status = None if self.goal is None else (self.goal.status, self.goal.text)
-        return self.goal, status, self.walk, self._before, self._start, self._waiting, self._drive
+        return self.goal, status, self.walk, self._before, self._start, self._waiting, self._drive, self._cut
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; a goal that came since is given up."""
-        goal, status, self.walk, self._before, self._start, waiting, self._drive = saved
+        goal, status, self.walk, self._before, self._start, waiting, self._drive, self._cut = saved
         if self.goal is not goal:
             self._drop("the world was restored")
         self.goal, self._waiting = goal, waiting
@@ -253,8 +310,10 @@ class Gait:
         if self._waiting is not None:
             self._waiting = (self._waiting[0].copy(), self._waiting[1])
 
-    def give_up(self, why: str) -> None:
-        """Stop at once, wherever the feet are: the robot was put elsewhere."""
+    def give_up(self, why: str, aborted: bool = False) -> None:
+        """Stop at once, wherever the feet are: the robot was put elsewhere, or (``aborted``) met something."""
+        if aborted and self.goal is not None:
+            self.goal.finish(GoalStatus.ABORTED, text=why)
         self._drop(why)
         self.walk = self._before = self._drive = None
 

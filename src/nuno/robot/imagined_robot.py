@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
@@ -43,7 +45,7 @@ class ImaginedRobot:
     ) -> None:  # fmt: skip
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names
-        state, motion, self._servo = original.saved() if of is None else of[0].saved_of(of[1])
+        state, motion, self._servo, found = original.saved() if of is None else of[0].saved_of(of[1])
         self._links = [world.find(body.name) for body in original.links.bodies]
         self.balance: Balance | None = None
         if original.balance is not None and (original.is_dynamic if of is None else of[0].balance is not None):
@@ -58,6 +60,13 @@ class ImaginedRobot:
             for name, controller in own.joints.controllers.items():
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)
+        whole = self._is_whole() and self.balance is None
+        self._guards: list[MotionGuard] = []
+        for k, own in enumerate(self._motions if whole else []):
+            above = self._guards[0] if self._guards else original._guard
+            self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
+            self._guards[k].load(found)
+            own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
 
     def __repr__(self) -> str:
@@ -108,11 +117,12 @@ class ImaginedRobot:
             robot = self.original.actual
             return np.array([robot.angles_of(state.q) for state in self._states])
 
-    def saved_of(self, world: int) -> tuple[RobotState, Any, Any]:
-        """Return state, wanted motion and servo command of one world, as ``SimulatedRobot.saved`` does."""
+    def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any]:
+        """Return of one world what ``SimulatedRobot.saved`` does of the robot."""
         if not 0 <= world < len(self._motions):
             raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
-        return self._states[world], self._motions[world].save(), self._servo
+        found = self._guards[world].save() if self._guards else None
+        return self._states[world], self._motions[world].save(), self._servo, found
 
     # What the world asks of it
 
@@ -122,6 +132,9 @@ class ImaginedRobot:
             return
         span, self._before = end - start, list(self._states)
         servo = None if self.balance is not None or self._servo is None else self._serve
+        if span > 0.0:
+            for guard, own in zip(self._guards, self._motions, strict=False):
+                guard.before_frame(own, span)
         aims = [own.begin(end, span, servo) for own in self._motions]
         if span <= 0.0:
             return
@@ -146,6 +159,10 @@ class ImaginedRobot:
             for own in self._motions:
                 own.joints.take_step()
                 own.gait.end_frame()
+            self._states = [
+                state if guard.met is None else replace(state, collision=guard.met)
+                for guard, state in zip(self._guards, self._states, strict=True)
+            ]
             return
         q, v = self.balance.dynamics.read()
         torques = self.balance.dynamics.efforts_now()
@@ -164,14 +181,17 @@ class ImaginedRobot:
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         joints = () if self.balance is None else self.balance.dynamics.joints
-        return list(self._states), [own.save() for own in self._motions], joints, self._servo
+        found = [guard.save() for guard in self._guards]
+        return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
-        states, motions, joints, self._servo = saved
+        states, motions, joints, self._servo, found = saved
         self._states = list(states)
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
+        for guard, own in zip(self._guards, found, strict=True):
+            guard.load(own)
         if self.balance is not None:
             self.balance.dynamics.joints = joints
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.robot.collision import Collision, Unbalance
+
 
 @dataclass(frozen=True, eq=False)
 class RobotState:
@@ -18,7 +20,10 @@ class RobotState:
         a: (nv,) float, acceleration likewise, that of the base without gravity.
         torques: (n,) float [N m; N], of the joints' motors, where the robot has dynamics; None else.
         fallen: Why and when the robot fell, where it has dynamics and did; None else.
-        over_torque: Names of joints whose motors gave all that they can.
+        over_torque: Names of joints whose motors gave all that they can; of a robot without dynamics those that would
+            need more than that, by inverse dynamics with all that the links bear.
+        unbalanced: Of a robot without dynamics, that its zero moment point is not under its soles; None where it is.
+        collision: Of a robot without dynamics, what its motion would run into, or was stopped by; None for nothing.
     """
 
     time: float
@@ -28,3 +33,5 @@ class RobotState:
     torques: np.ndarray | None = None
     fallen: str | None = None
     over_torque: tuple[str, ...] = ()
+    unbalanced: Unbalance | None = None
+    collision: Collision | None = None

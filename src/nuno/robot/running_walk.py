@@ -101,6 +101,11 @@ class RunningWalk(TimedMotion):
         """The footsteps and their times."""
         return self._schedule
 
+    @property
+    def known_until(self) -> float:
+        """The time [s] up to which all is worked out, and the tick after it."""
+        return float(self.times[-1] if self._done == len(self.times) else self.times[max(self._done - 2, 0)])
+
     def ensure(self, tick: int) -> None:
         """Work out all up to a tick, counted from the beginning of this walk, and the one after it.
 

@@ -174,6 +174,16 @@ class Sensors:
             read[name] = sensor.read(before.get(name, 0.0))
         return self._told(state.time, read)
 
+    @property
+    def soles(self) -> np.ndarray | None:
+        """Where the corners of the soles were at the last reading, (feet, 4, 3) [m]; None without feet."""
+        return self._corners if self._feet else None
+
+    def follow_loads(self) -> None:
+        """Take note of what bears on the links: a reading in the next frame need not ask solvers for contacts then."""
+        if self._loads is not None:
+            self._loads.read()
+
     def state_at_rest(self) -> RobotState:
         """Return the state of the robot at rest where it is now, at the world's time."""
         nothing = np.zeros(self._model.nv)

@@ -14,9 +14,11 @@ from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
+    from nuno.robot.burden import Burden
     from nuno.robot.gait import Gait
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
+    from nuno.robot.motion_guard import MotionGuard
     from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.robot.wanted_motion import WantedMotion
 
@@ -37,11 +39,25 @@ class SimulatedBody(SimulatedSenses):
     balance: Balance | None
     wanted: Humanoid
     _motion: WantedMotion
+    _guard: MotionGuard
+    _burden: Burden
 
     @property
     def is_dynamic(self) -> bool:
         """Return True if the links have dynamics."""
         return self.balance is not None and self.balance.dynamics.is_attached
+
+    @property
+    def collisions(self) -> str:
+        """What becomes of motions through static shapes, without dynamics: "stop", "warn" or "ignore"."""
+        return self._guard.mode
+
+    @collisions.setter
+    def collisions(self, mode: str) -> None:
+        self._guard.check_mode(mode)
+        with self.world.lock:
+            self._guard.mode = mode
+            self._look_anew()
 
     def attach(self) -> None:
         """Give the links dynamics from where they are, at rest: masses, motors, contact and balance.
@@ -97,6 +113,11 @@ class SimulatedBody(SimulatedSenses):
 
     def _start_from(self, q: np.ndarray) -> None:
         self._motion.start_from(q, self.world.time)
+        self._look_anew()
         self._state = self._motion.aim
         if self.actual is not self.wanted:
             self.actual.move_to(self.wanted.angle_vector(), q[:7])
+
+    def _look_anew(self) -> None:
+        self._guard.forget()
+        self._burden.forget()

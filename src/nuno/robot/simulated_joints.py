@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.robot.goal import Goal, Tolerances
+from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.trajectory import JointTrajectory, Motion, evaluate, resting_at, with_derivatives
 from nuno.robot.trajectory_controller import TrajectoryController
 
@@ -40,12 +40,13 @@ class SimulatedJoints:
         velocities: (n,) float.
         accelerations: (n,) float.
         desired: Positions, velocities and accelerations (n,) as the controllers want them.
+        commands: How often anything was asked of them, or taken back.
     """
 
     def __init__(self, robot: Humanoid, groups: Mapping[str, Sequence[str]]) -> None:
         self.limits, self.velocity_limits = robot.joint_limits, robot.velocity_limits
         count = len(robot.joint_names)
-        self.clock = 0.0
+        self.clock, self.commands = 0.0, 0
         self.positions = robot.angle_vector()
         self.velocities, self.accelerations = np.zeros(count), np.zeros(count)
         self.desired: Motion = (self.positions, self.velocities, self.accelerations)
@@ -70,6 +71,43 @@ class SimulatedJoints:
         if any([own.is_busy for own in self.controllers.values()]):
             return False
         return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()
+
+    def ahead(self, times: np.ndarray, given: np.ndarray | None = None, rows: Any = ()) -> np.ndarray:
+        """Return where the joints will be (k, n) at times (k,) [s] from now on, evenly spaced; nothing changes.
+
+        Args:
+            times: Of their clock, the first is now.
+            given: (k, m) where something else moves some joints.
+            rows: Those joints, (m,).
+        """
+        found = np.tile(self.desired[0], (len(times), 1))
+        for name, controller in self.controllers.items():
+            found[:, self.rows[name]] = controller.ahead(times)
+        if given is not None:
+            found[:, rows] = given
+        found[0] = self.positions
+        far = self.velocity_limits * (float(times[1] - times[0]) * ROUNDING)
+        lower, upper = self.limits
+        late = (np.abs(np.diff(found, axis=0)) > far).any(axis=0)
+        for joint in np.flatnonzero(late):  # they lag behind at their greatest velocity
+            wanted, at, most = found[:, joint].tolist(), float(self.positions[joint]), float(far[joint])
+            for k in range(1, len(times)):
+                at += min(max(wanted[k] - at, -most), most)
+                found[k, joint] = at
+        return np.clip(found, lower, upper)
+
+    @property
+    def end(self) -> float:
+        """When the joints come to rest [s] as far as is known now; that of their clock where they rest."""
+        end = max([self.clock, *(controller.end for controller in self.controllers.values())])
+        lag = np.abs(self.desired[0] - self.positions) / np.maximum(self.velocity_limits, 1e-9)
+        return end + float(lag.max(initial=0.0))
+
+    def stop(self, name: str, text: str) -> None:
+        """Let a controller give up its goal, which ends as aborted, and hold the joints where they are."""
+        own = self.controllers[name]
+        own.hold(self.positions[self.rows[name]], GoalStatus.ABORTED, ResultCode.PATH_TOLERANCE_VIOLATED, text)
+        self._ask(name)
 
     def step(self, duration: float, rows: np.ndarray | None = None, given: Motion | None = None) -> Motion:
         """Return positions, velocities and accelerations (n,) that the joints have ``duration`` [s] later.
@@ -121,19 +159,19 @@ class SimulatedJoints:
     def cancel(self, name: str) -> None:
         """Let a controller give up its goal and hold the joints where they are."""
         self.controllers[name].cancel(self.positions[self.rows[name]])
-        self._follow(name)
+        self._ask(name)
 
     def take_over(self, name: str) -> None:
         """Let something else move a controller's joints, or give them back: it holds them where they are now."""
         self.controllers[name].move_rest(self.positions[self.rows[name]])
-        self._follow(name)
+        self._ask(name)
 
     def send(
         self, name: str, trajectory: JointTrajectory, start_time: float = 0.0, tolerances: Tolerances | None = None
     ) -> Goal:
         """Send a trajectory to a controller, to start ``start_time`` [s] from now."""
         goal = self.controllers[name].accept(trajectory, self.clock, start_time, tolerances)
-        self._follow(name)
+        self._ask(name)
         return goal
 
     def save(self) -> tuple[Any, ...]:
@@ -148,7 +186,11 @@ class SimulatedJoints:
         self._pending = None
         for name, controller in self.controllers.items():
             controller.load(controllers[name])
-            self._follow(name)
+            self._ask(name)
+
+    def _ask(self, name: str) -> None:
+        self.commands += 1
+        self._follow(name)
 
     def _follow(self, name: str) -> None:
         rows, piece = self.rows[name], self.controllers[name].piece

@@ -10,10 +10,12 @@ import numpy as np
 
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.robot.balance import Balance
+from nuno.robot.burden import Burden
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.hands import hands_of
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
+from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.readings import JointState
 from nuno.robot.robot_state import RobotState
 from nuno.robot.sensor_model import SensorModel
@@ -56,9 +58,11 @@ class SimulatedRobot(SimulatedBody):
         dynamics: Whether its links have dynamics from the start: masses, motors with limits, contact, balance; they
             are one body for each joint then. Without, its joints and its walk go exactly where they are sent, and
             nothing pushes them. ``attach`` and ``detach`` change it at any time.
+        collisions: Without dynamics, what becomes of motions that would take links through static shapes: they "stop"
+            before that, and their goals end as aborted, are told as a warning ("warn"), or pass ("ignore").
 
     Raises:
-        InvalidInputError: the links are in another world, or the world is a batch.
+        InvalidInputError: the links are in another world, the world is a batch, or ``collisions`` is something else.
         BodyStateError: a robot moves these links already.
 
     Attributes:
@@ -74,6 +78,7 @@ class SimulatedRobot(SimulatedBody):
         self, robot: Humanoid, world: World, *, links: Links | None = None, real_time_factor: float | None = None,
         sensors: Mapping[str, SensorModel] | None = None, cameras: HeadCameras | None = None, seed: int = 0,
         default_controller: str = "default_controller", namespace: str | None = None, dynamics: bool = False,
+        collisions: str = "stop",
     ) -> None:  # fmt: skip
         if links is not None and links.world is not world:
             raise InvalidInputError("the links are in another world than the robot is to be in")
@@ -81,6 +86,7 @@ class SimulatedRobot(SimulatedBody):
             raise InvalidInputError("the cameras must be of the links that are given")
         if any(isinstance(other, SimulatedRobot) and other.links is links for other in world.drivers):
             raise BodyStateError(f"another robot moves the links of {robot.name!r} already")
+        MotionGuard.check_mode(collisions)
         self.pace = None if real_time_factor is None else number("real_time_factor", real_time_factor, above=0.0)
         self.world = world
         self._entered = links is None
@@ -100,6 +106,8 @@ class SimulatedRobot(SimulatedBody):
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
+        self._guard, self._burden = MotionGuard(self.links, collisions), Burden(self.links)
+        self.gait.looks = self._guard.velocities_of(self._motion)
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
@@ -296,9 +304,15 @@ class SimulatedRobot(SimulatedBody):
         span, self._before = end - start, self._state
         before = self._motion.aim
         servo = None if self._servo is None or self.is_dynamic else self._serve
+        if span > 0.0 and not self.is_dynamic:
+            self._guard.before_frame(self._motion, span)
         aim = self._motion.begin(end, span, servo)
         if span <= 0.0:
             return
+        if servo is not None and self._guard.after_step(self._motion, before.q) and self.collisions == "stop":
+            self._motion.cancel()
+            self.servo(None)
+            aim = self._motion.begin(end, span)
         if self.balance is not None and self.is_dynamic:
             loads = self.balance.dynamics.loads()[0]
             command = self.balance.command(self._state, aim, span, self._servo, loads)
@@ -320,6 +334,8 @@ class SimulatedRobot(SimulatedBody):
             angles = self.actual.angles_of(q)
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
+        else:
+            self._state = self._burden.after_frame(self._state, self._guard.met)
         self.joints.take_step(actual)
         for gripper in self.grippers.values():
             gripper.end_frame()
@@ -335,11 +351,11 @@ class SimulatedRobot(SimulatedBody):
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
         joints = () if self.balance is None else self.balance.dynamics.joints
-        return self._state, self._motion.save(), joints, grippers, self._servo
+        return self._state, self._motion.save(), joints, grippers, self._servo, self._guard.save(), self._burden.save()
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
-        self._state, motion, joints, grippers, self._servo = saved
+        self._state, motion, joints, grippers, self._servo, guard, burden = saved
         self._motion.load(motion)
         if self.balance is not None:
             self.balance.dynamics.joints = joints
@@ -348,10 +364,12 @@ class SimulatedRobot(SimulatedBody):
         for name, gripper in self.grippers.items():
             gripper.load(grippers[name])
         self._readings = None
+        self._guard.load(guard)
+        self._burden.load(burden)
 
-    def saved(self) -> tuple[RobotState, Any, Any]:
-        """Return its state, what is wanted of it, and its servo command, for its copies in imagined worlds."""
-        return self._state, self._motion.save(), self._servo
+    def saved(self) -> tuple[RobotState, Any, Any, Any]:
+        """Return its state, what is wanted of it, its servo command, and what was found of its way, for its copies."""
+        return self._state, self._motion.save(), self._servo, self._guard.save()
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot:
         """Return the driver of this robot's copies in a batch that was imagined from its world."""
@@ -364,9 +382,9 @@ class SimulatedRobot(SimulatedBody):
         for other in futures.drivers:
             if getattr(other, "original", None) is self:
                 joints = () if self.balance is None else self.balance.dynamics.joints
-                state, motion, servo = other.saved_of(k)  # type: ignore[attr-defined]
+                state, motion, servo, guard = other.saved_of(k)  # type: ignore[attr-defined]
                 grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
-                self.load((state, motion, joints, grippers, servo))
+                self.load((state, motion, joints, grippers, servo, guard, self._burden.save()))
                 self._motion.disown()
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:

@@ -40,6 +40,28 @@ class Stance:
         data = robot.scratch
         self._carriers = [(data.oMi[joint], data.v[joint], data.a[joint]) for joint in joints]
 
+    def ahead(self, angles: np.ndarray) -> np.ndarray | None:
+        """Return where the base goes (k, 7) as the joints go through angles (k, n) from now on, None where it stays.
+
+        The foot that bears the robot now is taken to bear it all the while.
+        """
+        if not any((np.ptp(angles[:, rows], axis=0) != 0.0).any() for rows in self._rows):
+            return None
+        foot, robot = self._bearing(), self._robot
+        placed = self._soles[foot].copy()
+        carrier = self._carriers[foot][0]
+        found = np.empty((len(angles), 7))
+        for k, own in enumerate(angles):
+            pin.forwardKinematics(robot.model, robot.scratch, robot.configuration_of(own, IDENTITY))
+            found[k] = pin.SE3ToXYZQUAT(placed * (carrier * self._placements[foot]).inverse())
+        return found
+
+    def _bearing(self) -> int:
+        """Return the number of the foot that bears the robot where it is."""
+        self._robot.update()
+        heights = [float(sole.translation[2]) for sole in self._soles]
+        return heights.index(min(heights)) if min(heights) < heights[0] - LOWER else 0
+
     def base(self, present: np.ndarray, motion: Motion) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]] | None:
         """Return where the base goes and how it moves, None where it stays.
 
@@ -56,9 +78,7 @@ class Stance:
         legs_move = [moving[rows].any() for rows in self._rows]
         if not any(legs_move):
             return None
-        robot.update()
-        heights = [float(sole.translation[2]) for sole in self._soles]
-        k = heights.index(min(heights)) if min(heights) < heights[0] - LOWER else 0
+        k = self._bearing()
         if not legs_move[k]:
             return None
         model = robot.model

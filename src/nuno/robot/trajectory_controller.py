@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -147,6 +148,27 @@ class TrajectoryController:
             self.piece = self._spline.piece(time)
             renewed = True
         return renewed
+
+    @property
+    def end(self) -> float:
+        """When the joints come to rest [s], as far as is known now; long past where nothing is asked of them."""
+        if self._next is not None:
+            return self._next[0] + self._next[2].duration
+        return -np.inf if self._spline is None else self._spline.end
+
+    def ahead(self, times: np.ndarray) -> np.ndarray:
+        """Return where the joints are wanted (k, m) at times (k,) [s] to come, increasing; nothing changes."""
+        found, own, k = np.empty((len(times), len(self.names))), copy.copy(self), 0
+        while k < len(times):
+            own.advance(float(times[k]))
+            end = own.piece.end if own._next is None else min(own.piece.end, own._next[1] - SOON)
+            last = max(k + 1, int(np.searchsorted(times, end)))
+            spans = (times[k:last] - own.piece.start)[:, None]
+            part = np.zeros((last - k, len(self.names)))
+            for coefficient in own.piece.coefficients[::-1]:
+                part = part * spans + coefficient
+            found[k:last], k = part, last
+        return found
 
     def check(self, time: float, desired: Motion, actual: Motion, rows: np.ndarray) -> bool:
         """Compare what is wanted at a time [s] with what is, and end the goal where that is due.

@@ -66,6 +66,17 @@ class TimedMotion(ABC):
         self.ensure(k)
         return self._configuration(k, share)
 
+    def sampled(self, times: np.ndarray) -> np.ndarray:
+        """Return the configurations (k, nq) at times (k,) [s], between ticks by straight lines."""
+        at = np.clip((times - float(self.times[0])) / self.dt, 0.0, len(self.times) - 1.0)
+        tick = np.minimum(np.floor(at + 1e-9).astype(int), max(len(self.times) - 2, 0))
+        share = np.clip(at - tick, 0.0, 1.0)[:, None]
+        self.ensure(int(tick.max()))
+        after = self.configurations[np.minimum(tick + 1, len(self.times) - 1)]
+        found = (1.0 - share) * self.configurations[tick] + share * after
+        found[:, 3:7] /= np.linalg.norm(found[:, 3:7], axis=1, keepdims=True)
+        return np.asarray(found)
+
     def state_at(self, time: float) -> RobotState:
         """Return configuration, velocity and acceleration at a time [s]; before and after the walk at rest."""
         k, share = self._tick(time)

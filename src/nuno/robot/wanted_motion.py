@@ -34,13 +34,14 @@ class WantedMotion:
         robot: The robot.
         joints: Its joints and controllers.
         gait: Its walks.
+        stance: Where its base goes as the legs move.
         aim: How it is to move at the end of the frame.
     """
 
     def __init__(self, robot: Humanoid, groups: Mapping[str, Sequence[str]], time: float) -> None:
         self.robot = robot
         self.joints = SimulatedJoints(robot, groups)
-        self.gait, self._stance = Gait(robot, self.joints), Stance(robot)
+        self.gait, self.stance = Gait(robot, self.joints), Stance(robot)
         nothing = np.zeros(robot.model.nv)
         self.aim = RobotState(time, robot.configuration(), nothing, nothing)
         self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
@@ -66,7 +67,7 @@ class WantedMotion:
         if positions is robot._angles and base is None:
             self.aim = RobotState(end, before.q, before.v, before.a)
             return self.aim
-        if base is None and (stood := self._stance.base(robot._angles, (positions, velocities, accelerations))):
+        if base is None and (stood := self.stance.base(robot._angles, (positions, velocities, accelerations))):
             base, base_motion = stood
         v, a = np.zeros_like(before.v), np.zeros_like(before.a)
         v[6:], a[6:] = velocities, accelerations

@@ -1,0 +1,141 @@
+"""Burden: whether a robot whose motion is given could do it with weight: its joints' torques, and its balance."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.robot.collision import Collision, Unbalance
+from nuno.robot.sensors import Sensors
+from nuno.robot.support import convex_outline, distance_inside
+
+if TYPE_CHECKING:
+    from nuno.robot.links import Links
+    from nuno.robot.robot_state import RobotState
+
+logger = logging.getLogger(__name__)
+
+EVERY = 30
+"""Frames from one look to the next."""
+ENOUGH = 3
+"""Looks at a robot at rest, of two frames each, after which it is not looked at again until something moves."""
+TIPPING = 5e-3
+"""[m] By which the zero moment point must be outside the soles to count."""
+LEVEL = 1e-3
+"""[m] By which the lowest sole may be above or below what is taken as the ground."""
+LIFTED = 5e-3
+"""[m] Above the lowest corner of all soles, from where on a sole does not bear."""
+
+
+class Burden:
+    """Looks every ``EVERY`` frames whether the joints' torques and the balance are possible.
+
+    What is found twice in a row counts: the blow of something that is caught does not. It is reported once for a
+    joint, and once for each time that balance is lost, as a warning.
+
+    Args:
+        links: The robot's links.
+    """
+
+    def __init__(self, links: Links) -> None:
+        self._links, self._robot = links, links.robot
+        self._sensors = Sensors(links.robot, links)
+        limits = links.robot.effort_limits
+        self._limits = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
+        frames = links.robot.description.frames
+        sizes = [size for foot in links.robot.description.feet if (size := frames[foot].size) is not None]
+        self._inner = 0.4 * min((float(np.min(size)) for size in sizes), default=0.0)
+        self._frames = 0
+        self._still = 0  # looks since anything changed
+        self._last: tuple[frozenset[int], float] = (frozenset(), -np.inf)
+        self._over: tuple[str, ...] = ()
+        self._unbalanced: Unbalance | None = None
+        self._told: set[str] = set()
+
+    def after_frame(self, state: RobotState, met: Collision | None) -> RobotState:
+        """Return a state with what was found of it after a frame, and what its motion would run into."""
+        self._frames += 1
+        if self._frames >= EVERY - 1:
+            self._look(state)
+        if met is None and not self._over and self._unbalanced is None:
+            return state
+        return replace(state, over_torque=self._over, unbalanced=self._unbalanced, collision=met)
+
+    def forget(self) -> None:
+        """Begin anew: the robot was put elsewhere."""
+        self._last, self._over, self._unbalanced, self._still = (frozenset(), -np.inf), (), None, 0
+
+    def save(self) -> tuple[Any, ...]:
+        """Return what it has found, for ``load``."""
+        return self._frames, self._still, self._last, self._over, self._unbalanced
+
+    def load(self, saved: tuple[Any, ...]) -> None:
+        """Go on from what was found then."""
+        self._frames, self._still, self._last, self._over, self._unbalanced = saved
+
+    def _look(self, state: RobotState) -> None:
+        loaded = any(body.is_dynamic for body in self._links.world._bodies.values())
+        moves = bool(state.v.any() or state.a.any())
+        self._still = 0 if moves or loaded else self._still + 1
+        prepares = self._frames < EVERY
+        self._frames %= EVERY
+        if self._still > 2 * ENOUGH:
+            return
+        if prepares:
+            self._sensors.follow_loads()  # a look takes what has changed since the frame before
+            return
+        told = self._sensors.read(state)
+        soles = self._sensors.soles
+        if soles is not None and abs(float(soles[:, :, 2].min()) - self._sensors.ground) > LEVEL:
+            self._sensors.ground = float(soles[:, :, 2].min())
+            told = self._sensors.read(state)
+        over = frozenset(np.flatnonzero(np.abs(told.torques) > self._limits).tolist())
+        outside = -np.inf if soles is None else self._outside(soles, told.zero_moment_point)
+        last, self._last = self._last, (over, outside)
+        both = over & last[0]
+        self._over = tuple(self._robot.joint_names[k] for k in sorted(both)) if both else ()
+        if both:
+            self._tell_torques(told.torques)
+        if min(outside, last[1]) <= TIPPING:
+            self._unbalanced = None
+        elif self._unbalanced is None:
+            self._unbalanced = Unbalance(max(outside, last[1]), state.time)
+            logger.warning(
+                "%r would tip over: %s. Hold less or nearer, move slower, or give it dynamics (attach)",
+                self._robot.name, self._unbalanced,
+            )  # fmt: skip
+        elif outside > self._unbalanced.distance:
+            self._unbalanced = replace(self._unbalanced, distance=outside)
+
+    def _tell_torques(self, torques: np.ndarray) -> None:
+        new = [name for name in self._over if name not in self._told]
+        if not new:
+            return
+        self._told.update(new)
+        rows = [self._robot.joint_index(name) for name in new]
+        most = max(rows, key=lambda row: abs(torques[row]) / self._limits[row])
+        logger.warning(
+            "%r could not do that: %s would need more than the limit, %s the most: %.0f of %.0f N m. Hold less or "
+            "nearer, move slower, or give it dynamics (attach)",
+            self._robot.name, ", ".join(new), self._robot.joint_names[most], abs(torques[most]), self._limits[most],
+        )  # fmt: skip
+
+    def _outside(self, soles: np.ndarray, point: np.ndarray) -> float:
+        """Return how far outside the hull of soles (feet, 4, 3) a point (2,) is [m]; -inf where it is well inside."""
+        if not np.isfinite(point).all():
+            return -np.inf
+        heights = soles[:, :, 2]
+        bearing = soles[heights.min(axis=1) < heights.min() + LIFTED]
+        # balls in the soles, and all that lies between two of them, are in the hull
+        middles = bearing[:, :, :2].mean(axis=1)
+        a, along = middles[0], middles[-1] - middles[0]
+        share = float(np.clip((point - a) @ along / max(along @ along, 1e-12), 0.0, 1.0))
+        away = point - a - share * along
+        if away @ away < self._inner**2:
+            return -np.inf
+        corners = bearing.reshape(-1, 3)
+        corners = corners[corners[:, 2] < corners[:, 2].min() + LIFTED, :2]
+        return -distance_inside(convex_outline(corners), point) if len(corners) > 2 else -np.inf

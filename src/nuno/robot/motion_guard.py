@@ -1,0 +1,314 @@
+"""MotionGuard: looks ahead along what a robot without dynamics is asked to do, and keeps it out of static shapes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.errors import InvalidInputError
+from nuno.robot.coal_shapes import LinkHulls
+from nuno.robot.collision import Collision
+from nuno.robot.link_sweep import Sweep, first_entry, spare_way
+from nuno.robot.pinocchio import pin
+from nuno.robot.running_walk import RunningWalk
+from nuno.robot.spatial_arrays import placement_arrays
+from nuno.robot.static_shapes import StaticShapes
+
+if TYPE_CHECKING:
+    from nuno.robot.gait import Looks
+    from nuno.robot.links import Links
+    from nuno.robot.walk import TimedMotion
+    from nuno.robot.wanted_motion import WantedMotion
+    from nuno.world.world import World
+
+logger = logging.getLogger(__name__)
+
+COLLISIONS = ("stop", "warn", "ignore")
+FAR = 20.0
+"""[s] That are looked ahead at once; a longer motion is looked at again on the way."""
+AROUND = 2.5
+"""[m] From the base, within which the next three steps may take a link."""
+ARM = 1.5
+"""[m] By which a link moves at most for each radian of a joint, and more than a metre for each of the base."""
+SAME = object()
+"""Stands for the commands and shapes of now."""
+SOON = 1e-9
+"""[s] Rounding of sums of frames."""
+
+
+class MotionGuard:
+    """Sweeps a robot's links along what it is about to do, once for each command and whenever static shapes change.
+
+    With "stop" joints stop before they take a link more than 5 mm into something, and walks come to rest before that;
+    their goals end as aborted. With "warn" the robot goes on. Both are reported once for a link and a body, as a
+    warning.
+
+    Args:
+        links: The robot's links.
+        mode: "stop", "warn" or "ignore".
+        world: The batch that the links' copies are in; None is their own world.
+        of: The guard of the links themselves, where these are copies, whose shapes are the same; copies are silent.
+        index: Which world of the batch.
+
+    Attributes:
+        mode: "stop", "warn" or "ignore"; it may be changed at any time.
+        met: What the last motion that was begun would run into, or was stopped by; None for nothing.
+
+    Raises:
+        InvalidInputError: another mode.
+    """
+
+    def __init__(
+        self, links: Links, mode: str, world: World | None = None, of: MotionGuard | None = None, index: int = 0
+    ) -> None:  # fmt: skip
+        self.check_mode(mode)
+        self.mode = mode
+        self.met: Collision | None = None
+        self._links, self._robot, self._of = links, links.robot, of
+        self._world = links.world if world is None else world
+        self._made: tuple[LinkHulls, StaticShapes] | None = None
+        self._placements: Any = None
+        self._told: set[tuple[str, str]] = set() if of is None else of._told
+        self._key: Any = None
+        self._rests_since = -1  # the commands when nothing was left to do of them
+        self._own: Any = None  # the commands after what was done here
+        self._until = -np.inf  # the joints' clock up to which the way is known to be free
+        self._acts = np.inf  # the clock at which joints are to stop
+        self._spare = 0.0  # [m] that links may move until they must be looked at again, step by step
+        self._spare_key: Any = None
+        self._index = index
+
+    @staticmethod
+    def check_mode(mode: str) -> None:
+        """Raise where there is no such mode.
+
+        Raises:
+            InvalidInputError: so.
+        """
+        if mode not in COLLISIONS:
+            raise InvalidInputError(f"collisions must be one of {COLLISIONS}, got {mode!r}")
+
+    def forget(self) -> None:
+        """Look anew before the next frame: the robot was put elsewhere."""
+        self._key = self._spare_key = self._own = self.met = None
+        self._spare, self._acts, self._until, self._rests_since = 0.0, np.inf, -np.inf, -1
+
+    def save(self) -> tuple[Any, ...]:
+        """Return what it has found, for ``load``."""
+        return self._acts, self._until, self.met, self._spare
+
+    def load(self, saved: tuple[Any, ...] | None) -> None:
+        """Go on from what was found when robot and world were as they are now; None begins anew.
+
+        So the robot stops in the same frame, whenever it was looked at.
+        """
+        self.forget()
+        if saved is not None:
+            self._acts, self._until, self.met, self._spare = saved
+            self._key = SAME
+
+    def before_frame(self, motion: WantedMotion, span: float) -> None:
+        """Look ahead where anything has changed, and stop what is about to run into something.
+
+        Args:
+            motion: What the robot is asked to do.
+            span: [s] of the frame that comes.
+        """
+        joints, gait = motion.joints, motion.gait
+        if joints.commands == self._rests_since or self.mode == "ignore":
+            return
+        if gait.walk is None and joints.is_resting:
+            self._rests_since = joints.commands
+            return
+        key = (joints.commands, gait.walk, self._shapes().key())
+        if self._key is SAME:
+            self._key = key
+        if key != self._key or joints.clock + span > self._until + SOON:
+            self._look(motion, span)
+            self._key = (joints.commands, gait.walk, key[2])
+        if joints.clock + span > self._acts + SOON:
+            self._stop(motion)
+
+    def after_step(self, motion: WantedMotion, before: np.ndarray) -> Collision | None:
+        """Return what the links run into in a frame that nobody could look ahead to, None for nothing.
+
+        Args:
+            motion: What the robot is asked to do, which has been worked out for the frame.
+            before: Configuration (nq,) when it began.
+        """
+        if self.mode == "ignore":
+            return None
+        key, after = self._shapes().key(), motion.aim.q
+        if self._spare_key is None:  # as it was loaded
+            self._spare_key = key
+        self._spare -= ARM * float(np.abs(after - before).sum())
+        if self._spare > 0.0 and key == self._spare_key:
+            return None
+        robot, now, span = motion.robot, self._world.time, motion.aim.time - self._world.time
+        angles = np.stack([robot.angles_of(before), robot.angles_of(after)])
+        sweep = self._sweep(motion, np.array([now, now + span]), angles, np.stack([before[:7], after[:7]]))
+        met = self._first(sweep)
+        self._spare, self._spare_key = spare_way(sweep, self._shapes(), self._index), key
+        if met is not None:
+            self.met, self._spare = met, 0.0
+            self._tell(met, "the joints stop before that" if self.mode == "stop" else "and goes through it")
+        return met
+
+    def velocities_of(self, motion: WantedMotion) -> Looks:
+        """Return what to ask before a robot takes a velocity, see ``Gait.looks``."""
+
+        def look(walk: RunningWalk, since: float) -> Collision | None:
+            # in the open nothing is worked out before it is walked
+            if self.mode != "stop" or not self._near_anything(motion):
+                return None
+            met = self._on_walk(motion, walk, since, 1.0 / self._world.frame_rate)
+            if met is not None:
+                self.met = met
+                self._tell(met, "the walk ends before that")
+            return met
+
+        return look
+
+    # Inside
+
+    def _meets(self, motion: WantedMotion, span: float) -> Callable[[TimedMotion, float], Collision | None]:
+        return lambda walk, since: self._on_walk(motion, walk, since, span)
+
+    def _on_walk(self, motion: WantedMotion, walk: TimedMotion, since: float, span: float) -> Collision | None:
+        """Return what a robot on a walk would run into from a time [s] of the walk on, now."""
+        clock, end = motion.joints.clock, float(walk.times[-1])
+        count = max(int(np.ceil((end - since) / span - SOON)), 1)
+        times = clock + span * np.arange(count + 1)
+        own = since + span * np.arange(count + 1)
+        configurations = walk.sampled(own)
+        if motion.gait.walk is not None and (first := own < walk.times[0]).any():
+            configurations[first] = motion.gait.ahead(times)[first]
+        return self._swept(motion, times, *self._angles(motion, times, configurations), on_feet=False)
+
+    def _near_anything(self, motion: WantedMotion) -> bool:
+        """Return True if anything but planes may be in the way of the next steps."""
+        _, shapes = self._tools()
+        now, place = np.array([self._world.time]), motion.robot.position
+        for obstacle in shapes.obstacles:
+            if obstacle.is_plane:
+                continue
+            places, axes = obstacle.poses(now, self._index)
+            if obstacle.body._path is not None:
+                return True
+            apart = np.abs(axes[0].T @ (place - places[0]) - obstacle.middle) - obstacle.half
+            if np.linalg.norm(np.maximum(apart, 0.0)) < AROUND:
+                return True
+        return False
+
+    def _tools(self) -> tuple[LinkHulls, StaticShapes]:
+        if self._made is None and self._of is not None and self._of._world is self._world:
+            self._made = self._of._tools()
+        if self._made is None:
+            bodies = [self._world.find(body.name) for body in self._links.bodies] if self._of else self._links.bodies
+            hulls = LinkHulls(self._robot) if self._of is None else self._of._tools()[0]
+            if self._links.are_joints:
+                owners = [bodies[joint - 1] for joint in hulls.joints]
+            else:
+                owners = list(bodies) if len(bodies) == len(hulls.names) else []
+            self._made = hulls, StaticShapes(self._world, owners)
+        return self._made
+
+    def _shapes(self) -> StaticShapes:
+        return self._tools()[1]
+
+    def _look(self, motion: WantedMotion, span: float) -> None:
+        """Find what the motion under way runs into, and when joints are to stop for that."""
+        joints, gait = motion.joints, motion.gait
+        clock, self._acts, self._until = joints.clock, np.inf, np.inf
+        end = min(max(joints.end, gait.end), clock + FAR)
+        count = int(np.ceil((end - clock) / span - SOON))
+        if count < 1:
+            return
+        times = clock + span * np.arange(count + 1)
+        self._until = float(times[-1])
+        walked = None if gait.walk is None else gait.ahead(times)
+        met = self._swept(motion, times, *self._angles(motion, times, walked), on_feet=walked is None)
+        if met is None:
+            if (joints.commands, gait.walk) != self._own:
+                self.met = None
+            return
+        self.met = met
+        hit = clock + met.time - self._world.time  # that of a frame, after which it is too late
+        if self.mode == "stop" and gait.walk is not None and gait.turn_back(hit, str(met), self._meets(motion, span)):
+            self._tell(met, "the walk ends before that")
+            self._until = -np.inf  # the way is another one
+            self._own = joints.commands, gait.walk
+            return
+        does = "the motion stops before that" if self.mode == "stop" else "and goes through it"
+        self._tell(met, does)
+        if self.mode == "stop":
+            self._acts = hit
+
+    def _angles(
+        self, motion: WantedMotion, times: np.ndarray, walked: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        """Return the joints' angles (k, n) and the base (k, 7) at times of the joints' clock (k,)."""
+        robot = motion.robot
+        if walked is None:
+            angles = motion.joints.ahead(times)
+            base = np.tile(motion.aim.q[:7], (len(times), 1))
+            return angles, base
+        rows = motion.gait.rows
+        given = np.array([robot.angles_of(q) for q in walked])[:, rows]
+        return motion.joints.ahead(times, given, rows), walked[:, :7]
+
+    def _swept(
+        self, motion: WantedMotion, times: np.ndarray, angles: np.ndarray, base: np.ndarray, on_feet: bool
+    ) -> Collision | None:  # fmt: skip
+        """Return what the links run into; ``on_feet``: the base goes where its foot leaves it."""
+        if not self._shapes().obstacles:
+            return None
+        if on_feet and (stood := motion.stance.ahead(angles)) is not None:
+            base = stood
+        clock = self._world.time + times - motion.joints.clock
+        return self._first(self._sweep(motion, clock, angles, base))
+
+    def _sweep(self, motion: WantedMotion, clock: np.ndarray, angles: np.ndarray, base: np.ndarray) -> Sweep:
+        """Return the links along angles (k, n) and poses of the base (k, 7) at times of the world's clock (k,)."""
+        robot, data = motion.robot, motion.robot.scratch
+        if self._placements is None or self._placements[0] is not data:
+            self._placements = (data, *placement_arrays(data.oMi.tolist()))
+        axes, places = (np.empty((len(angles), *part.shape)) for part in self._placements[1:])
+        for k, (own, pose) in enumerate(zip(angles, base, strict=True)):
+            pin.forwardKinematics(robot.model, data, robot.configuration_of(own, pose))
+            axes[k], places[k] = self._placements[1:]
+        return Sweep(self._tools()[0], clock, axes, places)
+
+    def _first(self, sweep: Sweep) -> Collision | None:
+        hulls, shapes = self._tools()
+        found = first_entry(sweep, shapes, self._index)
+        if found is None:
+            return None
+        k, link, obstacle, point = found
+        return Collision(hulls.names[link], obstacle.body.name, float(sweep.times[k]), point, int(hulls.joints[link]))
+
+    def _stop(self, motion: WantedMotion) -> None:
+        """Let what takes the link there stop at once."""
+        assert self.met is not None
+        joints, robot, text = motion.joints, motion.robot, str(self.met)
+        chain = {joint - 2 for joint in robot.model.supports[self.met.joint].tolist() if joint >= 2}
+        legs = {int(row) for row in motion.gait.rows}
+        if motion.gait.is_walking:
+            motion.gait.give_up(text, aborted=True)
+        for name, rows in joints.rows.items():
+            if joints.controllers[name].end > joints.clock - SOON and (chain | legs) & set(rows.tolist()):
+                joints.stop(name, text)
+        self._key, self._own = None, (joints.commands, motion.gait.walk)
+
+    def _tell(self, met: Collision, does: str) -> None:
+        pair = (met.link, met.body)
+        if pair in self._told or self._of is not None:
+            return
+        self._told.add(pair)
+        logger.warning(
+            '%r: %s; %s. Send it elsewhere, move the body, or let it pass with collisions="ignore" or '
+            "world.ignore_contact(link, body)", self._robot.name, met, does,
+        )  # fmt: skip
