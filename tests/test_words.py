@@ -39,6 +39,7 @@ ALLOWED = {
     r"fill_(doubtful_)?holes": "morphology's hole filling",
     r"(taught_|find_)?[lL]ayers": "the layers of a folded cloth, public names",
     r"over": "what lies over a point, public: `Layers.over`",
+    r"over_torque": "public attribute of `RobotState`: joints beyond their torque limits",
     r"known": "public argument of `nuno.fit_material`: the rest of the material",
     r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",
     r"(is_)?root": "of a tree of joints",

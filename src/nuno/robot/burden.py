@@ -77,7 +77,7 @@ class Burden:
         self._frames, self._still, self._last, self._over, self._unbalanced = saved
 
     def _look(self, state: RobotState) -> None:
-        loaded = any(body.is_dynamic for body in self._links.world._bodies.values())
+        loaded = any(body.is_dynamic for body in self._links.world.bodies)
         moves = bool(state.v.any() or state.a.any())
         self._still = 0 if moves or loaded else self._still + 1
         prepares = self._frames < EVERY

@@ -56,7 +56,7 @@ class Drive:
 
 
 Looks = Callable[[RunningWalk, float], object]
-"""What a robot would run into on a walk from a time [s] of it on, None for nothing."""
+"""Tells what a robot would run into on a walk from a time [s] of it on, None for nothing."""
 
 
 class Gait:
@@ -94,7 +94,7 @@ class Gait:
 
     @property
     def end(self) -> float:
-        """When the walk is over [s], of the joints' clock; of a velocity that is kept, as far as it is worked out."""
+        """The time when the walk is over [s], of the joints' clock; of a velocity the time that is worked out."""
         walk = self.walk
         if walk is None:
             return -math.inf

@@ -63,7 +63,7 @@ class ImaginedRobot:
         whole = self._is_whole() and self.balance is None
         self._guards: list[MotionGuard] = []
         for k, own in enumerate(self._motions if whole else []):
-            above = self._guards[0] if self._guards else original._guard
+            above = self._guards[0] if self._guards else original.guard
             self._guards.append(MotionGuard(original.links, original.collisions, world, above, k))
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)

@@ -155,7 +155,7 @@ def spare_way(sweep: Sweep, shapes: StaticShapes, world: int = 0) -> float:
         return 0.0
     last, radii = sweep.middles[-1, moved], sweep.hulls.radii[moved]
     for obstacle in shapes.obstacles:
-        if obstacle.body._path is not None:
+        if obstacle.path is not None:
             return 0.0
         touched = obstacle.touched[moved]
         if not touched.any():

@@ -196,7 +196,7 @@ class MotionGuard:
             if obstacle.is_plane:
                 continue
             places, axes = obstacle.poses(now, self._index)
-            if obstacle.body._path is not None:
+            if obstacle.path is not None:
                 return True
             apart = np.abs(axes[0].T @ (place - places[0]) - obstacle.middle) - obstacle.half
             if np.linalg.norm(np.maximum(apart, 0.0)) < AROUND:

@@ -31,6 +31,7 @@ class SimulatedBody(SimulatedSenses):
         joints: Its joints and controllers.
         gait: Its walks.
         balance: Its dynamics; None where its links are one body for each shape.
+        guard: Without dynamics, it keeps the links out of static shapes.
     """
 
     links: Links
@@ -39,7 +40,7 @@ class SimulatedBody(SimulatedSenses):
     balance: Balance | None
     wanted: Humanoid
     _motion: WantedMotion
-    _guard: MotionGuard
+    guard: MotionGuard
     _burden: Burden
 
     @property
@@ -50,13 +51,13 @@ class SimulatedBody(SimulatedSenses):
     @property
     def collisions(self) -> str:
         """What becomes of motions through static shapes, without dynamics: "stop", "warn" or "ignore"."""
-        return self._guard.mode
+        return self.guard.mode
 
     @collisions.setter
     def collisions(self, mode: str) -> None:
-        self._guard.check_mode(mode)
+        self.guard.check_mode(mode)
         with self.world.lock:
-            self._guard.mode = mode
+            self.guard.mode = mode
             self._look_anew()
 
     def attach(self) -> None:
@@ -119,5 +120,5 @@ class SimulatedBody(SimulatedSenses):
             self.actual.move_to(self.wanted.angle_vector(), q[:7])
 
     def _look_anew(self) -> None:
-        self._guard.forget()
+        self.guard.forget()
         self._burden.forget()

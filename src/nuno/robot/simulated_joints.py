@@ -98,7 +98,7 @@ class SimulatedJoints:
 
     @property
     def end(self) -> float:
-        """When the joints come to rest [s] as far as is known now; that of their clock where they rest."""
+        """The time when the joints come to rest [s] as far as is known now; that of their clock where they rest."""
         end = max([self.clock, *(controller.end for controller in self.controllers.values())])
         lag = np.abs(self.desired[0] - self.positions) / np.maximum(self.velocity_limits, 1e-9)
         return end + float(lag.max(initial=0.0))

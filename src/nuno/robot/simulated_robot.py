@@ -106,8 +106,8 @@ class SimulatedRobot(SimulatedBody):
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
-        self._guard, self._burden = MotionGuard(self.links, collisions), Burden(self.links)
-        self.gait.looks = self._guard.velocities_of(self._motion)
+        self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.links)
+        self.gait.looks = self.guard.velocities_of(self._motion)
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began
         self._due = wall_clock.perf_counter()
@@ -305,11 +305,11 @@ class SimulatedRobot(SimulatedBody):
         before = self._motion.aim
         servo = None if self._servo is None or self.is_dynamic else self._serve
         if span > 0.0 and not self.is_dynamic:
-            self._guard.before_frame(self._motion, span)
+            self.guard.before_frame(self._motion, span)
         aim = self._motion.begin(end, span, servo)
         if span <= 0.0:
             return
-        if servo is not None and self._guard.after_step(self._motion, before.q) and self.collisions == "stop":
+        if servo is not None and self.guard.after_step(self._motion, before.q) and self.collisions == "stop":
             self._motion.cancel()
             self.servo(None)
             aim = self._motion.begin(end, span)
@@ -335,7 +335,7 @@ class SimulatedRobot(SimulatedBody):
             self.actual.move_to(angles, q[:7])
             actual = (angles, self._state.v[6:], self._state.a[6:])
         else:
-            self._state = self._burden.after_frame(self._state, self._guard.met)
+            self._state = self._burden.after_frame(self._state, self.guard.met)
         self.joints.take_step(actual)
         for gripper in self.grippers.values():
             gripper.end_frame()
@@ -351,7 +351,7 @@ class SimulatedRobot(SimulatedBody):
         """Return all that it is, for a snapshot."""
         grippers = {name: gripper.save() for name, gripper in self.grippers.items()}
         joints = () if self.balance is None else self.balance.dynamics.joints
-        return self._state, self._motion.save(), joints, grippers, self._servo, self._guard.save(), self._burden.save()
+        return self._state, self._motion.save(), joints, grippers, self._servo, self.guard.save(), self._burden.save()
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken; goals that came since are given up."""
@@ -364,12 +364,12 @@ class SimulatedRobot(SimulatedBody):
         for name, gripper in self.grippers.items():
             gripper.load(grippers[name])
         self._readings = None
-        self._guard.load(guard)
+        self.guard.load(guard)
         self._burden.load(burden)
 
     def saved(self) -> tuple[RobotState, Any, Any, Any]:
         """Return its state, what is wanted of it, its servo command, and what was found of its way, for its copies."""
-        return self._state, self._motion.save(), self._servo, self._guard.save()
+        return self._state, self._motion.save(), self._servo, self.guard.save()
 
     def imagined(self, futures: World, world: int) -> ImaginedRobot:
         """Return the driver of this robot's copies in a batch that was imagined from its world."""

@@ -14,6 +14,7 @@ from nuno.shapes.shape import Plane
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.shapes.path import Path
     from nuno.world.world import World
 
 
@@ -40,9 +41,15 @@ class Obstacle:
         """Return True if it is endless."""
         return isinstance(self.body.shape, Plane)
 
+    @property
+    def path(self) -> Path | None:
+        """The path that it follows, None where it stands."""
+        path: Path | None = self.body._path
+        return path
+
     def poses(self, times: np.ndarray, world: int) -> tuple[np.ndarray, np.ndarray]:
         """Return its places (k, 3) [m] and axes (k, 3, 3) in one world at times (k,) [s]; k is 1 where it stands."""
-        path = self.body._path
+        path = self.path
         if path is None:
             place, turn = self.body.pose()
         else:
@@ -77,14 +84,14 @@ class StaticShapes:
         if version != self._version:
             self._version = version
             self._renew()
-        return (self._number, *(own.body._path for own in self._led))
+        return (self._number, *(own.path for own in self._led))
 
     def _renew(self) -> None:
         found, made = [], {}
         seen: list[tuple[Any, ...]] = []
-        for body in self._world._bodies.values():
+        for body in self._world.bodies:
             is_other = body in self._own or getattr(body, "_links", None) is not None
-            if is_other or body._dynamics is not None or body.shape.is_cloth or not body.group:
+            if is_other or body.is_dynamic or body.shape.is_cloth or not body.group:
                 continue
             touched = np.array([self._world._rules.touch(link, body) for link in self._links], dtype=bool)
             if not touched.any():
@@ -96,11 +103,12 @@ class StaticShapes:
                 before = (body.shape, solid_parts(body.shape), 0.5 * (low + high), 0.5 * (high - low))
             made[body] = before
             # a body that is moved has other arrays from then on, never other numbers in the same
-            where = () if body._path is not None else (body._position, body._quaternion)
-            seen.append((body, *before[1:], *where, touched.tobytes()))
-            found.append(Obstacle(body, *before[1:], touched))
+            obstacle = Obstacle(body, *before[1:], touched)
+            found.append(obstacle)
+            # a body that is moved has other arrays from then on, never other numbers in the same
+            seen.append((body, *before[1:], *(() if obstacle.path else body.pose()), touched.tobytes()))
         self._made, self.obstacles = made, tuple(found)
-        self._led = tuple(own for own in found if own.body._path is not None)
+        self._led = tuple(own for own in found if own.path is not None)
         same = len(seen) == len(self._seen) and all(
             len(a) == len(b) and all(x is y or (isinstance(x, bytes) and x == y) for x, y in zip(a, b, strict=True))
             for a, b in zip(seen, self._seen, strict=True)

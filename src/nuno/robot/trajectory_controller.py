@@ -151,7 +151,7 @@ class TrajectoryController:
 
     @property
     def end(self) -> float:
-        """When the joints come to rest [s], as far as is known now; long past where nothing is asked of them."""
+        """The time when the joints come to rest [s], as far as is known now; -inf where nothing is asked of them."""
         if self._next is not None:
             return self._next[0] + self._next[2].duration
         return -np.inf if self._spline is None else self._spline.end

@@ -79,7 +79,6 @@ def carry_by_robot(
     measure = _Measure(driver, mat, plan)
     measure.look()
     begin = round(plan.settle * FRAME_RATE)
-    told = None
     for frame in range(plan.frames):
         if frame == begin:
             world.set_material(mat, plan.material)
@@ -88,15 +87,15 @@ def carry_by_robot(
         measure.look()
         if watch is not None:
             watch(driver, mat, (frame + 1) / FRAME_RATE - plan.settle)
-        if (frame + 1) % EVERY == 0 and (told := measure.failure()):
-            return CarryByRobot(np.nan, told[0], told[1], np.nan)
+        if (frame + 1) % EVERY == 0 and (failed := measure.failure()):
+            return CarryByRobot(np.nan, failed[0], failed[1], np.nan)
     outcome = measure.judged()
     apart = measure.base[-1] - plan.base[walk, -1]
     return CarryByRobot(float(outcome.value[0]), np.nan, "", float(np.linalg.norm(apart)))
 
 
 class _Measure:
-    """What is seen of a trial, frame by frame."""
+    """Measurements of a trial, frame by frame."""
 
     def __init__(self, driver: SimulatedRobot, mat: Body, plan: CarryPlan) -> None:
         self.driver, self.mat, self.plan = driver, mat, plan
