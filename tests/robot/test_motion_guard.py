@@ -318,8 +318,10 @@ def test_a_motion_that_begins_inside_may_leave(caplog):
     table = robot.world.find("table")
     lowest = corners(robot, hands=True)[:, 2].min()
     table.locate((0.0, 0.9, lowest + 0.02 - 0.01))  # 2 cm of the hand in it
-    robot.angle_vector({ELBOW: -1.9}, 1.0)
-    robot.wait_interpolation()
+    with caplog.at_level(logging.WARNING):
+        robot.angle_vector({ELBOW: -1.9}, 1.0)
+        robot.wait_interpolation()
+    assert caplog.records and all("when it sets off" in record.message for record in caplog.records)
     assert robot.state().collision is None
     assert robot.actual.angle_vector()[robot.actual.joint_index(ELBOW)] == pytest.approx(-1.9)
     assert height < lowest and len(goal)

@@ -92,8 +92,10 @@ class _Pair:
         """Return how deep [m] the link may go: deeper where it is in the obstacle when the motion begins."""
         return max(DEEP, DEEPER - self.distance(0, 0.0)[0])
 
-    def entry(self, allowed: float, first: int, last: int) -> tuple[int, np.ndarray] | None:
-        """Return after which time the link is first deeper than allowed in the obstacle, and where (3,); else None.
+    def entry(self, allowed: float, first: int, last: int) -> tuple[int, float, np.ndarray] | None:
+        """Return after which time the link is first deeper than allowed in the obstacle, where (3,); else None.
+
+        Between the two is the share of the way to the next time at which that is found.
 
         Args:
             allowed: [m].
@@ -108,15 +110,15 @@ class _Pair:
             share = (at - float(self.way[k])) / step if step > 0.0 else 0.0
             found, point = self.distance(k, share)
             if found < -allowed:
-                return (k if share > 0.0 else max(k - 1, first)), point
+                return (k, share, point) if share > 0.0 or k == first else (k - 1, 1.0, point)
             if at >= end:
                 return None
             at = min(at + max(found + allowed, LEAST), end)
 
 
 def first_entry(
-    sweep: Sweep, shapes: StaticShapes, world: int = 0
-) -> tuple[int, int, Obstacle, np.ndarray] | None:  # fmt: skip
+    sweep: Sweep, shapes: StaticShapes, world: int = 0, inside: list[tuple[int, Obstacle]] | None = None
+) -> tuple[int, int, Obstacle, np.ndarray] | None:
     """Return after which time a link first goes too deep into an obstacle, which, into which, and where (3,) [m].
 
     Between that time and the next it goes too deep. A sweep that begins later, at the same times, finds the same.
@@ -125,26 +127,28 @@ def first_entry(
         sweep: The sweep.
         shapes: What stands in the world.
         world: Which of a batch.
+        inside: Gets the links that are too deep in an obstacle when the sweep begins, and that.
     """
     best: tuple[int, int, Obstacle, np.ndarray] | None = None
-    last = len(sweep.times) - 1
+    earliest, last = np.inf, len(sweep.times) - 1
     for obstacle in shapes.obstacles:
         poses = obstacle.poses(sweep.times, world)
         for link in _near(sweep, obstacle, *poses).tolist():
             pair = _Pair(sweep, link, obstacle, poses)
             allowed = pair.allowed()
+            if inside is not None and allowed > DEEP + DEEPER:
+                inside.append((link, obstacle))
             found = pair.entry(allowed, 0, last)
             if found is None:
                 continue
             # steps fall elsewhere where a sweep begins elsewhere: each span of time by itself decides
-            k, point = found
-            for own in range(max(k - 1, 0), min(k + 2, last)):
+            for own in range(max(found[0] - 1, 0), min(found[0] + 2, last)):
                 if (alone := pair.entry(allowed, own, own + 1)) is not None:
-                    k, point = own, alone[1]
+                    found = alone
                     break
-            best, last = (k, link, obstacle, point), max(k, 1)
-            if k == 0:
-                return best
+            k, share, point = found
+            if k + share < earliest:
+                best, earliest, last = (k, link, obstacle, point), k + share, min(k + 1, last)
     return best
 
 

@@ -20,6 +20,7 @@ from nuno.robot.static_shapes import StaticShapes
 if TYPE_CHECKING:
     from nuno.robot.gait import Looks
     from nuno.robot.links import Links
+    from nuno.robot.static_shapes import Obstacle
     from nuno.robot.walk import TimedMotion
     from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
@@ -284,7 +285,14 @@ class MotionGuard:
 
     def _first(self, sweep: Sweep) -> Collision | None:
         hulls, shapes = self._tools()
-        found = first_entry(sweep, shapes, self._index)
+        inside: list[tuple[int, Obstacle]] = []
+        found = first_entry(sweep, shapes, self._index, inside)
+        for own, obstacle in inside:
+            if self._is_new(hulls.names[own], obstacle.body.name):
+                logger.warning(
+                    "%r: %s is in %r when it sets off; it may leave it, and go no deeper. Move the body, or put the "
+                    "robot elsewhere", self._robot.name, hulls.names[own], obstacle.body.name,
+                )  # fmt: skip
         if found is None:
             return None
         k, link, obstacle, point = found
@@ -304,11 +312,16 @@ class MotionGuard:
         self._key, self._own = None, (joints.commands, motion.gait.walk)
 
     def _tell(self, met: Collision, does: str) -> None:
-        pair = (met.link, met.body)
-        if pair in self._told or self._of is not None:
+        if not self._is_new(met.link, met.body):
             return
-        self._told.add(pair)
         logger.warning(
             '%r: %s; %s. Send it elsewhere, move the body, or let it pass with collisions="ignore" or '
             "world.ignore_contact(link, body)", self._robot.name, met, does,
         )  # fmt: skip
+
+    def _is_new(self, link: str, body: str) -> bool:
+        """Return True once for a link and a body; never of copies, whose states tell."""
+        if (link, body) in self._told or self._of is not None:
+            return False
+        self._told.add((link, body))
+        return True

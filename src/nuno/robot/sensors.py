@@ -176,7 +176,7 @@ class Sensors:
 
     @property
     def soles(self) -> np.ndarray | None:
-        """Where the corners of the soles were at the last reading, (feet, 4, 3) [m]; None without feet."""
+        """The corners of the soles at the last reading, (feet, 4, 3) [m]; None without feet."""
         return self._corners if self._feet else None
 
     def follow_loads(self) -> None:

@@ -50,7 +50,7 @@ class SimulatedBody(SimulatedSenses):
 
     @property
     def collisions(self) -> str:
-        """What becomes of motions through static shapes, without dynamics: "stop", "warn" or "ignore"."""
+        """The setting for motions through static shapes, without dynamics: "stop", "warn" or "ignore"."""
         return self.guard.mode
 
     @collisions.setter
