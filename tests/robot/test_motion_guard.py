@@ -32,6 +32,12 @@ def corners(robot, hands=False):
     return np.concatenate([body.vertices for body in bodies])
 
 
+def corners_of(robot, name):
+    """All vertices (n, 3) of links whose names begin so."""
+    return np.concatenate([body.vertices for body, link in zip(robot.links.bodies, robot.links.names, strict=True)
+                           if link.startswith(name)])  # fmt: skip
+
+
 def extent(robot, run, hands=False):
     """The least and greatest coordinates (3,) of the links' vertices in a motion."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -160,6 +166,31 @@ def test_only_what_leads_there_stops():
     robot.world.run(1.2)
     assert robot.joints.controllers["larm_controller"].goal.status == GoalStatus.ABORTED
     assert robot.actual.angle_vector()[robot.actual.joint_index("head_1_joint")] == pytest.approx(0.4)
+
+
+def test_a_walk_that_would_carry_an_arm_into_something():
+    """An arm that moves while the robot walks: whichever of the two is to end, no link is in the table at any time."""
+    robot = make()
+    goal, height = plate_in_the_way(robot)
+    leg = max(corners_of(robot, "leg_left")[:, 1].max(), corners_of(robot, "base_link")[:, 1].max())
+    low, high = np.array([-1.5, leg + 0.1, height - 0.02]), np.array([1.5, leg + 1.7, height])
+    robot.world.remove("table")
+    robot.world.add(nuno.box(tuple(high - low), name="table", position=0.5 * (low + high)))
+    deepest = []
+
+    def look(_):
+        points = corners(robot, hands=True)
+        deepest.append(np.minimum(points - low, high - points).min(axis=1).max())
+
+    robot.go_pos(0.2, wait=False)
+    robot.world.run(0.5)
+    robot.angle_vector(goal, 1.0, controller_type="larm_controller")
+    robot.world.run(7.0, each_frame=look)
+    assert max(deepest) <= DEEP + LEAST
+    assert robot.state().collision.body == "table"
+    arm = robot.joints.controllers["larm_controller"].goal
+    assert GoalStatus.ABORTED in (arm.status, robot._base_goal.status)
+    assert not robot.gait.is_walking
 
 
 def test_modes(caplog):

@@ -314,6 +314,8 @@ class Gait:
         """Stop at once, wherever the feet are: the robot was put elsewhere, or (``aborted``) met something."""
         if aborted and self.goal is not None:
             self.goal.finish(GoalStatus.ABORTED, text=why)
+            for name in self._names:
+                self._joints.take_over(name)
         self._drop(why)
         self.walk = self._before = self._drive = None
 

@@ -16,6 +16,7 @@ from nuno.robot.coal_shapes import LinkHulls
 from nuno.robot.pinocchio import coal, pin
 
 if TYPE_CHECKING:
+    from nuno.bodies.body import Body
     from nuno.robot.static_shapes import Obstacle, StaticShapes
 
 DEEP = 5e-3
@@ -24,6 +25,10 @@ DEEPER = 2e-3
 """[m] Likewise, beyond where it began, of a link that is in something when the motion begins."""
 LEAST = 1e-3
 """[m] By which a pair is looked at anew at least."""
+
+
+Inside = dict[tuple[int, "Body"], float]
+"""By link and body, how deep [m] a link may go that is in the body already."""
 
 
 class Sweep:
@@ -88,9 +93,13 @@ class _Pair:
                 best, point = float(found), np.array(self._result.getNearestPoint1())
         return best, point
 
-    def allowed(self) -> float:
-        """Return how deep [m] the link may go: deeper where it is in the obstacle when the motion begins."""
-        return max(DEEP, DEEPER - self.distance(0, 0.0)[0])
+    def allowed(self, inside: Inside) -> float:
+        """Return how deep [m] the link may go, deeper where it is in the obstacle already, and take note of that."""
+        depth, pair = -self.distance(0, 0.0)[0], (self.link, self.obstacle.body)
+        if depth > DEEP + LEAST:
+            return inside.setdefault(pair, depth + DEEPER)
+        inside.pop(pair, None)
+        return DEEP if depth <= DEEP else DEEP + LEAST
 
     def entry(self, allowed: float, first: int, last: int) -> tuple[int, float, np.ndarray] | None:
         """Return after which time the link is first deeper than allowed in the obstacle, where (3,); else None.
@@ -117,7 +126,7 @@ class _Pair:
 
 
 def first_entry(
-    sweep: Sweep, shapes: StaticShapes, world: int = 0, inside: list[tuple[int, Obstacle]] | None = None
+    sweep: Sweep, shapes: StaticShapes, world: int = 0, inside: Inside | None = None
 ) -> tuple[int, int, Obstacle, np.ndarray] | None:
     """Return after which time a link first goes too deep into an obstacle, which, into which, and where (3,) [m].
 
@@ -127,17 +136,17 @@ def first_entry(
         sweep: The sweep.
         shapes: What stands in the world.
         world: Which of a batch.
-        inside: Gets the links that are too deep in an obstacle when the sweep begins, and that.
+        inside: Links that are too deep in a body already, and how deep they may go [m]; kept from sweep to sweep, or
+            motion after motion would go deeper and deeper.
     """
+    known: Inside = {} if inside is None else inside
     best: tuple[int, int, Obstacle, np.ndarray] | None = None
     earliest, last = np.inf, len(sweep.times) - 1
     for obstacle in shapes.obstacles:
         poses = obstacle.poses(sweep.times, world)
         for link in _near(sweep, obstacle, *poses).tolist():
             pair = _Pair(sweep, link, obstacle, poses)
-            allowed = pair.allowed()
-            if inside is not None and allowed > DEEP + DEEPER:
-                inside.append((link, obstacle))
+            allowed = pair.allowed(known)
             found = pair.entry(allowed, 0, last)
             if found is None:
                 continue

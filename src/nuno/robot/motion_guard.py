@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import InvalidInputError
 from nuno.robot.coal_shapes import LinkHulls
 from nuno.robot.collision import Collision
-from nuno.robot.link_sweep import Sweep, first_entry, spare_way
+from nuno.robot.link_sweep import Inside, Sweep, first_entry, spare_way
 from nuno.robot.pinocchio import pin
 from nuno.robot.running_walk import RunningWalk
 from nuno.robot.spatial_arrays import placement_arrays
@@ -20,7 +20,7 @@ from nuno.robot.static_shapes import StaticShapes
 if TYPE_CHECKING:
     from nuno.robot.gait import Looks
     from nuno.robot.links import Links
-    from nuno.robot.static_shapes import Obstacle
+    from nuno.robot.trajectory_controller import TrajectoryController
     from nuno.robot.walk import TimedMotion
     from nuno.robot.wanted_motion import WantedMotion
     from nuno.world.world import World
@@ -78,6 +78,8 @@ class MotionGuard:
         self._own: Any = None  # the commands after what was done here
         self._until = -np.inf  # the joints' clock up to which the way is known to be free
         self._acts = np.inf  # the clock at which joints are to stop
+        self._walks_on = False  # whether the walk under way is free, and other joints are what is to stop
+        self._inside: Inside = {}
         self._spare = 0.0  # [m] that links may move until they must be looked at again, step by step
         self._spare_key: Any = None
         self._index = index
@@ -99,7 +101,7 @@ class MotionGuard:
 
     def save(self) -> tuple[Any, ...]:
         """Return what it has found, for ``load``."""
-        return self._acts, self._until, self.met, self._spare
+        return self._acts, self._until, self.met, self._spare, self._walks_on
 
     def load(self, saved: tuple[Any, ...] | None) -> None:
         """Go on from what was found when robot and world were as they are now; None begins anew.
@@ -108,7 +110,7 @@ class MotionGuard:
         """
         self.forget()
         if saved is not None:
-            self._acts, self._until, self.met, self._spare = saved
+            self._acts, self._until, self.met, self._spare, self._walks_on = saved
             self._key = SAME
 
     def before_frame(self, motion: WantedMotion, span: float) -> None:
@@ -238,7 +240,10 @@ class MotionGuard:
             return
         self.met = met
         hit = clock + met.time - self._world.time  # that of a frame, after which it is too late
-        if self.mode == "stop" and gait.walk is not None and gait.turn_back(hit, str(met), self._meets(motion, span)):
+        late = any(own.end > hit for own in self._leading(motion, met))
+        self._walks_on = walked is not None and late and self._is_of_others(motion, times, walked)
+        turns_back = self.mode == "stop" and walked is not None and not self._walks_on
+        if turns_back and gait.turn_back(hit, str(met), self._meets(motion, span)):
             self._tell(met, "the walk ends before that")
             self._until = -np.inf  # the way is another one
             self._own = joints.commands, gait.walk
@@ -247,6 +252,14 @@ class MotionGuard:
         self._tell(met, does)
         if self.mode == "stop":
             self._acts = hit
+
+    def _is_of_others(self, motion: WantedMotion, times: np.ndarray, walked: np.ndarray) -> bool:
+        """Return True if the walk itself is free, with all joints but those of the legs as they are now."""
+        angles, base = self._angles(motion, times, walked)
+        others = np.ones(angles.shape[1], dtype=bool)
+        others[motion.gait.rows] = False
+        angles[:, others] = angles[0, others]
+        return self._swept(motion, times, angles, base, on_feet=False) is None
 
     def _angles(
         self, motion: WantedMotion, times: np.ndarray, walked: np.ndarray | None
@@ -285,31 +298,39 @@ class MotionGuard:
 
     def _first(self, sweep: Sweep) -> Collision | None:
         hulls, shapes = self._tools()
-        inside: list[tuple[int, Obstacle]] = []
-        found = first_entry(sweep, shapes, self._index, inside)
-        for own, obstacle in inside:
-            if self._is_new(hulls.names[own], obstacle.body.name):
+        found = first_entry(sweep, shapes, self._index, self._inside)
+        for own, body in self._inside:
+            if self._is_new(hulls.names[own], body.name):
                 logger.warning(
                     "%r: %s is in %r when it sets off; it may leave it, and go no deeper. Move the body, or put the "
-                    "robot elsewhere", self._robot.name, hulls.names[own], obstacle.body.name,
+                    "robot elsewhere", self._robot.name, hulls.names[own], body.name,
                 )  # fmt: skip
         if found is None:
             return None
         k, link, obstacle, point = found
         return Collision(hulls.names[link], obstacle.body.name, float(sweep.times[k]), point, int(hulls.joints[link]))
 
+    def _leading(self, motion: WantedMotion, met: Collision) -> list[TrajectoryController]:
+        """Return the controllers whose joints lead a link to what it would run into: its own, and the legs'."""
+        rows = {joint - 2 for joint in self._robot.model.supports[met.joint].tolist()}
+        rows |= {int(row) for row in motion.gait.rows}
+        joints = motion.joints
+        return [joints.controllers[name] for name, own in joints.rows.items() if rows & set(own.tolist())]
+
     def _stop(self, motion: WantedMotion) -> None:
         """Let what takes the link there stop at once."""
         assert self.met is not None
-        joints, robot, text = motion.joints, motion.robot, str(self.met)
-        chain = {joint - 2 for joint in robot.model.supports[self.met.joint].tolist() if joint >= 2}
-        legs = {int(row) for row in motion.gait.rows}
-        if motion.gait.is_walking:
+        joints, text, before = motion.joints, str(self.met), motion.joints.commands
+        if motion.gait.is_walking and not self._walks_on:
             motion.gait.give_up(text, aborted=True)
-        for name, rows in joints.rows.items():
-            if joints.controllers[name].end > joints.clock - SOON and (chain | legs) & set(rows.tolist()):
+            self._key = None
+        for name, own in joints.controllers.items():
+            if own.end > joints.clock - SOON and own in self._leading(motion, self.met):
                 joints.stop(name, text)
-        self._key, self._own = None, (joints.commands, motion.gait.walk)
+        if joints.commands == before and self._key is not None:  # something came to the robot, not the robot to it
+            self._acts = np.inf
+        else:
+            self._key, self._own = None, (joints.commands, motion.gait.walk)
 
     def _tell(self, met: Collision, does: str) -> None:
         if not self._is_new(met.link, met.body):
