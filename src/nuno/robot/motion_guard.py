@@ -123,13 +123,16 @@ class MotionGuard:
         joints, gait = motion.joints, motion.gait
         if joints.commands == self._rests_since or self.mode == "ignore":
             return
-        if gait.walk is None and joints.is_resting:
-            self._rests_since = joints.commands
-            return
         key = (joints.commands, gait.walk, self._shapes().key())
         if self._key is SAME:
             self._key = key
-        if key != self._key or joints.clock + span > self._until + SOON:
+        at = joints.clock + span - SOON
+        if key == self._key and at <= self._until and at <= self._acts:
+            return
+        if gait.walk is None and joints.is_resting:
+            self._rests_since = joints.commands
+            return
+        if key != self._key or at > self._until:
             self._look(motion, span)
             self._key = (joints.commands, gait.walk, key[2])
         if joints.clock + span > self._acts + SOON:
@@ -220,7 +223,7 @@ class MotionGuard:
         return self._made
 
     def _shapes(self) -> StaticShapes:
-        return self._tools()[1]
+        return self._tools()[1] if self._made is None else self._made[1]
 
     def _look(self, motion: WantedMotion, span: float) -> None:
         """Find what the motion under way runs into, and when joints are to stop for that."""

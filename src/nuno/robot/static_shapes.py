@@ -84,7 +84,7 @@ class StaticShapes:
         if version != self._version:
             self._version = version
             self._renew()
-        return (self._number, *(own.path for own in self._led))
+        return (self._number, *[own.path for own in self._led]) if self._led else (self._number,)
 
     def _renew(self) -> None:
         found, made = [], {}
