@@ -91,7 +91,7 @@ class MotionGuard:
         Raises:
             InvalidInputError: so.
         """
-        if mode not in COLLISIONS:
+        if not isinstance(mode, str) or mode not in COLLISIONS:
             raise InvalidInputError(f"collisions must be one of {COLLISIONS}, got {mode!r}")
 
     def forget(self) -> None:
