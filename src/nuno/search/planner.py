@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import EstimationError, InvalidInputError, NunoError
+from nuno.search.knots import LONGEST
 from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
 
 METHODS = ("cem", "mppi")
-LONGEST = 3600.0
-"""[s] That a motion may be imagined for."""
 SMALLEST = 1e-3
 """Share of its first value that a standard deviation keeps at least."""
 
@@ -111,9 +110,9 @@ def plan(
         knots = np.clip(knots, low, high)
         if k:
             futures.restore(saved)
-        _called("act", act, futures, knots)
+        called("act", act, futures, knots)
         futures.run(seconds)
-        costs = _checked(_called("cost", cost, futures), n)
+        costs = _checked(called("cost", cost, futures), n)
         finite = np.isfinite(costs)
         failed += int(n - finite.sum())
         if not finite.any():
@@ -136,7 +135,7 @@ def plan(
     return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
 
 
-def _called(name: str, own: Callable[..., Any], *given: Any) -> Any:
+def called(name: str, own: Callable[..., Any], *given: Any) -> Any:
     """Return what a function of the caller returns; what it raises comes out with its name before it."""
     try:
         return own(*given)
