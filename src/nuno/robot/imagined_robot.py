@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.joint_batch import JointBatch
+from nuno.robot.pinocchio import pin
 from nuno.robot.robot_state import RobotState
+from nuno.robot.spatial_arrays import placement_arrays
 from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
-from nuno.shapes.path import Path
+from nuno.tables.kinematic_motion import KinematicGroup
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -59,6 +62,12 @@ class ImaginedRobot:
                 controller.near = original.joints.controllers[name].near
             self._motions.append(own)
         self._before = self._states
+        self._group = KinematicGroup(tuple(body.key for body in self._links))
+        self._data = original.actual.model.createData()
+        self._axes, self._origins = placement_arrays(self._data.oMi.tolist())
+        self._batch: JointBatch | None = None  # which has what the joints are, while nobody asks their controllers
+        self._asked: list[int] = []  # worlds whose controllers were asked in this frame
+        self._pending: tuple[Any, ...] = ()
 
     def __repr__(self) -> str:
         return f"<ImaginedRobot {self.original.actual.name!r} in {self.world.world_count} worlds>"
@@ -88,6 +97,7 @@ class ImaginedRobot:
         with self.world.lock:
             worlds = self.world.world_count
             if angles is not None:
+                self._bring_motions()
                 span = number("seconds", seconds, above=0.0)
                 wanted = np.array([own.joints.desired[0] for own in self._motions])
                 if isinstance(angles, Mapping):
@@ -112,6 +122,7 @@ class ImaginedRobot:
         """Return state, wanted motion and servo command of one world, as ``SimulatedRobot.saved`` does."""
         if not 0 <= world < len(self._motions):
             raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
+        self._bring_motions()
         return self._states[world], self._motions[world].save(), self._servo
 
     # What the world asks of it
@@ -120,56 +131,54 @@ class ImaginedRobot:
         """Set the motors for a frame, or send the links on their way."""
         if not self._is_whole():
             return
-        span, self._before = end - start, list(self._states)
-        servo = None if self.balance is not None or self._servo is None else self._serve
-        aims = [own.begin(end, span, servo) for own in self._motions]
+        span, self._before = end - start, self._states
+        if self.balance is None:
+            self._begin_kinematic(start, end)
+            return
+        aims = [own.begin(end, span) for own in self._motions]
         if span <= 0.0:
             return
-        if self.balance is not None:
-            loads = self.balance.dynamics.loads()
-            told = [
-                self.balance.command(state, aim, span, self._servo, load)
-                for state, aim, load in zip(self._states, aims, loads, strict=True)
-            ]
-            self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
-            return
-        moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
-        if moved:
-            self._lead(start, end, aims)
-        self._states = aims
+        loads = self.balance.dynamics.loads()
+        told = [
+            self.balance.command(state, aim, span, self._servo, load)
+            for state, aim, load in zip(self._states, aims, loads, strict=True)
+        ]
+        self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
         if not self._is_whole():
             return
         if self.balance is None:
-            for own in self._motions:
-                own.joints.take_step()
-                own.gait.end_frame()
+            self._end_kinematic()
             return
         q, v = self.balance.dynamics.read()
         torques = self.balance.dynamics.efforts_now()
+        states = list(self._states)
         for w, own in enumerate(self._motions):
-            state = self.balance.judge(self._states[w], own.aim, q[w], v[w], torques[w], self.world.time)
-            self._states[w] = state
+            state = self.balance.judge(states[w], own.aim, q[w], v[w], torques[w], self.world.time)
+            states[w] = state
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
             own.gait.end_frame()
+        self._states = states
 
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
-        self._states = list(self._before)
-        for own in self._motions:
-            own.cancel()
+        self._states = self._before
+        for w in range(len(self._motions)) if self.balance is not None else self._asked:
+            self._motions[w].cancel()
+        self._asked, self._pending = [], ()
 
     def save(self) -> Any:
         """Return all that it is, for a snapshot."""
         joints = () if self.balance is None else self.balance.dynamics.joints
+        self._bring_motions()
         return list(self._states), [own.save() for own in self._motions], joints, self._servo
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
         states, motions, joints, self._servo = saved
-        self._states = list(states)
+        self._states, self._batch = list(states), None
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
         if self.balance is not None:
@@ -183,17 +192,84 @@ class ImaginedRobot:
 
     def _is_whole(self) -> bool:
         """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""
-        return all(body._world is self.world for body in self._links)
+        return set(self.world.bodies).issuperset(self._links)
 
-    def _lead(self, start: float, end: float, aims: list[RobotState]) -> None:
+    # Without dynamics
+
+    def _begin_kinematic(self, start: float, end: float) -> None:
+        """Work out where all robots are at the end of the frame, and send their links there.
+
+        Robots of which a controller must be asked, or whose base moves, are worked out one by one.
+        """
+        span, self._asked, self._pending = end - start, [], ()
+        if span <= 0.0:
+            for own in self._motions:
+                own.begin(end, span)
+            self._asked = list(range(len(self._motions)))
+            return
+        if self._batch is None:
+            self._batch = JointBatch([own.joints for own in self._motions])
+        batch, servo = self._batch, None if self._servo is None else self._serve
+        motion, desired, rests = batch.step(span)
+        alone = batch.due(span)
+        legs = self._motions[0].leg_rows
+        alone |= (motion[0] != batch.motion[0])[:, legs].any(axis=1) | motion[1:, :, legs].any(axis=(0, 2))
+        alone |= np.array([servo is not None or own.gait.is_walking for own in self._motions])
+        states = list(self._states)
+        for w in np.flatnonzero(alone).tolist():
+            self._bring(w)
+            states[w] = self._motions[w].begin(end, span, servo)
+        self._asked = np.flatnonzero(alone).tolist()
+        for w in np.flatnonzero(~alone).tolist():
+            q, v, a = states[w].q, states[w].v, states[w].a
+            if not rests[w]:
+                q = self.original.actual.configuration_of(motion[0, w], q[:7])
+                v, a = np.zeros_like(v), np.zeros_like(a)
+                v[6:], a[6:] = motion[1:, w]
+            states[w] = RobotState(end, q, v, a)
+        moved = [w for w, state in enumerate(states) if not np.array_equal(state.q, self._states[w].q)]
+        if moved:
+            self._lead(start, end, states)
+        self._states, self._pending = states, (~alone, span, motion, desired)
+
+    def _end_kinematic(self) -> None:
+        for w in self._asked:
+            own = self._motions[w]
+            own.joints.take_step()
+            own.gait.end_frame()
+            if self._batch is not None:
+                self._batch.gather(w)
+        if self._batch is not None and self._pending:
+            self._batch.take(*self._pending)
+        self._asked, self._pending = [], ()
+
+    def _bring_motions(self) -> None:
+        """Bring the motions of all worlds up to date, for whoever reads or changes them."""
+        if self._batch is not None:
+            for w in range(len(self._motions)):
+                self._bring(w)
+            self._batch = None
+
+    def _bring(self, world: int) -> None:
+        assert self._batch is not None
+        self._batch.scatter(world)
+        self._motions[world].take(self._states[world])
+
+    def _lead(self, start: float, end: float, states: list[RobotState]) -> None:
         """Send the links to where the robots are at the end of the frame, on a path for each world."""
-        poses = [self.original.links.poses_of(own.robot) for own in self._motions]
-        places, turns = (np.array(part) for part in zip(*poses, strict=True))
-        worlds, times = self.world.world_count, np.array([start, end])
-        for k, body in enumerate(self._links):
-            place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
-            path = Path(times, np.stack([place, places[:, k]], axis=1), np.stack([turn, turns[:, k]], axis=1))
-            self.world.move(body, path)
+        axes = np.empty((len(states), *self._axes.shape))
+        origins = np.empty((len(states), *self._origins.shape))
+        for w, state in enumerate(states):
+            pin.forwardKinematics(self.original.actual.model, self._data, state.q)
+            axes[w], origins[w] = self._axes, self._origins
+        ends = self.original.links.poses_at(axes, origins)
+        begins = self._group.arrived(self._links, start)
+        worlds, keys = len(states), []
+        for begin, aim in zip(begins, ends, strict=True):
+            first = begin if begin.ndim == 3 else begin[:, None]
+            both = np.stack(np.broadcast_arrays(first, aim.swapaxes(0, 1)), axis=2)
+            keys.append(both if worlds > 1 else both[:, 0])
+        self._group.lead(self._links, self.world, np.array([start, end]), keys[0], keys[1])
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
         return self._servo.rows, self._servo.step(before, others, base, span, None)

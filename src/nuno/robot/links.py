@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.robot.pinocchio import pin
-from nuno.robot.spatial_arrays import placement_arrays
+from nuno.robot.spatial_arrays import placement_arrays, quaternions_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
-from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
+from nuno.tables.kinematic_motion import KinematicGroup
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:
@@ -70,8 +69,7 @@ class Links:
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
         # by which the quaternion of its joint is multiplied for that of a shape
         self._turned_by = np.stack([quat.multiply(row, self._turns) for row in np.eye(4)], axis=2)
-        self._placements = robot.data.oMi.tolist()
-        self._joint_axes, self._joint_places = placement_arrays(self._placements)
+        self._joint_axes, self._joint_places = placement_arrays(robot.data.oMi.tolist())
         self._inside = True
         self._kinematic_group = KinematicGroup(self._keys)
         for body in self.bodies:
@@ -90,18 +88,22 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
-        return self._poses_at(self._placements, self._joint_axes, self._joint_places)
+        return self.poses_at(self._joint_axes, self._joint_places)
 
-    def poses_of(self, robot: Humanoid) -> tuple[np.ndarray, np.ndarray]:
-        """Return where another robot of the same model has such shapes now, as ``poses`` does."""
-        placements = robot.update().oMi.tolist()
-        return self._poses_at(placements, *placement_arrays(placements))
+    def poses_at(self, axes: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where shapes are whose joints are elsewhere.
 
-    def _poses_at(self, placements: Any, axes: np.ndarray, origins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        Args:
+            axes: (..., joints, 3, 3), rotation matrices of Pinocchio's joints.
+            origins: (..., joints, 3) [m], where they are.
+
+        Returns:
+            Positions (..., n, 3) [m] and quaternions (..., n, 4).
+        """
         joints = self._rows
-        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], self._offsets)
-        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
-        return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
+        places = origins[..., joints, :] + np.einsum("...kij,kj->...ki", axes[..., joints, :, :], self._offsets)
+        turns = quaternions_of(axes)[..., [3, 0, 1, 2]]
+        return places, np.einsum("kij,...kj->...ki", self._turned_by, turns[..., joints, :])
 
     def follow(self, seconds: float) -> None:
         """Let the bodies move from where they are to where the robot is now, in ``seconds`` [s] from the world's time.
@@ -115,7 +117,7 @@ class Links:
         self._check_inside()
         positions, quaternions = self.poses()
         with self.world.lock:
-            start, now = self._arrived(), self.world.time
+            start, now = self._kinematic_group.arrived(self.bodies, self.world.time), self.world.time
             if duration == 0.0:
                 times, places, turns = np.array([now]), positions[:, None], quaternions[:, None]
             else:
@@ -123,14 +125,7 @@ class Links:
                 places, turns = np.empty((len(positions), 2, 3)), np.empty((len(positions), 2, 4))
                 places[:, 0], places[:, 1] = start[0], positions
                 turns[:, 0], turns[:, 1] = start[1], quaternions
-            kinematic_group = self._kinematic_group
-            kinematic_group.path_batch = PathBatch(self._keys, times, places, turns)
-            if [body._path for body in self.bodies] != kinematic_group.paths:
-                for body, path in zip(self.bodies, kinematic_group.paths, strict=True):
-                    if body._path is None:  # the first time, and after anything else took the body elsewhere
-                        self.world.move(body, path)
-                    else:  # what ``World.move`` does to a body that follows a path already
-                        body._path = path
+            self._kinematic_group.lead(self.bodies, self.world, times, places, turns)
             if duration == 0.0:
                 for body, place, turn in zip(self.bodies, positions, quaternions, strict=True):
                     body._position, body._quaternion = place, turn
@@ -142,15 +137,6 @@ class Links:
             for body in self.bodies:
                 if body._path is not None:
                     self.world.move(body, None)
-
-    def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
-        path_batch = self._kinematic_group.path_batch
-        if path_batch is not None and path_batch.arrived is not None and path_batch.arrived[0] == self.world.time:
-            if [body._path for body in self.bodies] == self._kinematic_group.paths:
-                return path_batch.arrived[1:]
-        places, turns = [body._position for body in self.bodies], [body._quaternion for body in self.bodies]
-        return np.array(places).reshape(-1, 3), np.array(turns).reshape(-1, 4)
 
     def leave(self) -> None:
         """Take the bodies out of the world.

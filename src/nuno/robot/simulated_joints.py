@@ -71,6 +71,11 @@ class SimulatedJoints:
             return False
         return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()
 
+    @property
+    def followed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the polynomials (6, 3, n) that the joints follow, with derivatives, and since when (n,) [s]."""
+        return self._polynomials, self._begin
+
     def step(self, duration: float, rows: np.ndarray | None = None, given: Motion | None = None) -> Motion:
         """Return positions, velocities and accelerations (n,) that the joints have ``duration`` [s] later.
 
