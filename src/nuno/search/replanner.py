@@ -43,7 +43,7 @@ def replan(
     execute: Callable[[World, Knots], Any] | None = None, done: Callable[[World], Any] | None = None,
     samples: int = 32, iterations: int = 2, method: Literal["cem", "mppi"] = "cem", elites: int | None = None,
     temperature: float = 0.1, bounds: tuple[ArrayLike, ArrayLike] | None = None, seed: int = 0,
-    device: str | None = None,
+    device: str | None = None, thorough: bool = True,
 ) -> Replanned:  # fmt: skip
     """Plan in imagination, act for a while, look, and plan again: model-predictive control over knots.
 
@@ -57,7 +57,8 @@ def replan(
         cost: ``cost(futures)`` after the horizon, (samples,), as of ``plan``.
         now: ``now(world)``, (d,): where the numbers that the knots move are at present.
         start: (k, d), knots of the first motion.
-        spread: As of ``plan``, anew in each period.
+        spread: As of ``plan``, anew in each period; with ``shrink`` in proportion to the time that is left, so that
+            motions become no faster.
         horizon: How long a motion takes [s].
         every: How long the world goes on between two plans [s].
         periods: How many plans at most, up to 10,000.
@@ -74,6 +75,7 @@ def replan(
         bounds: Lowest and highest knots.
         seed: Of the samples; each period has its own.
         device: Where futures run.
+        thorough: As of ``plan``.
 
     Raises:
         InvalidInputError: an argument out of range, or a function of the caller's fails.
@@ -85,7 +87,8 @@ def replan(
         if other is not None:
             function(name, other)
     knots = finite_array("start", start, ("k", "d"))
-    span = number("horizon", horizon, above=0.0, high=LONGEST)
+    wide = finite_array("spread", spread, (), knots.shape[1:], knots.shape)
+    span = whole = number("horizon", horizon, above=0.0, high=LONGEST)
     pause = number("every", every, above=0.0, high=span)
     rounds = count("periods", periods, high=10_000)
     shrinks, first = flag("shrink", shrink), count("seed", seed, low=0)
@@ -100,8 +103,9 @@ def replan(
 
         begin = time.perf_counter()
         found = plan(
-            world, imagined, cost, start=knots, spread=spread, horizon=span, samples=samples, iterations=iterations,
-            method=method, elites=elites, temperature=temperature, bounds=bounds, seed=first + k, device=device,
+            world, imagined, cost, start=knots, spread=wide * (span / whole), horizon=span, samples=samples,
+            iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds,
+            seed=first + k, device=device, thorough=thorough,
         )  # fmt: skip
         took.append(time.perf_counter() - begin)
         motion = Knots(here, found.knots, span)
