@@ -69,7 +69,7 @@ def test_commands_are_those_of_the_driver():
     way = np.repeat(start[None], 3, axis=0)
     arm = [robot.actual.joint_index(f"arm_left_{k}_joint") for k in (2, 4)]
     way[:, arm] += np.array([[0.1, -0.2], [0.2, -0.1], [0.15, 0.0]])
-    spans = [0.3, 0.2, 0.3]
+    spans = [0.3, 0.02, 0.3]  # the second is too short, and is stretched
 
     def follow():  # the driver may have waited for a fresh state before it sent
         futures.run(max(0.0, world.time - futures.time))

@@ -118,8 +118,8 @@ class ImaginedRobot:
 
         Args:
             avs: (k, n) for all worlds or (worlds, k, n) [rad; m for slides].
-            times: How long each takes [s] from the one before, (k,), or one number for all; not stretched where that is
-                too fast: joints lag behind then.
+            times: How long each takes [s] from the one before, (k,), or one number for all; what is too fast for the
+                joints is stretched, in each world by itself.
 
         Raises:
             InvalidInputError: other shapes, not finite, or times that are not positive.
@@ -138,11 +138,13 @@ class ImaginedRobot:
         """Send each world's joints through angles (worlds, k, n), each of which takes a span (k,) [s]."""
         if self._servo is not None or any(own.gait.is_walking for own in self._motions):
             raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
-        times = np.cumsum(spans)
+        shortest = self.original.angle_vector_duration
         for own, goals in zip(self._motions, wanted, strict=True):
             begin = own.joints.desired[0]
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
-            speeds = passing_velocities(steps, spans)
+            needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
+            longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
+            speeds, times = passing_velocities(steps, longer), np.cumsum(longer)
             for name, rows in own.joints.rows.items():
                 names = own.joints.controllers[name].names
                 own.joints.send(name, JointTrajectory(names, times, goals[:, rows], speeds[:, rows]))
