@@ -87,7 +87,7 @@ def replan(
         if other is not None:
             function(name, other)
     knots = finite_array("start", start, ("k", "d"))
-    wide = finite_array("spread", spread, (), knots.shape[1:], knots.shape)
+    deviations = finite_array("spread", spread, (), knots.shape[1:], knots.shape)
     span = whole = number("horizon", horizon, above=0.0, high=LONGEST)
     pause = number("every", every, above=0.0, high=span)
     rounds = count("periods", periods, high=10_000)
@@ -103,7 +103,7 @@ def replan(
 
         begin = time.perf_counter()
         found = plan(
-            world, imagined, cost, start=knots, spread=wide * (span / whole), horizon=span, samples=samples,
+            world, imagined, cost, start=knots, spread=deviations * (span / whole), horizon=span, samples=samples,
             iterations=iterations, method=method, elites=elites, temperature=temperature, bounds=bounds,
             seed=first + k, device=device, thorough=thorough,
         )  # fmt: skip
