@@ -168,6 +168,7 @@ CALLS = {
     "Hull.of": {"points": CUBE[0]},
     "HandPath": {"times": [0.0, 1.0], "positions": [POINT, POINT], "held": [True, False]},
     "JointTrajectory": {"names": ("a",), "times": [0.0, 1.0], "positions": [[0.0], [1.0]]},
+    "Knots": {"now": [0.0, 0.0, 0.0], "values": [POINT], "seconds": 1.0},
     "Lamp": {},
     "Motor": {},
     "Names": {},
@@ -238,6 +239,11 @@ CALLS = {
         "world": lambda s: s.world, "act": lambda s: (lambda futures, knots: None),
         "cost": lambda s: (lambda futures: np.zeros(2)), "start": [[0.0]], "spread": 1.0, "horizon": 0.01, "samples": 2,
         "iterations": 1,
+    },
+    "replan": {
+        "world": lambda s: s.world, "act": lambda s: (lambda futures, motion: None),
+        "cost": lambda s: (lambda futures: np.zeros(2)), "now": lambda s: (lambda world: [0.0]), "start": [[0.0]],
+        "spread": 1.0, "horizon": 0.01, "every": 0.01, "periods": 1, "samples": 2, "iterations": 1,
     },
     "segment_before": {"image": IMAGE, "camera": lambda s: s.camera, "table": lambda s: s.table_of},
     "segment_after": {

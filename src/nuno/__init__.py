@@ -112,8 +112,10 @@ if TYPE_CHECKING:
     from nuno.robot.wire.client import WireRobot
     from nuno.robot.wire.names import Names
     from nuno.robot.wire.server import RobotServer
+    from nuno.search.knots import Knots
     from nuno.search.minimise import Minimum, minimise
     from nuno.search.planner import Plan, plan
+    from nuno.search.replanner import Replanned, replan
     from nuno.search.sampler import Uniform
     from nuno.search.sweep import SweepResult, read_sweep, sweep
     from nuno.search.trial import Trial, each
@@ -173,6 +175,7 @@ __all__ = [
     "InvalidInputError",
     "Joint",
     "JointTrajectory",
+    "Knots",
     "Lamp",
     "Layers",
     "LiftResult",
@@ -200,6 +203,7 @@ __all__ = [
     "Readings",
     "Recording",
     "RefusedError",
+    "Replanned",
     "Resolution",
     "ResultsInUseError",
     "ResultsMismatchError",
@@ -283,6 +287,7 @@ __all__ = [
     "read_case",
     "read_fold_case",
     "read_sweep",
+    "replan",
     "replay_fold",
     "segment_after",
     "segment_before",
@@ -351,8 +356,10 @@ _LAZY = {
         "nuno.robot.wire.client": "WireRobot",
         "nuno.robot.wire.names": "Names",
         "nuno.robot.wire.server": "RobotServer",
+        "nuno.search.knots": "Knots",
         "nuno.search.minimise": "Minimum minimise",
         "nuno.search.planner": "Plan plan",
+        "nuno.search.replanner": "Replanned replan",
         "nuno.search.sampler": "Uniform",
         "nuno.search.sweep": "SweepResult read_sweep sweep",
         "nuno.search.trial": "Trial each",

@@ -60,6 +60,40 @@ def test_commands_differ_and_the_best_is_adopted(scene):
     assert np.array_equal(robot.state().q, futures.robot.state()[2].q)
 
 
+def test_commands_are_those_of_the_driver():
+    """A way through three postures, and one posture: in an imagined world to the bit as by the driver in its own."""
+    world, robot, _ = standing(False)
+    world.run(0.6)
+    futures = world.imagine(2)
+    start = robot.actual.angle_vector()
+    way = np.repeat(start[None], 3, axis=0)
+    arm = [robot.actual.joint_index(f"arm_left_{k}_joint") for k in (2, 4)]
+    way[:, arm] += np.array([[0.1, -0.2], [0.2, -0.1], [0.15, 0.0]])
+    spans = [0.3, 0.02, 0.3]  # the second is too short, and is stretched
+
+    def follow():  # the driver may have waited for a fresh state before it sent
+        futures.run(max(0.0, world.time - futures.time))
+
+    robot.angle_vector_sequence(list(way), spans)
+    follow()
+    futures.robot.angle_vector_sequence(np.stack([way, np.repeat(start[None], 3, axis=0)]), spans)
+    for seconds in (0.4, 0.3):
+        world.run(seconds)
+        follow()
+        states = futures.robot.state()
+        assert np.array_equal(states[0].q, robot.state().q) and np.array_equal(states[0].v, robot.state().v)
+        assert np.abs(states[0].q - states[1].q).max() > 0.05
+    robot.angle_vector(start, 0.5)
+    follow()
+    futures.robot.angle_vector(start, 0.5)
+    world.run(0.3)
+    follow()
+    assert np.array_equal(futures.robot.state()[0].q, robot.state().q)
+    for wrong, times, named in ((way[:, :5], 1.0, "avs"), (way, [1.0, 1.0], "times"), (way, 0.0, "times")):
+        with pytest.raises(InvalidInputError, match=named):
+            futures.robot.angle_vector_sequence(wrong, times)
+
+
 def test_a_batch_goes_back_with_its_robots(scene):
     """Saved and restored, all worlds' robots go on with the same bits; copies of a copy too."""
     world, _, _, saved = scene

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState
-from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.path import Path
 from nuno.validation import finite_array, number
@@ -108,14 +109,44 @@ class ImaginedRobot:
                     wanted = np.array(
                         np.broadcast_to(finite_array("angles", angles, (count,), (worlds, count)), wanted.shape)
                     )
-                if self._servo is not None or any(own.gait.is_walking for own in self._motions):
-                    raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
-                for own, goal in zip(self._motions, wanted, strict=True):
-                    for name, rows in own.joints.rows.items():
-                        names = own.joints.controllers[name].names
-                        own.joints.send(name, JointTrajectory(names, np.array([span]), goal[rows][None]))
+                self._send(wanted[:, None], np.array([span]))
             robot = self.original.actual
             return np.array([robot.angles_of(state.q) for state in self._states])
+
+    def angle_vector_sequence(self, avs: ArrayLike, times: ArrayLike = 1.0) -> None:
+        """Send joints through many angles, as the robot's own ``angle_vector_sequence`` does in its world.
+
+        Args:
+            avs: (k, n) for all worlds or (worlds, k, n) [rad; m for slides].
+            times: How long each takes [s] from the one before, (k,), or one number for all; what is too fast for the
+                joints is stretched, in each world by itself.
+
+        Raises:
+            InvalidInputError: other shapes, not finite, or times that are not positive.
+            BodyStateError: the robot walks or is under a servo command.
+        """
+        with self.world.lock:
+            worlds, count = self.world.world_count, len(self.joint_names)
+            given = finite_array("avs", avs, ("k", count), (worlds, "k", count))
+            spans = np.array(np.broadcast_to(finite_array("times", times, (), given.shape[-2:-1]), given.shape[-2]))
+            if (spans <= 0.0).any():
+                raise InvalidInputError(f"times must be above 0, got {spans.min():g}")
+            self._send(np.broadcast_to(given, (worlds, *given.shape[-2:])), spans)
+
+    def _send(self, wanted: np.ndarray, spans: np.ndarray) -> None:
+        """Send each world's joints through angles (worlds, k, n), each of which takes a span (k,) [s]."""
+        if self._servo is not None or any(own.gait.is_walking for own in self._motions):
+            raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
+        shortest = self.original.angle_vector_duration
+        for own, goals in zip(self._motions, wanted, strict=True):
+            begin = own.joints.desired[0]
+            steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
+            needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
+            longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
+            speeds, times = passing_velocities(steps, longer), np.cumsum(longer)
+            for name, rows in own.joints.rows.items():
+                names = own.joints.controllers[name].names
+                own.joints.send(name, JointTrajectory(names, times, goals[:, rows], speeds[:, rows]))
 
     def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any]:
         """Return of one world what ``SimulatedRobot.saved`` does of the robot."""

@@ -21,7 +21,7 @@ from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.known_joints import Angles, KnownJoints
 from nuno.robot.limb_controllers import LimbControllers
-from nuno.robot.trajectory import JointTrajectory
+from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.shapes.path import minimum_jerk
 from nuno.validation import checked, finite_array, number
 
@@ -221,10 +221,7 @@ class JointInterface(LimbControllers, KnownJoints):
             self._checked_time(each[k], ways[k], ways[k + 1], controller_type, time_scale) for k in range(len(wanted))
         ])  # fmt: skip
         steps = np.array([self.sub_angle_vector(b, a) for a, b in itertools.pairwise(ways)])
-        slopes = np.divide(steps, spans[:, None], out=np.zeros_like(steps), where=spans[:, None] > 0.0)
-        velocities = np.zeros_like(steps)
-        velocities[:-1] = np.where(steps[:-1] * steps[1:] >= 0.0, 0.5 * (slopes[:-1] + slopes[1:]), 0.0)
-        velocities[:-1][(spans[:-1] <= 0.0) | (spans[1:] <= 0.0)] = 0.0
+        velocities = passing_velocities(steps, spans)
         self._show(wanted[-1])
         self._send(clients, np.cumsum(spans), np.array(wanted), velocities, start)
         return wanted

@@ -174,6 +174,24 @@ class Spline:
         )
 
 
+def passing_velocities(steps: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    """Return velocities with which joints pass the points of a way, and rest at its last.
+
+    The mean of those before and after, or none where these differ in sign or take no time.
+
+    Args:
+        steps: (..., k, n) from each point to the next [rad; m for slides], the first one from where the joints are.
+        spans: (k,) what each takes [s].
+    """
+    slopes = np.divide(steps, spans[:, None], out=np.zeros_like(steps), where=spans[:, None] > 0.0)
+    found = np.zeros_like(steps)
+    before, after = steps[..., :-1, :], steps[..., 1:, :]
+    mean = 0.5 * (slopes[..., :-1, :] + slopes[..., 1:, :])
+    found[..., :-1, :] = np.where(before * after >= 0.0, mean, 0.0)
+    found[..., :-1, :][..., (spans[:-1] <= 0.0) | (spans[1:] <= 0.0), :] = 0.0
+    return found
+
+
 def resting_at(positions: np.ndarray) -> np.ndarray:
     """Return the coefficients (6, m) of joints that rest."""
     found = np.zeros((6, len(positions)))

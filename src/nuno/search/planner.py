@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import EstimationError, InvalidInputError, NunoError
+from nuno.search.knots import LONGEST
 from nuno.validation import checked, count, finite_array, function, number
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
 
 METHODS = ("cem", "mppi")
-LONGEST = 3600.0
-"""[s] That a motion may be imagined for."""
 SMALLEST = 1e-3
 """Share of its first value that a standard deviation keeps at least."""
 
@@ -49,7 +48,7 @@ def plan(
     world: World, act: Callable[[World, np.ndarray], Any], cost: Callable[[World], Any], *, start: ArrayLike,
     spread: ArrayLike, horizon: float, samples: int = 32, iterations: int = 4, method: Literal["cem", "mppi"] = "cem",
     elites: int | None = None, temperature: float = 0.1, bounds: tuple[ArrayLike, ArrayLike] | None = None,
-    seed: int = 0, device: str | None = None,
+    seed: int = 0, device: str | None = None, thorough: bool = True,
 ) -> Plan:  # fmt: skip
     """Find what to do next: imagine many motions in one batch, keep to the best, and do so again around them.
 
@@ -74,6 +73,7 @@ def plan(
         bounds: Lowest and highest knots, each a number, (d,) or (k, d); None is none.
         seed: Of the samples.
         device: Where futures run; None is where the world runs.
+        thorough: As of ``World.imagine``; without, fast motions are imagined in less time, and less truly.
 
     Raises:
         InvalidInputError: an argument out of range, or costs of another shape.
@@ -102,7 +102,7 @@ def plan(
         raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
     heat = number("temperature", temperature, above=0.0)
     random, floor = np.random.default_rng(count("seed", seed, low=0)), SMALLEST * sigma
-    futures = world.imagine(n, device)
+    futures = world.imagine(n, device, thorough=thorough)
     saved = futures.save()
     found, lowest, failed, history = mean, np.inf, 0, []
     for k in range(rounds):
@@ -111,9 +111,9 @@ def plan(
         knots = np.clip(knots, low, high)
         if k:
             futures.restore(saved)
-        _called("act", act, futures, knots)
+        called("act", act, futures, knots)
         futures.run(seconds)
-        costs = _checked(_called("cost", cost, futures), n)
+        costs = _checked(called("cost", cost, futures), n)
         finite = np.isfinite(costs)
         failed += int(n - finite.sum())
         if not finite.any():
@@ -136,7 +136,7 @@ def plan(
     return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
 
 
-def _called(name: str, own: Callable[..., Any], *given: Any) -> Any:
+def called(name: str, own: Callable[..., Any], *given: Any) -> Any:
     """Return what a function of the caller returns; what it raises comes out with its name before it."""
     try:
         return own(*given)
