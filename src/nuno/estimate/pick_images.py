@@ -83,7 +83,7 @@ def find_cloth_before(
     if rectangle is None:
         assert images.mask_before is not None
         rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
-        over = _over_the_border(images.mask_before, camera, table)
+        over = _border_warning(images.mask_before, camera, table)
         if over is not None:
             rectangle = replace(rectangle, warnings=(*rectangle.warnings, over))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
@@ -91,7 +91,7 @@ def find_cloth_before(
     return images, rectangle
 
 
-def _over_the_border(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
+def _border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
     """Return a warning where the outline of a mask (h, w) runs along the table's border: the cloth goes on there."""
     if table.half_extents is None:
         return None

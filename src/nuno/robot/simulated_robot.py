@@ -311,8 +311,7 @@ class SimulatedRobot(SimulatedBody):
 
     def begin_frame(self, start: float, end: float) -> None:
         """Send the links to where the robot is at the end of the frame, or, with dynamics, set their motors."""
-        span, self._before = end - start, self._state
-        before = self._motion.aim
+        span, before, self._before = end - start, self._motion.aim, self._state
         servo = None if self._servo is None or self.is_dynamic else self._serve
         if span > 0.0 and not self.is_dynamic:
             self.guard.before_frame(self._motion, span)

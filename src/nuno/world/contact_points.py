@@ -93,8 +93,8 @@ def frame_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str, 
     if rigid:
         names, by_slot = _names(world), next(iter(rigid.values())).solver.impulses()
         for k, own in rigid.items():
-            touched = by_slot.get(own.slot, {})
-            found[k] = {names[slot]: impulse for slot, impulse in touched.items() if slot in names}
+            given = by_slot.get(own.slot, {})
+            found[k] = {names[slot]: impulse for slot, impulse in given.items() if slot in names}
     for coupled in _coupled(world):
         for k, given in coupled.impulses(bodies).items():
             for name, impulse in given.items():

@@ -21,10 +21,10 @@ def joint_loads(world: Simulation, joints: Sequence[Joint]) -> tuple[np.ndarray,
     """
     wrenches, efforts = np.zeros((world.world_count, len(joints), 6)), np.zeros((world.world_count, len(joints)))
     for coupled in world._stepping.last:
-        index, told, along = coupled.joint_loads()
+        index, borne, along = coupled.joint_loads()
         for n, joint in enumerate(joints):
             k = index.get(joint)
             if k is not None:
                 kept = coupled.kept[joint.body]
-                wrenches[kept, n], efforts[kept, n] = told[kept, k], along[kept, k]
+                wrenches[kept, n], efforts[kept, n] = borne[kept, k], along[kept, k]
     return wrenches, efforts
