@@ -41,7 +41,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(np|numpy|warp|collections|concurrent|contextlib|os|pathlib|matplotlib|trimesh|PIL|pinocchio)\..*"),
     ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
-    ("py:class", r"(Arms|Color|FileName|Mode)"),  # names for a union of types
+    ("py:class", r"(Arms|Color|FileName|Mode|Pace)"),  # names for a union of types
     ("py:class", r"DeviceArray"),  # Warp's arrays, under a name for type checkers
     # What a result holds for other functions to take
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
