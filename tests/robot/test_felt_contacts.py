@@ -185,8 +185,8 @@ def test_without_dynamics_nothing_is_felt():
     strict=True, reason="3e-6 rad apart in the fourth frame, from equal states and motors; cause unknown"
 )
 def test_a_copy_whose_hand_presses_a_table_keeps_the_bits(standing):
-    """A copy of a robot that presses a table goes on bit for bit."""
+    """A copy of a robot that presses a table goes on bit for bit, also where a first contact point is not near."""
     world, robot = standing
     world.add(table_under(robot))
     lower_hand(robot)
-    feels_alike(world, robot, 0.1)
+    feels_alike(world, robot, 0.5)

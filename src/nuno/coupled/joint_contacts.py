@@ -13,7 +13,7 @@ from nuno.coupled.joint_response import Joints
 from nuno.coupled.pass_progress import Passing, goes_on, is_linked, island_of, note_wrong
 from nuno.numbers.crew import barrier
 from nuno.rigid.convex import Parts
-from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, POINTS, Contacts
+from nuno.rigid.persistent_manifolds import COLOURS, COUNTS, FAR, POINTS, Contacts
 from nuno.rigid.rigid_body import RigidState, rotation_between
 from nuno.rigid.rigid_contact import part_entry
 
@@ -30,10 +30,15 @@ def resolve_entry(rigid: RigidState, parts: Parts, c: Contacts, world: int, e: i
     turn_b = rigid.rotation[j]
     part_entry(rigid, parts, c, world, e, dt)
     o = e * POINTS
+    arm_a = c.arm_a[o]
+    arm_b = c.arm_b[o]
+    if c.start[o][0] >= FAR:  # a point that is far away has the arms of whenever it was near last
+        arm_a = c.local_a[o]
+        arm_b = c.local_b[o]
     went_a = wp.length(rigid.position[i] - a)
-    went_a = went_a + wp.length(rotation_between(turn_a, rigid.rotation[i])) * wp.length(c.arm_a[o])
+    went_a = went_a + wp.length(rotation_between(turn_a, rigid.rotation[i])) * wp.length(arm_a)
     went_b = wp.length(rigid.position[j] - b)
-    went_b = went_b + wp.length(rotation_between(turn_b, rigid.rotation[j])) * wp.length(c.arm_b[o])
+    went_b = went_b + wp.length(rotation_between(turn_b, rigid.rotation[j])) * wp.length(arm_b)
     floor = ROUNDING * (1.0 + wp.max(wp.length(a), wp.length(b)))
     return wp.max(wp.max(went_a, went_b) - floor, 0.0)
 
