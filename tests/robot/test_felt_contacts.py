@@ -181,9 +181,6 @@ def test_without_dynamics_nothing_is_felt():
 
 
 @pytest.mark.long
-@pytest.mark.xfail(
-    strict=True, reason="3e-6 rad apart in the fourth frame, from equal states and motors; cause unknown"
-)
 def test_a_copy_whose_hand_presses_a_table_keeps_the_bits(standing):
     """A copy of a robot that presses a table goes on bit for bit, also where a first contact point is not near."""
     world, robot = standing
