@@ -22,12 +22,12 @@ TOP = 0.74  # [m]
 class Watched(nuno.SimulatedRobot):
     """A simulated robot that keeps, frame by frame, what runs into what, and how low its arms come over the table."""
 
-    collisions, lowest, feet, moments, edge = (), np.inf, None, (), 0.27  # [m] x of the table's side next to the robot
+    hits, lowest, feet, moments, edge = (), np.inf, None, (), 0.27  # [m] x of the table's side next to the robot
 
     def end_frame(self):
         """Look, after every frame."""
         super().end_frame()
-        self.collisions = (*self.collisions, *self.actual.self_collisions())
+        self.hits = (*self.hits, *self.actual.self_collisions())
         feet = np.array([self.actual.frame_pose(foot).position for foot in self.actual.feet])
         self.feet = feet if self.feet is None else self.feet
         assert np.abs(feet - self.feet).max() < 1e-9
@@ -116,7 +116,7 @@ def test_how_the_robot_moved(played):
     assert robot.moments == ("above", "taken", "carried halfway", "laid", "folded")
     assert result.plan.hands == ("right_hand", "left_hand") and result.held == (1, 1)
     assert [hand.held for hand in robot.hands.values()] == [(), ()]
-    assert robot.collisions == () and TOP < robot.lowest < TOP + 0.02
+    assert robot.hits == () and TOP < robot.lowest < TOP + 0.02
     assert result.plan.stretch == 1.0 and result.plan.errors < 5e-4  # the tolerance of reach
 
 

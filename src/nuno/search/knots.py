@@ -87,7 +87,7 @@ class Knots:
         times = np.linspace(0.0, self.seconds, count + 1)
         try:
             places = self.at(times)[..., columns]  # type: ignore[index]
-        except (IndexError, TypeError):
+        except (IndexError, TypeError, ValueError):
             places = times
         if places.shape[-1] != 3 or places.ndim != self.values.ndim:
             raise InvalidInputError(f"columns must choose 3 of {self.now.shape[-1]} numbers, got {columns!r}")

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nuno.errors import InvalidInputError
 from nuno.search.knots import LONGEST, Knots
 from nuno.search.planner import Plan, called, plan
 from nuno.validation import checked, count, finite_array, flag, function, number
@@ -66,7 +67,7 @@ def replan(
             carried out to its end. Else each looks ``horizon`` ahead.
         execute: ``execute(world, motion)`` begins the motion in the world itself, through a robot's driver for
             instance; None is ``act``. The world then runs for ``every``.
-        done: ``done(world)`` after each period ends it where it is true.
+        done: ``done(world)``, before each period and at the end, ends it where it is True.
         samples: As of ``plan``, and so are the others.
         iterations: Of each period.
         method: "cem" or "mppi".
@@ -96,6 +97,8 @@ def replan(
     motions: list[Knots] = []
     took: list[float] = []
     for k in range(rounds):
+        if done is not None and _is_done(done, world):
+            return Replanned(tuple(plans), tuple(motions), np.array(took), True)
         here = finite_array("what now returns", called("now", now, world), (knots.shape[1],))
 
         def imagined(futures: World, values: np.ndarray, here: np.ndarray = here, span: float = span) -> None:
@@ -114,10 +117,16 @@ def replan(
         called("act" if execute is None else "execute", execute or act, world, motion)
         is_last = shrinks and (k == rounds - 1 or span - pause <= SOON)
         world.run(span if is_last else pause)
-        if done is not None and called("done", done, world):
-            return Replanned(tuple(plans), tuple(motions), np.array(took), True)
         if is_last:
             break
         left = motion.later(pause, shrink=shrinks)
         knots, span = left.values, left.seconds
-    return Replanned(tuple(plans), tuple(motions), np.array(took), False)
+    return Replanned(tuple(plans), tuple(motions), np.array(took), done is not None and _is_done(done, world))
+
+
+def _is_done(done: Callable[[World], Any], world: World) -> bool:
+    """Return what the caller's function says, if it is True or False."""
+    said = called("done", done, world)
+    if not isinstance(said, bool | np.bool_):
+        raise InvalidInputError(f"done must return True or False, got {type(said).__name__}")
+    return bool(said)

@@ -77,13 +77,14 @@ class Reading(Saving):
             if isinstance(bodies, str | Body) or not isinstance(bodies, Iterable):
                 raise InvalidInputError(f"bodies must be several, a list or tuple, got {type(bodies).__name__}")
             own = [self._own(body) for body in bodies]
+            if not own:
+                raise InvalidInputError("bodies must be at least one")
             for body in own:
                 if not body.is_dynamic:
                     raise BodyStateError(f"{body.name!r} is static; its pose() and path say where it is")
                 if not isinstance(body.material, Rigid):
                     raise InvalidInputError(f"{body.name!r} deforms; state() tells its vertices")
-            if self._rigid is None:
-                return tuple(np.zeros((self.world_count, 0, k)) for k in (3, 4, 3, 3))  # type: ignore[return-value]
+            assert self._rigid is not None
             return self._rigid.motions(own)
 
     def state(self, body: Body | str, copy: bool = True) -> dict[str, DeviceArray]:
