@@ -9,7 +9,7 @@ import pytest
 import nuno
 from pair_with import GRAVITY, mass_of, mean_load, moment, moments, volume
 
-sys.path.append(str(Path(__file__).parents[1] / "contact"))
+sys.path.append(str(Path(__file__).parents[1] / "contact" / "self"))
 from crossing import count_crossings, vertex_triangle_distances
 
 FOAM = nuno.Soft(density=300.0, youngs_modulus=5e4, poisson_ratio=0.3, damping=0.05)
