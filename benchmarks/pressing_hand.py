@@ -152,7 +152,7 @@ def in_nuno() -> dict[str, Any]:
         places.append(np.asarray(cube.vertices).mean(axis=0))
         forces.append(force_on(world, cube)[0])
     q = dynamics.read()[0][0]
-    return summary(robot, q, dynamics.efforts_now()[0], np.mean(forces[-6:], axis=0), places, spent, RATE)
+    return summary(robot, q, dynamics.felt(1.0 / RATE)[2][0], np.mean(forces[-6:], axis=0), places, spent, RATE)
 
 
 def with_mujoco() -> dict[str, Any]:

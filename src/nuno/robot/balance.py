@@ -54,12 +54,12 @@ class Balance:
         robot = links.robot
         self.dynamics = LinkDynamics(links, friction=friction)
         self._robot, self._world = robot, links.world
-        self._feet = [robot.frame_index(foot) for foot in robot.description.feet]
-        joints = [robot.model.frames[foot].parentJoint for foot in self._feet]
+        feet = [robot.frame_index(foot) for foot in robot.description.feet]
+        joints = [robot.model.frames[foot].parentJoint for foot in feet]
         self._foot_links = [links.names[links.joints.index(joint)] for joint in joints]
         self._control = WholeBodyControl(robot, links.world.gravity, friction=SURE * friction, gains=gains)
         self._data = robot.model.createData()
-        self._stabiliser = Stabiliser(robot, links.world.gravity) if self._feet else None
+        self._stabiliser = Stabiliser(robot, links.world.gravity) if feet else None
         self._warns = True
         self.is_on = True
 
@@ -146,9 +146,9 @@ class Balance:
         """Return q, v, torques, contacts, joint wrenches and loads after a frame of ``span`` [s], of each world."""
         dynamics = self.dynamics
         q, v = dynamics.read()
-        contacts, wrenches = dynamics.felt(span)
+        contacts, wrenches, efforts = dynamics.felt(span)
         loads = dynamics.loads([dynamics.pressing(own, self._foot_links) for own in contacts])
-        return list(zip(q, v, dynamics.efforts_now(), contacts, wrenches, loads, strict=True))
+        return list(zip(q, v, efforts, contacts, wrenches, loads, strict=True))
 
     def imagined(self, world: World) -> Balance:
         """Return the same for the copies of the links in a batch that was imagined from their world."""

@@ -76,9 +76,8 @@ class CaptureStep:
     def pose(self, time: float, ground: float) -> np.ndarray:
         """Return where the foot is to be (4,) at a time [s], above a ground at a height [m]."""
         share = min(max(self.share(time), 0.0), 1.0)
-        way = 0.5 - 0.5 * math.cos(
-            math.pi * share
-        )  # fast legs throw the robot back: this takes a sixth less than jerks
+        # fast legs throw the robot back: this takes a sixth less than jerks
+        way = 0.5 - 0.5 * math.cos(math.pi * share)
         turn = math.remainder(self.goal[2] - self.start[3], math.tau)
         x, y = self.start[:2] + way * (self.goal[:2] - self.start[:2])
         lift = LIFT * self.height * (4.0 * share * (1.0 - share)) ** 2

@@ -92,7 +92,8 @@ def convex(points: np.ndarray) -> Any:
     return coal.Convex(corners, triangles)
 
 
-def _geometry(shape: Shape) -> Any:
+def primitive(shape: Shape) -> Any:
+    """Return a shape that coal has too, about its own origin; else None."""
     if isinstance(shape, Box):
         return coal.Box(*shape.size)
     if isinstance(shape, Sphere):
@@ -101,14 +102,25 @@ def _geometry(shape: Shape) -> Any:
         return coal.Cylinder(shape.radius, shape.height)
     if isinstance(shape, Capsule):
         return coal.Capsule(shape.radius, shape.height)
-    if isinstance(shape, Plane):
-        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-    vertices, faces = shape.mesh()
-    if isinstance(shape, Hull):
-        return convex(np.asarray(vertices, dtype=float))
+    return None
+
+
+def surface(vertices: np.ndarray, faces: np.ndarray) -> Any:
+    """Return triangles (m, 3) between vertices (n, 3) [m] as coal has them; their inside does not count."""
     mesh = coal.BVHModelOBBRSS()
     mesh.beginModel(len(faces), len(vertices))
     mesh.addVertices(np.asarray(vertices, dtype=float))
     mesh.addTriangles(np.asarray(faces, dtype=np.int64))
     mesh.endModel()
     return mesh
+
+
+def _geometry(shape: Shape) -> Any:
+    if (found := primitive(shape)) is not None:
+        return found
+    if isinstance(shape, Plane):
+        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+    vertices, faces = shape.mesh()
+    if isinstance(shape, Hull):
+        return convex(np.asarray(vertices, dtype=float))
+    return surface(vertices, faces)

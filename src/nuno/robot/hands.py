@@ -18,10 +18,10 @@ from nuno.robot.placement import pose_of
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert
 from nuno.shapes.surface import SurfacePoints
 from nuno.validation import checked, number
-from nuno.world.contact_points import frame_impulses
 
 if TYPE_CHECKING:
     from nuno.robot.links import Links
+    from nuno.robot.robot_state import Contacts
 
 PROBES = 5
 """Points along each side of the closing volume from which the nearest surface is looked for."""
@@ -61,7 +61,7 @@ class Hand:
         self.body, self._offset = carrier(links, name)
         self._shapes = carried_by(links, self.body)
         self._grips: list[Grip] = []
-        self._fingers = [[links.bodies[k] for k in own] for own in links.finger_bodies.of_hand(name)]
+        self._fingers = [[links.names[k] for k in own] for own in links.finger_bodies.of_hand(name)]
         self.pressed: tuple[Body, ...] = ()  # in the last frame, by all fingers
 
     def __repr__(self) -> str:
@@ -85,18 +85,19 @@ class Hand:
         """Return True if it holds by its fingers' friction alone, and grips nothing."""
         return bool(self._fingers) and self.body.is_dynamic
 
-    def feel(self) -> None:
-        """Take note of what the fingers pressed on in the frame that ended; nothing where the hand does not press."""
+    def feel(self, contacts: Contacts) -> None:
+        """Take note of what the fingers pressed on in the frame that ended; nothing where the hand does not press.
+
+        Args:
+            contacts: What touched the robot's links in it.
+        """
         self.pressed = ()
         if self.presses:
-            world = self.links.world
-            touched = frame_impulses(world, [body for own in self._fingers for body in own])
-            of_fingers, first = [], 0
-            for own in self._fingers:
-                of_fingers.append({name for found in touched[first : first + len(own)] for name in found})
-                first += len(own)
-            names = set.intersection(*of_fingers)
-            self.pressed = tuple(b for b in world.bodies if b.name in names and b not in self.links.bodies)
+            names = set.intersection(
+                *({name for link in own for name in contacts.get(link, ())} for own in self._fingers)
+            )
+            bodies = self.links.world.bodies
+            self.pressed = tuple(b for b in bodies if b.name in names and b not in self.links.bodies)
 
     @property
     def width(self) -> float:

@@ -220,28 +220,25 @@ class LinkDynamics:
         angles = np.where(slides, along, 2.0 * np.arctan2(across[..., 3], across[..., 0]))
         return angles, np.einsum("wkx,wkx->wk", motion, axis)
 
-    def efforts_now(self) -> np.ndarray:
-        """Return what motors, friction and stops exert (worlds, n) [N m; N], the mean over the last frame."""
-        return joint_loads(self.world, self.joints)[1]
-
-    def felt(self, span: float) -> tuple[list[Contacts], np.ndarray]:
-        """Return what touched links and what joints bore over the last frame.
+    def felt(self, span: float) -> tuple[list[Contacts], np.ndarray, np.ndarray]:
+        """Return what touched links, what joints bore, and what their motors did over the last frame.
 
         Args:
             span: [s] of the frame.
 
         Returns:
-            Of each world, by link and by the other body's name, the force (3,) [N] on the link; and (worlds, n, 6) the
-            wrenches of `RobotState.joint_wrenches`.
+            Of each world, by link and by the other body's name, the force (3,) [N] on the link; (worlds, n, 6) the
+            wrenches of `RobotState.joint_wrenches`; and the mean of what motors, friction and stops exert, (worlds, n)
+            [N m; N].
         """
-        wrenches, _ = joint_loads(self.world, self.joints)
+        wrenches, efforts = joint_loads(self.world, self.joints)
         found: list[dict[str, dict[str, np.ndarray]]] = [{} for _ in range(self.world.world_count)]
         for name, own in zip(self.links.names, frame_impulses(self.world, self.bodies), strict=True):
             for other, impulse in own.items():
                 for contacts, given in zip(found, impulse, strict=True):
                     if given.any():
                         contacts.setdefault(name, {})[other] = given / span
-        return list(found), wrenches
+        return list(found), wrenches, efforts
 
     def pressing(self, contacts: Contacts, feet: Sequence[str]) -> dict[str, np.ndarray]:
         """Return what bodies that move load links other than the feet with, (3,) [N] by link.

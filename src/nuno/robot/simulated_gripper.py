@@ -13,6 +13,7 @@ from nuno.robot.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
     from nuno.robot.finger_dynamics import FingerDynamics
+    from nuno.robot.robot_state import Contacts
 
 PEAK = 1.5
 """Of the mean, the highest velocity on a cubic between two points of rest."""
@@ -79,10 +80,14 @@ class SimulatedGripper:
         self._motion = self._move(self.hand.joint_angles(width))
         return self.goal
 
-    def end_frame(self) -> None:
-        """Take hold where the fingers have closed, and end the goal where they have come to rest."""
+    def end_frame(self, contacts: Contacts) -> None:
+        """Take hold where the fingers have closed, and end the goal where they have come to rest.
+
+        Args:
+            contacts: What touched the robot's links in the frame.
+        """
         if self._fingers is not None:
-            self.hand.feel()
+            self.hand.feel(contacts)
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return

@@ -346,7 +346,7 @@ class SimulatedRobot(SimulatedBody):
             self._state = self._burden.after_frame(self._state, self.guard.met)
         self.joints.take_step(actual)
         for gripper in self.grippers.values():
-            gripper.end_frame()
+            gripper.end_frame(self._state.contacts)
         self.gait.end_frame()
 
     def cancel_frame(self) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.robot.pinocchio import coal, pin
-from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
+from nuno.robot.coal_shapes import primitive, surface
+from nuno.robot.pinocchio import pin
+from nuno.shapes.shape import Plane
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -36,10 +37,10 @@ class Obstacles:
                 continue
             place = pin.SE3.Identity()
             position, (w, x, y, z) = body.pose()
-            if (shape := _primitive(coal, body)) is not None:
+            if (shape := primitive(body.shape)) is not None:
                 place = pin.SE3(pin.Quaternion(w, x, y, z).toRotationMatrix(), np.array(position))
             else:
-                shape = _triangles(coal, body)
+                shape = surface(body.vertices, body.faces)
             index = self._model.addGeometryObject(pin.GeometryObject(body.name, 0, place, shape))
             for link in links:
                 self._model.addCollisionPair(pin.CollisionPair(link, index))
@@ -54,28 +55,3 @@ class Obstacles:
                 link, body = (self._model.geometryObjects[k] for k in (pair.first, pair.second))
                 return str(self._robot.model.frames[link.parentFrame].name), str(body.name)
         return None
-
-
-def _primitive(coal: Any, body: Body) -> Any:
-    """Return a shape that coal has too, else None."""
-    shape = body.shape
-    if isinstance(shape, Box):
-        return coal.Box(*shape.size)
-    if isinstance(shape, Sphere):
-        return coal.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.height)
-    if isinstance(shape, Capsule):
-        return coal.Capsule(shape.radius, shape.height)
-    return None
-
-
-def _triangles(coal: Any, body: Body) -> Any:
-    """Return a body's surface where it is; its inside does not count."""
-    mesh = coal.BVHModelOBBRSS()
-    vertices, faces = np.asarray(body.vertices, dtype=float), body.faces
-    mesh.beginModel(len(faces), len(vertices))
-    mesh.addVertices(vertices)
-    mesh.addTriangles(np.asarray(faces, dtype=np.int64))
-    mesh.endModel()
-    return mesh
