@@ -354,7 +354,7 @@ CALLS = {
     "Viewer.plot": {"name": "a", "read": lambda s: (lambda: 0.0)}, "Viewer.record": {},
     "Viewer.remove_camera": {"name": "a"}, "Viewer.remove_plot": {"name": "a"}, "Viewer.show": {"open": False},
     "Viewer.step": {},
-    "Hand.close": {}, "Hand.feel": {}, "Hand.gap": {},
+    "Hand.close": {}, "Hand.gap": {},
     "Hand.joint_angles": {"width": 0.05}, "Hand.move": {"width": 0.05}, "Hand.open": {},
     "Hand.volume": {}, "HeadCameras.camera": {"name": "head_left"}, "HeadCameras.look_from": None,
     "Humanoid.angle_vector": {}, "Humanoid.camera": {}, "Humanoid.checked_angles": {"angles": {"head_1_joint": 0.1}},

@@ -61,7 +61,7 @@ class Hand:
         self.body, self._offset = carrier(links, name)
         self._shapes = carried_by(links, self.body)
         self._grips: list[Grip] = []
-        self._fingers = [[links.names[k] for k in own] for own in links.finger_bodies.of_hand(name)]
+        self._fingers = [[links.names[k] for k in own] for own in links.finger_bodies.of_hand(name)]  # links of each
         self.pressed: tuple[Body, ...] = ()  # in the last frame, by all fingers
 
     def __repr__(self) -> str:
@@ -84,20 +84,6 @@ class Hand:
     def presses(self) -> bool:
         """Return True if it holds by its fingers' friction alone, and grips nothing."""
         return bool(self._fingers) and self.body.is_dynamic
-
-    def feel(self, contacts: Contacts) -> None:
-        """Take note of what the fingers pressed on in the frame that ended; nothing where the hand does not press.
-
-        Args:
-            contacts: What touched the robot's links in it.
-        """
-        self.pressed = ()
-        if self.presses:
-            names = set.intersection(
-                *({name for link in own for name in contacts.get(link, ())} for own in self._fingers)
-            )
-            bodies = self.links.world.bodies
-            self.pressed = tuple(b for b in bodies if b.name in names and b not in self.links.bodies)
 
     @property
     def width(self) -> float:
@@ -271,3 +257,17 @@ def carried_by(links: Links, body: Body) -> list[Body]:
 def hands_of(links: Links) -> dict[str, Hand]:
     """Return the hands of a robot that is in a world, by name."""
     return {name: Hand(links, name) for name in links.robot.description.hands}
+
+
+def pressed_by(hand: Hand, contacts: Contacts) -> tuple[Body, ...]:
+    """Return the bodies that all fingers of a hand pressed on in the frame that ended; none where it does not press.
+
+    Args:
+        hand: The hand.
+        contacts: What touched the robot's links in the frame.
+    """
+    if not hand.presses:
+        return ()
+    names = set.intersection(*({name for link in own for name in contacts.get(link, ())} for own in hand._fingers))
+    bodies = hand.links.world.bodies
+    return tuple(body for body in bodies if body.name in names and body not in hand.links.bodies)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
-from nuno.robot.hands import Hand
+from nuno.robot.hands import Hand, pressed_by
 from nuno.robot.simulated_joints import SimulatedJoints
 from nuno.robot.trajectory import JointTrajectory
 
@@ -87,7 +87,7 @@ class SimulatedGripper:
             contacts: What touched the robot's links in the frame.
         """
         if self._fingers is not None:
-            self.hand.feel(contacts)
+            self.hand.pressed = pressed_by(self.hand, contacts)
         goal = self.goal
         if goal is None or goal.is_done or (self._motion is not None and not self._motion.is_done):
             return
