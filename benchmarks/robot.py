@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from reaching import reaching
 from sensors import ticks
 from wire import SERVERS, other_process, ours, put_on_the_wire
 
@@ -129,35 +130,6 @@ def beside_a_cloth(repeats: int) -> dict[str, Any]:
     robot.angle_vector({"arm_right_4_joint": -0.5}, 2.0 * repeats * FRAME)
     compare("in motion")
     return found
-
-
-def reaching(targets: int) -> dict[str, Any]:
-    """Two hands of Talos to random poses that it can reach, feet on the floor: how many, and how long [ms]."""
-    robot = nuno.Humanoid("talos")
-    robot.self_collisions()  # reads the meshes
-    start = robot.angle_vector()
-    arms = [k for k, name in enumerate(robot.joint_names) if name.startswith("arm_")]
-    low, high = (limit[arms] for limit in robot.joint_limits)
-    random = np.random.default_rng(1)
-    wanted: list[dict[str, Any]] = []
-    while len(wanted) < targets:
-        angles = start.copy()
-        angles[arms] = np.clip(start[arms] + random.uniform(-0.6, 0.6, len(arms)), low, high)
-        robot.angle_vector(angles)
-        if not robot.self_collisions():
-            wanted.append({hand: robot.frame_pose(hand) for hand in ("left_hand", "right_hand")})
-    spent, reached, largest = [], 0, 0.0
-    for goals in wanted:
-        robot.stand()
-        begin = time.thread_time()
-        result = robot.reach(goals)
-        spent.append(time.thread_time() - begin)
-        reached += bool(result)
-        largest = max([largest, *result.position_errors.values()]) if result else largest
-    return {
-        "targets": targets, "reached": reached, "median_ms": round(1000.0 * statistics.median(spent), 2),
-        "largest_error_mm": round(1000.0 * largest, 3),
-    }  # fmt: skip
 
 
 def without_meshes(urdf: Path, folder: Path) -> Path:
@@ -305,7 +277,7 @@ def main() -> None:
         "control_tick_ms": control(options.repeats),
         "sensors_ms": ticks("talos", options.repeats),
         "beside_a_cloth": beside_a_cloth(options.repeats),
-        "reaching": reaching(60),
+        "reaching": reaching("talos", 60)["poses"],
         "kinematics_ms": kinematics(options.repeats, 60),
     }
     with other_process(put_on_the_wire, *SERVERS["real time"]) as url:
