@@ -10,6 +10,7 @@ PACKAGE = Path(nuno.__file__).parent
 FOLDERS = (
     "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
     "numbers", "state", "constraints", "plans", "solvers", "topology", "rigid", "coupled", "bodies", "world",
+    "envs",
 )  # fmt: skip
 """Where nothing is left; `tests/test_imports.py` looks for the first of the words in all folders."""
 
@@ -37,6 +38,9 @@ REPLACED = {
 IN_KERNELS = {"near": "shape list, floats, mean", "those": "crew"}
 KERNELS = ("state", "constraints", "plans", "numbers")
 
+# Where a viewer's page picks bodies with the mouse, as the field says.
+IN_VIEWER = {word: now for word, now in REPLACED.items() if word != "picked"}
+
 # What an identifier may be in spite of its word, and why.
 ALLOWED = {
     r"(frame_|key_|_frame_|_grip_|_same_|_with_equal_)?times|_times": "points in time [s]",
@@ -44,13 +48,14 @@ ALLOWED = {
     r"roll|fill_?|sliding_window_view|ListedColormap": "names of NumPy, Warp, Matplotlib",
     r"query_ball_point|fillConvexPoly|_least_squares": "names of SciPy and OpenCV; the field's least squares",
     r"fill_(doubtful_)?holes": "morphology's hole filling",
-    r"(taught_|find_)?[lL]ayers": "the layers of a folded cloth, public names",
+    r"(taught_|find_|vertex_)?[lL]ayers": "the layers of a folded cloth, public names",
     r"over": "what lies over a point, public: `Layers.over`",
     r"over_torque": "public attribute of `RobotState`: joints beyond their torque limits",
     r"known": "public argument of `nuno.fit_material`: the rest of the material",
     r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",
     r"(is_)?root": "of a tree of joints",
     r"least": "public attribute of `nuno.solvers.resolution.Resolution`",
+    r"SpreadTask|spread_task": "a task of `nuno.envs`: a cloth is spread on a table",
     r"BALL|(project_)?ball(_joint)?": "the field's ball joint",
     r"listed_(position|rotation)": "where bodies were when rows were listed: a verb, and in saved states",
     r"lay_over|left_over|over_triangle": "verbs: to lay over, to be left over",
@@ -90,13 +95,19 @@ def found(folders, replaced):
 def test_replaced_words_name_no_concept():
     """No identifier and no file name has a replaced word, but those that are allowed with a reason."""
     assert not found(FOLDERS, REPLACED)
+    assert not found(("viewer",), IN_VIEWER)
     assert not found(KERNELS, IN_KERNELS)
     assert not found(("rigid",), {"those": IN_KERNELS["those"]})
 
 
 def test_every_exception_is_used():
     """An allowed name that nothing has is no exception."""
-    names = {name for folder in FOLDERS for path in (PACKAGE / folder).rglob("*.py") for name in identifiers(path)}
+    names = {
+        name
+        for folder in (*FOLDERS, "viewer")
+        for path in (PACKAGE / folder).rglob("*.py")
+        for name in identifiers(path)
+    }
     assert not [pattern for pattern in ALLOWED if not any(re.fullmatch(pattern, name) for name in names)]
 
 

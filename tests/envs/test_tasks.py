@@ -58,15 +58,15 @@ def test_fold_wants_halves_on_each_other_and_no_heap():
 
 
 def test_hang_wants_both_sides_of_the_rod_alike():
-    """On the table it is 0, held before the rod a quarter, hung over it by halves nearly 1."""
+    """On the table it is 0, held before the bar a quarter, hung over it by halves nearly 1."""
     task = HangTask(**SMALL)
-    flat, rod = task.flat((0.0, 0.0), 0.0), (0.0, 0.1, 0.3)
-    assert score_of(task, flat, rod)[0] == 0.0
+    flat, bar = task.flat((0.0, 0.0), 0.0), (0.0, 0.1, 0.3)
+    assert score_of(task, flat, bar)[0] == 0.0
     held = np.column_stack([flat[:, 0], np.zeros(25), flat[:, 1] + 0.3])
-    assert score_of(task, held, rod)[0] == 0.25
+    assert score_of(task, held, bar)[0] == 0.25
     hung = np.column_stack([flat[:, 0], 0.1 + 0.02 * np.sign(flat[:, 1] - 1e-6), 0.3 - np.abs(flat[:, 1])])
-    s = 0.4  # two of five rows are behind it, the row on the rod is not
-    assert score_of(task, hung, rod)[0] == pytest.approx((1.0 + 12.0 * s * (1.0 - s)) / 4.0)
+    s = 0.4  # two of five rows are behind it, the row on the bar is not
+    assert score_of(task, hung, bar)[0] == pytest.approx((1.0 + 12.0 * s * (1.0 - s)) / 4.0)
 
 
 def test_cover_counts_the_box():

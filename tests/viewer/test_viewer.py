@@ -135,7 +135,7 @@ def test_a_body_is_removed_again_and_again_while_it_looks(caplog, monkeypatch):
 def test_viewing_changes_no_bit(monkeypatch):
     """A world that is looked at, with contacts, and filmed, moves as one that is not."""
     monkeypatch.setattr(following_module, "SHARE", 1.0)  # looks as often as it can
-    monkeypatch.setattr(following_module, "IDLE", 0.0)  # though there is no page
+    monkeypatch.setattr(following_module, "POLL", 0.0)  # though there is no page
     runs = []
     for looked_at in (False, True):
         world = make_world()
@@ -180,7 +180,7 @@ def test_a_stepped_world_is_followed():
 
 def test_it_looks_rarely_while_nobody_does(monkeypatch):
     """Without a page a world is looked at only now and then; a page that comes is shown all of it, and follows."""
-    monkeypatch.setattr(following_module, "IDLE", 1e6)
+    monkeypatch.setattr(following_module, "POLL", 1e6)
     looks = []
     look = Scene.look
     monkeypatch.setattr(Scene, "look", lambda own, sparing=False: (looks.append(sparing), look(own, sparing))[1])

@@ -57,6 +57,6 @@ class ScriptedPolicy:
         vertices, found = self._env.vertices, np.empty_like(self._before)
         for k, way in enumerate(self._ways):
             here = self._next == k
-            beside = 0.0 if way.vertices is None else vertices[here][:, way.vertices]
-            found[here] = way.places[here] + beside
+            offset = 0.0 if way.vertices is None else vertices[here][:, way.vertices]
+            found[here] = way.places[here] + offset
         return found

@@ -25,13 +25,13 @@ class SpreadTask(ClothTask):
 
     @cached_property
     def dropped(self) -> np.ndarray:
-        """(shapes, n, 3) [m]: cloths that were picked at one vertex each, lifted and dropped."""
+        """(shapes, n, 3) [m]: cloths that were held at one vertex each, lifted and dropped."""
         batch = self.world().imagine(SHAPES)
         cloth = batch.find("cloth")
-        picked = np.random.default_rng(0).integers(len(self.flat((0, 0), 0.0)), size=(SHAPES, 1))
-        start = cloth.vertices[np.arange(SHAPES), picked[:, 0]]
+        held = np.random.default_rng(0).integers(len(self.flat((0, 0), 0.0)), size=(SHAPES, 1))
+        start = cloth.vertices[np.arange(SHAPES), held[:, 0]]
         path = Path([0.0, 0.75], np.stack([start, moved(start, 0.0, 0.0, DROP)], axis=1), interpolation="minimum_jerk")
-        grip = batch.grip(cloth, picked, to=path)
+        grip = batch.grip(cloth, held, to=path)
         batch.run(1.0)
         grip.release()
         batch.run(1.0)

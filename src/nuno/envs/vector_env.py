@@ -16,7 +16,7 @@ from nuno.validation import count, finite_array
 
 AutoresetMode = gymnasium.vector.AutoresetMode
 HOLD = 4
-"""Control steps for which the score must be high enough with open hands: what slides off a rod has not been hung."""
+"""Control steps for which the score must be high enough with open hands: what slides off a bar has not been hung."""
 
 
 class ClothVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
@@ -148,7 +148,7 @@ class ClothVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarr
         terminations = self._held >= HOLD
         truncations = (self._steps >= self.task.horizon) & ~terminations & ~ended
         self._score = score
-        infos = self._told({"score": score, "success": terminations}, ~ended)
+        infos = self._masked({"score": score, "success": terminations}, ~ended)
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             infos = self._joined(infos, self._begin(ended))
         self._ended = terminations | truncations
@@ -195,7 +195,7 @@ class ClothVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarr
         self._batch.begin(worlds, [self.task.start(self._random[k]) for k in worlds])
         self._steps[worlds], self._held[worlds], self._ended[worlds] = 0, 0, False
         self._score = np.where(mask, self._batch.score(), self._score)
-        return self._told({"score": self._score}, mask)
+        return self._masked({"score": self._score}, mask)
 
     def _with_final(self, observations: np.ndarray, infos: dict[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin anew where an episode has just ended; the infos keep what was seen at its end."""
@@ -203,18 +203,18 @@ class ClothVectorEnv(gymnasium.vector.VectorEnv[np.ndarray, np.ndarray, np.ndarr
         final = np.full(self.num_envs, None, dtype=object)
         for k in np.flatnonzero(ended):
             final[k] = observations[k]
-        of_end = self._told({name: infos[name] for name in ("score", "success")}, ended)
-        going = self._told({name: infos[name] for name in ("score", "success")}, ~ended)
+        of_end = self._masked({name: infos[name] for name in ("score", "success")}, ended)
+        going = self._masked({name: infos[name] for name in ("score", "success")}, ~ended)
         infos = {"final_obs": final, "_final_obs": ended.copy(), "final_info": of_end, "_final_info": ended.copy()}
         infos = self._joined(self._joined(infos, going), self._begin(ended))
         return self._batch.observe(self._steps), infos
 
-    def _told(self, values: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
+    def _masked(self, values: dict[str, np.ndarray], mask: np.ndarray) -> dict[str, Any]:
         """Return values as Gymnasium's infos: zero where they are not told, with a mask each."""
         if not mask.any():
             return {}
-        told = {name: np.where(mask, value, np.zeros_like(value)) for name, value in values.items()}
-        return told | {f"_{name}": mask.copy() for name in values}
+        masked = {name: np.where(mask, value, np.zeros_like(value)) for name, value in values.items()}
+        return masked | {f"_{name}": mask.copy() for name in values}
 
     def _joined(self, infos: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
         """Return infos of some worlds together with those of others."""

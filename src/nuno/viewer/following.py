@@ -32,7 +32,7 @@ logger = logging.getLogger(__name__)
 
 SHARE = 0.02
 """Of a core's time that looking and sending may take; where they take longer, they are done more rarely."""
-IDLE = 0.5
+POLL = 0.5
 """[s] Between two looks while no page is there, so that the next finds the world about as it is."""
 CHANNEL_RATE = 5e5
 """[bytes/s] That pages in notebooks get at most: Jupyter drops messages over 1e6 by default."""
@@ -68,7 +68,7 @@ class Following:
         self._piece = 2  # frames of a run between two chances to look
         self._last_chance = time.perf_counter()
         self._stop = threading.Event()
-        self._sent_time = self._idle_until = self._channels_due = 0.0
+        self._sent_time = self._polled_until = self._channels_due = 0.0
         self._channels: list[Channel] = []  # pages that no server is needed for, in notebooks
         self._look(wait=True)
         heard = weakly(self, "_hear") if control else None
@@ -211,9 +211,9 @@ class Following:
 
     def _follow_once(self) -> None:
         now = time.perf_counter()
-        if (not self.page_count and now < self._idle_until) or (self._channels and now < self._channels_due):
+        if (not self.page_count and now < self._polled_until) or (self._channels and now < self._channels_due):
             return
-        self._idle_until = now + IDLE
+        self._polled_until = now + POLL
         with self._turn:
             if not self._stop.is_set():
                 self._send(self._look(wait=False))

@@ -86,7 +86,7 @@ class Scene:
             sparing: Leave contacts as they were while working them out would take more than a share of the time.
         """
         self.time = self.world._time
-        gone = dict(self._body_objects)
+        left = dict(self._body_objects)
         for body in list(self.world._bodies.values()):
             style = self.styles.of(body)
             if not style.visible:
@@ -101,10 +101,10 @@ class Scene:
                 self._entered += body_objects.objects
                 self._looked.append(body_objects)
                 continue  # the one that it replaces stays among those that are gone
-            gone.pop(body.key)
+            left.pop(body.key)
             if body_objects.look():
                 self._looked.append(body_objects)
-        for key, body_objects in gone.items():
+        for key, body_objects in left.items():
             self._left += [obj.number for obj in body_objects.objects]
             if self._body_objects[key] is body_objects:
                 del self._body_objects[key]

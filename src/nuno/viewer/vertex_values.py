@@ -64,9 +64,9 @@ def vertex_layers(faces: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         faces: (m, 3).
         vertices: (n, 3) [m].
     """
-    # over an edge, a vertex would lie over both of its triangles: all are looked at from a hair's breadth beside
-    beside = 1e-6 * float(np.ptp(vertices, axis=0).max()) * np.array((0.77, 0.41, 0.0))
-    corners = vertices[faces] - beside
+    # over an edge, a vertex would lie over both of its triangles: all are looked at from a hair's breadth aside
+    aside = 1e-6 * float(np.ptp(vertices, axis=0).max()) * np.array((0.77, 0.41, 0.0))
+    corners = vertices[faces] - aside
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
     # a grid of cells as large as the largest triangle: each lies in up to four of them
     size = max(float((high - low).max()), 1e-9) * (1.0 + 1e-9)

@@ -23,7 +23,7 @@ class VisualMeshes:
     """
 
     def __init__(self, robots: Iterable[Links] = ()) -> None:
-        self._known: list[Links] = []
+        self._read: list[Links] = []
         self._garments: dict[str, list[VisualMesh]] = {}
         for links in robots:
             self._take(links)
@@ -35,12 +35,12 @@ class VisualMeshes:
             MeshError: a visual mesh that cannot be read.
         """
         links = body._links
-        if links is not None and not any(links is known for known in self._known):
+        if links is not None and not any(links is known for known in self._read):
             self._take(links)
         return self._garments.get(body.key)
 
     def _take(self, links: Links) -> None:
-        self._known.append(links)
+        self._read.append(links)
         if any(body.group == 0 for body in links.bodies):
             return
         from nuno.robot.looks import looks_of  # which loads Pinocchio
