@@ -62,7 +62,9 @@ def describe_world(world: World, index: int | None = None) -> SceneDescription:
 
 
 def _one(pose: Any, k: int) -> Pose:
-    return tuple(np.array(part if part.ndim == 1 else part[k if len(part) > 1 else 0]) for part in pose)  # type: ignore[return-value]
+    """Return the pose in one world; the quaternion as long as 1, which a solver's is to a float's digits."""
+    position, turn = (np.array(part if part.ndim == 1 else part[k if len(part) > 1 else 0]) for part in pose)
+    return position, turn / np.linalg.norm(turn)
 
 
 def _row(values: np.ndarray, k: int) -> np.ndarray:
