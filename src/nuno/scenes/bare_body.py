@@ -57,6 +57,19 @@ def possible(inertia: np.ndarray, mass: float) -> np.ndarray:
     return symmetric if np.array_equal(raised, moments) else axes @ np.diag(raised) @ axes.T
 
 
+SHARE = 0.01
+"""Of a body's mass and inertia, what a body between two of its joints takes."""
+
+
+def split_off(body: SceneBody, name: str, position: np.ndarray) -> SceneBody:
+    """Return a small body that stands between two joints of a body, whose mass it takes a share of."""
+    material: Any = body.material
+    mass, inertia = float(material.mass), np.asarray(material.inertia)
+    largest = float(np.linalg.eigvalsh(inertia)[2])
+    body.material = replace(material, mass=(1.0 - SHARE) * mass, inertia=(1.0 - SHARE) * inertia)
+    return bare_body(name, position, SHARE * mass, SHARE * largest)
+
+
 def bare_body(name: str, position: np.ndarray, mass: float, moment: float) -> SceneBody:
     """Return a small ball without contact, which stands between two joints of one body.
 

@@ -74,4 +74,3 @@ def cloth_of(plate: Plate, *, area_density: float, friction: float, thickness: f
 def mean_of(value: Any) -> float:
     """Return the mean of a material's value, over elements and directions."""
     return float(np.mean(np.ravel(value)))
-

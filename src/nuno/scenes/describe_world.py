@@ -125,11 +125,10 @@ def _whole(material: Rigid, shape: Shape, thickness: float, offset: np.ndarray) 
     mass = density * unit.volume if material.mass is None else float(np.ravel(material.mass)[0])
     inertia = unit.inertia * (mass / unit.volume) if material.inertia is None else np.asarray(material.inertia)
     centre = unit.centre if material.centre_of_mass is None else np.asarray(material.centre_of_mass) - offset
-    return Rigid(
-        density, mass, inertia, *(float(np.ravel(value)[0]) for value in (
-            material.friction, material.restitution, material.air_drag
-        )), centre,
-    )  # fmt: skip
+    friction, restitution, air_drag = (
+        float(np.ravel(value)[0]) for value in (material.friction, material.restitution, material.air_drag)
+    )
+    return Rigid(density, mass, inertia, friction, restitution, air_drag, centre)
 
 
 def _add_grip(
@@ -141,20 +140,17 @@ def _add_grip(
         scene.joints.append(_joint(scene, grip, spec, body, target, poses))
         return
     if isinstance(spec, HoldSpec):
-        if spec.free is not None or len(spec.times) > 1 and spec.times[-1] > snapshot.time:
+        if spec.free is not None or (len(spec.times) > 1 and spec.times[-1] > snapshot.time):
             scene.note("a grip that leads a rigid body or lets it slide is left out", body)
             return
         scene.note("a grip or weld of a rigid body is saved as a fixed joint", body)
         position = poses[grip.body][0]
-        limit = float(np.ravel(spec.max_force)[0])
-        scene.joints.append(
-            SceneJoint(
-                _free_name(scene, "fixed", body, target), "fixed", body, target, position, np.array([0.0, 0.0, 1.0]),
-                max_force=limit,
-            )  # fmt: skip
-        )
+        most = float(np.ravel(spec.max_force)[0])
+        name, z = _free_name(scene, "fixed", body, target), np.array([0.0, 0.0, 1.0])
+        scene.joints.append(SceneJoint(name, "fixed", body, target, position, z, max_force=most))
         return
     if isinstance(spec, GripSpec):
+        limit: float | None
         held, moving = spec.vertices, len(spec.times) > 1 and spec.times[-1] > snapshot.time
         limit = None if spec.max_force is None else float(np.ravel(spec.max_force)[0])
     else:

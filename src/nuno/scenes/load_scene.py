@@ -94,9 +94,7 @@ def load_scene(
     return LoadedScene(goal, bodies, joints, tuple(grips), report_of(scene, source, "loaded"))
 
 
-def _read(
-    source: Path, kind: str, keyframe: str | None, fixed_base: bool, folders: list[Path]
-) -> SceneDescription:
+def _read(source: Path, kind: str, keyframe: str | None, fixed_base: bool, folders: list[Path]) -> SceneDescription:
     if kind in USD:
         from nuno.scenes.usd_reader import read_usd
 

@@ -34,7 +34,7 @@ def add_constraints(scene: SceneDescription, compiled: CompiledMjcf) -> None:
         ends = [compiled.body_name(compiled.root(each)) if compiled.moves(each) else None for each in (first, second)]
         if not compiled.moves(first):
             ends.reverse()
-        if ends[0] not in moving or ends[1] is not None and ends[1] not in moving:
+        if ends[0] not in moving or (ends[1] is not None and ends[1] not in moving):
             scene.note("equality constraints but welds and connections of bodies are left out", name)
             continue
         axis = np.array([0.0, 0.0, 1.0])

@@ -6,7 +6,6 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-
 from nuno.errors import FileFormatError, MissingPackageError
 from nuno.scenes.compiled_mjcf import CompiledMjcf, names_of
 from nuno.scenes.mjcf_constraints import add_constraints
@@ -88,5 +87,3 @@ def _key(mujoco: Any, model: Any, asked: str | None, path: Path, is_own: bool) -
         valid = ", ".join(name for name in names if name) or "none"
         raise FileFormatError(f"{str(path)!r} has no key frame named {asked!r}; there are: {valid}")
     return names.index(asked)
-
-

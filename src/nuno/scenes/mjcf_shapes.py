@@ -67,9 +67,7 @@ def _touches(compiled: CompiledMjcf, geom: int) -> bool:
     return bool(compiled.model.geom_contype[geom] or compiled.model.geom_conaffinity[geom])
 
 
-def _seen_or_touched(
-    scene: SceneDescription, compiled: CompiledMjcf, name: str, placed: list[Placed]
-) -> list[Placed]:
+def _seen_or_touched(scene: SceneDescription, compiled: CompiledMjcf, name: str, placed: list[Placed]) -> list[Placed]:
     """Return the geoms that touch, or where none does those that are seen."""
     touching = [geom for geom in placed if _touches(compiled, geom[0])]
     if touching and len(touching) < len(placed):

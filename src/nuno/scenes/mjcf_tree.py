@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from nuno.joints.joint_drives import Motor, Spring
-from nuno.scenes.bare_body import bare_body
+from nuno.scenes.bare_body import split_off
 from nuno.scenes.compiled_mjcf import CompiledMjcf
 from nuno.scenes.scene_description import SceneDescription, SceneJoint
 from nuno.shapes import quaternion as quat
 
 FREE, BALL, SLIDE, HINGE = range(4)
-SHARE = 0.01
-"""Of a body's mass and inertia, what a body between two of its joints takes."""
 
 
 def add_joints(scene: SceneDescription, compiled: CompiledMjcf) -> None:
@@ -33,8 +30,7 @@ def add_joints(scene: SceneDescription, compiled: CompiledMjcf) -> None:
             made[j] = _joint(scene, compiled, j, end, parent)
             scene.joints.append(made[j])
             if parent is not None:
-                above = compiled.root(parent_id)
-                made[j].contact = above == 0
+                made[j].contact = not compiled.moves(parent_id)
             parent = end
         above = names.get(compiled.root(parent_id))
         if len(joints) > 1 and above is not None:
@@ -58,22 +54,14 @@ def _static_names(scene: SceneDescription, compiled: CompiledMjcf) -> dict[int, 
 
 def _between(scene: SceneDescription, compiled: CompiledMjcf, name: str, j: int) -> str:
     """Add a body between two joints of a body, whose mass it takes a share of; return its name."""
-    body = scene.body(name)
-    material: Any = body.material
-    left = 1.0 - SHARE
-    largest = float(np.linalg.eigvalsh(material.inertia)[2])
-    mass = SHARE * float(material.mass)
-    body.material = replace(material, mass=left * float(material.mass), inertia=left * material.inertia)
     own = compiled.name("mjOBJ_JOINT", j) or f"joint {j}"
-    small = bare_body(f"{name} at {own}", np.array(compiled.data.xanchor[j]), mass, SHARE * largest)
+    small = split_off(scene.body(name), f"{name} at {own}", np.array(compiled.data.xanchor[j]))
     scene.bodies.append(small)
     scene.note("several joints of one body have bodies of 1 % of its mass in between", name)
     return small.name
 
 
-def _joint(
-    scene: SceneDescription, compiled: CompiledMjcf, j: int, body: str, other: str | None
-) -> SceneJoint:
+def _joint(scene: SceneDescription, compiled: CompiledMjcf, j: int, body: str, other: str | None) -> SceneJoint:
     model, data = compiled.model, compiled.data
     name = compiled.name("mjOBJ_JOINT", j) or f"joint {j}"
     kind = {BALL: "ball", SLIDE: "slider", HINGE: "hinge"}[int(model.jnt_type[j])]

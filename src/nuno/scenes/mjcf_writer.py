@@ -205,7 +205,7 @@ class MjcfWriter:
         return np.unique(np.concatenate(held)) if held else np.zeros(0, dtype=int)
 
     def _stands(self, name: str | None) -> bool:
-        return name is None or not is_rigid(self.bodies[name]) and self.bodies[name].material is None
+        return name is None or (not is_rigid(self.bodies[name]) and self.bodies[name].material is None)
 
     def _contacts(self) -> list[tuple[str, str]]:
         """Write pairs of bodies that do not touch; return those that do not for their groups or joints."""

@@ -8,7 +8,6 @@ from nuno.scenes.scene_description import SceneBody
 from nuno.shapes.shape import ClothMesh
 from nuno.shapes.soft_shape import SoftShape
 
-
 HELD = 1e6
 """Weight of a vertex that is held, by which it stays where it is."""
 

@@ -133,6 +133,12 @@ class UrdfReader:
                 f"a mesh of {str(self.path)!r} cannot be read; package_dirs says where packages are: "
                 f"{' '.join(str(error).split())}"
             ) from error
+        read = {str(part.name).rpartition("_")[0] for part in geometry.geometryObjects}
+        for link in self.tree.findall("link"):
+            if link.find(kind.lower()) is not None and link.get("name") not in read:
+                self.scene.note(
+                    f"{kind.lower()} shapes that Pinocchio does not read are left out", str(link.get("name"))
+                )
         found: dict[int, list[Part]] = {}
         for part in geometry.geometryObjects:
             joint = int(part.parentJoint)
@@ -167,7 +173,7 @@ class UrdfReader:
             return
         slides = np.linalg.norm(columns[:3]) > 0.5
         placement, k, v = self.data.oMi[joint], model.idx_qs[joint], model.idx_vs[joint]
-        axis = placement.rotation @ columns[:3 if slides else 6, 0][-3:]
+        axis = placement.rotation @ columns[: 3 if slides else 6, 0][-3:]
         parent = int(model.parents[joint])
         there = {body.name for body in scene.bodies}
         other = self.links.get(parent) if self.links.get(parent) in there else None
@@ -179,7 +185,7 @@ class UrdfReader:
             found.position = float(self.q[k])
             limits = float(model.lowerPositionLimit[k]), float(model.upperPositionLimit[k])
             if np.isfinite(limits).all() and limits[0] <= limits[1]:
-                if slides or -np.pi <= limits[0] and limits[1] <= np.pi:
+                if slides or (-np.pi <= limits[0] and limits[1] <= np.pi):
                     found.limits = limits
                 else:
                     scene.note("limits of hinges beyond half a turn are left out", name)
@@ -189,9 +195,8 @@ class UrdfReader:
 
     def _colors(self) -> dict[str, tuple[float, float, float]]:
         """By link, the colour of its first visual that has one."""
-        named = {
-            each.get("name"): each.find("color") for each in self.tree.findall("material") if each.find("color") is not None
-        }  # fmt: skip
+        given = {each.get("name"): each.find("color") for each in self.tree.findall("material")}
+        named = {name: color for name, color in given.items() if color is not None}
         found = {}
         for link in self.tree.findall("link"):
             for material in link.findall("visual/material"):

@@ -94,7 +94,7 @@ class UsdBodies:
             scene.note("bodies without a shape are balls of 1 cm that touch nothing", name)
         elif not touching and not bare and not prim.GetCustomDataByKey(BODY):
             scene.note("bodies that touch nothing are there to be seen", name)
-        body = self._body(prim, name, pose, used, bool(touching) or bare and bool(parts), moves, scale)
+        body = self._body(prim, name, pose, used, bool(touching) or (bare and bool(parts)), moves, scale)
         scene.bodies.append(body)
         self.bodies[str(prim.GetPath())] = body
         self.names[str(prim.GetPath())] = name
@@ -132,7 +132,7 @@ class UsdBodies:
         ]
         mass = self._mass(prim, parts, scale, name) if moves else None
         material = Rigid(friction=friction, restitution=min(restitution, 1.0)) if moves else None
-        body = SceneBody(name, shapes[0][0], *pose, material, color, friction)
+        body = SceneBody(name, shapes[0][0], pose[0], pose[1], material, color, friction)
         if not enabled:
             body.group = body.collides_with = 0
         body = whole_body(body, shapes, mass)

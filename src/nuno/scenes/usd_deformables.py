@@ -26,7 +26,7 @@ def deforming_prims(stage: UsdStage) -> list[Any]:
     return [
         prim for prim in stage.prims
         if prim.IsA(stage.usd.UsdGeom.TetMesh) or stage.has(prim, SURFACE)
-        or prim.IsA(stage.usd.UsdGeom.Mesh) and stage.value(prim, REST) is not None
+        or (prim.IsA(stage.usd.UsdGeom.Mesh) and stage.value(prim, REST) is not None)
     ]  # fmt: skip
 
 
@@ -67,9 +67,9 @@ def _deformable(scene: SceneDescription, stage: UsdStage, prim: Any, owner: Any,
         name, shape, now.mean(axis=0), quat.IDENTITY.copy(), None, stage.color(prim), vertices=now
     )  # fmt: skip
     # tetrahedra that nobody calls a deformable body are one to Newton too
-    if stage.has(prim, SURFACE) or stage.has(prim, VOLUME) or not is_cloth and owner is prim:
-        body.material = _material(scene, stage, prim, name, is_cloth)
-        body.friction = float(body.material.friction)
+    if stage.has(prim, SURFACE) or stage.has(prim, VOLUME) or (not is_cloth and owner is prim):
+        material = _material(scene, stage, prim, name, is_cloth)
+        body.material, body.friction = material, float(material.friction)
     speeds = stage.value(prim, "velocities")
     if speeds is not None and len(speeds) == len(now):
         body.velocities = np.array(speeds, dtype=float) @ matrix[:, :3].T

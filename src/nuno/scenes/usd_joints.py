@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from nuno.joints.joint_drives import Motor
+from nuno.scenes.bare_body import split_off
 from nuno.scenes.mjcf_tree import within_half_turn
 from nuno.scenes.scene_description import SceneDescription, SceneJoint
 from nuno.scenes.usd_bodies import UsdBodies
@@ -19,6 +20,8 @@ KINDS = {
     "PhysicsRevoluteJoint": "hinge", "PhysicsPrismaticJoint": "slider", "PhysicsSphericalJoint": "ball",
     "PhysicsFixedJoint": "fixed",
 }  # fmt: skip
+ENDLESS = 1e30
+"""[N] or [N m] A break force as large as this, such as the largest float, is none."""
 APART = 1e-3
 """[m] From which on the two places of a joint are told to be apart."""
 ROTATIONS, TRANSLATIONS = ("rotX", "rotY", "rotZ"), ("transX", "transY", "transZ")
@@ -42,10 +45,11 @@ class UsdJoints:
         if any(joint.name == name for joint in scene.joints):
             name = str(prim.GetPath())[1:]
         kind, axis = KINDS.get(str(prim.GetTypeName())), str(stage.value(prim, "physics:axis", "X"))
-        if kind is None:
-            kind, axis = self._generic(prim)
+        free = self._free(prim) if str(prim.GetTypeName()) == "PhysicsJoint" else ()
+        if str(prim.GetTypeName()) == "PhysicsJoint":
+            kind, axis = self._generic(prim, free)
         if kind is None or not stage.value(prim, "physics:jointEnabled", True):
-            scene.note("joints of distance, of several directions, and those that are off are left out", name)
+            scene.note("joints of distance, those that hold nothing, and those that are off are left out", name)
             return
         first, second = (self._end(prim, k) for k in (0, 1))
         (other, others, base), (body, own, _) = first, second
@@ -57,12 +61,18 @@ class UsdJoints:
                 return
             body, other, own, others, base = other, body, others, own, second[2]
         turned = body != second[0]
-        made = self._made(prim, name, kind, axis, str(body), base, (own, others), -1.0 if turned else 1.0)
+        if kind == "chain":
+            if turned:
+                scene.note("joints of several directions whose second body stands still are left out", name)
+                return
+            self._chain(prim, name, free, str(body), base, (own, others))
+            return
+        made = self._made(prim, name, kind, axis, str(body), base, (own, others), -1.0 if turned else 1.0, free)
         scene.joints.append(made)
 
     def _made(
         self, prim: Any, name: str, kind: str, axis: str, body: str, other: str | None, frames: tuple[Pose, Pose],
-        sign: float,
+        sign: float, free: tuple[str, ...],
     ) -> SceneJoint:  # fmt: skip
         """Return the joint; where its bodies change places, the axis does too, and positions stay what they are."""
         scene, stage = self.scene, self.stage
@@ -84,32 +94,68 @@ class UsdJoints:
         contact = bool(stage.value(prim, "physics:collisionEnabled", False))
         made = SceneJoint(name, kind, body, other, own[0], direction, position, contact=contact)
         breaks = [stage.value(prim, f"physics:break{what}", np.inf) for what in ("Force", "Torque")]
-        if np.isfinite(breaks).any():
+        if min(breaks) < ENDLESS:
             scene.note("joints do not break", name)
         if kind in ("hinge", "slider"):
-            self._limits(prim, made)
-            self._drive(prim, made)
+            self._limits(prim, made, free)
+            self._drive(prim, made, free[0] if free else "angular" if kind == "hinge" else "linear")
         elif kind == "ball":
             cone = float(stage.value(prim, "physics:coneAngle0Limit", -1.0)) * np.pi / 180.0
             if 0.0 <= cone < 3.0:
                 made.limits = (0.0, cone)
         return made
 
-    def _generic(self, prim: Any) -> tuple[str | None, str]:
-        """Return the kind of joint, and its axis, that a generic one is by its locked directions."""
-        free = []
-        for direction in (*ROTATIONS, *TRANSLATIONS):
+    def _free(self, prim: Any) -> tuple[str, ...]:
+        """Return the directions in which a generic joint is not locked."""
+        found = []
+        for direction in (*TRANSLATIONS, *ROTATIONS):
             low = self.stage.value(prim, f"limit:{direction}:physics:low", -np.inf)
             high = self.stage.value(prim, f"limit:{direction}:physics:high", np.inf)
             if not low > high:
-                free.append(direction)
+                found.append(direction)
+        return tuple(found)
+
+    def _generic(self, prim: Any, free: tuple[str, ...]) -> tuple[str | None, str]:
+        """Return the kind of joint that a generic one is, "chain" for several joints one after the other."""
         if not free:
             return "fixed", "X"
-        if tuple(free) == ROTATIONS:
-            return "ball", "X"
+        if len(free) == 6:
+            return None, "X"
         if len(free) == 1:
             return "hinge" if free[0] in ROTATIONS else "slider", free[0][-1]
-        return None, "X"
+        stops = [self.stage.value(prim, f"limit:{direction}:physics:low", -np.inf) for direction in free]
+        return ("ball" if free == ROTATIONS and not np.isfinite(stops).any() else "chain"), "X"
+
+    def _chain(
+        self, prim: Any, name: str, free: tuple[str, ...], body: str, other: str | None, frames: tuple[Pose, Pose]
+    ) -> None:
+        """Add a joint for each free direction, slides first, with small bodies in between."""
+        from scipy.spatial.transform import Rotation
+
+        scene, (own, others) = self.scene, frames
+        scene.note("several joints of one body have bodies of 1 % of its mass in between", body)
+        relative = quat.multiply(quat.inverse(others[1]), own[1])
+        angles = Rotation.from_quat(np.roll(relative, -1)).as_euler("XYZ")
+        places = quat.rotate(quat.inverse(others[1]), own[0] - others[0])
+        turn, above = others[1], other
+        for k, direction in enumerate(free):
+            n, slides = "XYZ".index(direction[-1]), direction in TRANSLATIONS
+            end = body
+            if k < len(free) - 1:
+                small = split_off(scene.body(body), f"{body} at {name} {direction}", own[0])
+                scene.bodies.append(small)
+                end = small.name
+            axis = quat.rotate(turn, np.eye(3)[n])
+            joint = SceneJoint(f"{name} {direction}", "slider" if slides else "hinge", end, above, own[0], axis)
+            joint.position = float(places[n] if slides else angles[n])
+            self._limits(prim, joint, (direction,))
+            self._drive(prim, joint, direction)
+            scene.joints.append(joint)
+            if not slides:
+                turn = quat.multiply(turn, quat.from_axis_angle(np.eye(3)[n], np.array(angles[n])))
+            above = end
+        if other is not None and self.scene.body(other).material is not None:
+            scene.ignored.append((body, other))
 
     def _end(self, prim: Any, k: int) -> tuple[str | None, Pose, str | None]:
         """Return the name of a body at an end, the joint's frame there in the world, and the name to join to."""
@@ -133,10 +179,9 @@ class UsdJoints:
     def _unit(self, joint: SceneJoint) -> float:
         return np.pi / 180.0 if joint.kind == "hinge" else self.stage.unit
 
-    def _limits(self, prim: Any, joint: SceneJoint) -> None:
-        kind = "rot" if joint.kind == "hinge" else "trans"
+    def _limits(self, prim: Any, joint: SceneJoint, directions: tuple[str, ...] = ()) -> None:
         names = [("physics:lowerLimit", "physics:upperLimit")]
-        names += [(f"limit:{kind}{axis}:physics:low", f"limit:{kind}{axis}:physics:high") for axis in "XYZ"]
+        names += [(f"limit:{each}:physics:low", f"limit:{each}:physics:high") for each in directions]
         for low, high in names:
             lower, upper = (self.stage.value(prim, name, end) for name, end in ((low, -np.inf), (high, np.inf)))
             if np.isfinite(lower) and np.isfinite(upper) and lower <= upper:
@@ -144,10 +189,9 @@ class UsdJoints:
         if joint.kind == "hinge":
             within_half_turn(self.scene, joint)
 
-    def _drive(self, prim: Any, joint: SceneJoint) -> None:
+    def _drive(self, prim: Any, joint: SceneJoint, which: str) -> None:
         """Set the motor that a drive is; per degree and the stage's units."""
         stage, unit = self.stage, self._unit(joint)
-        which = "angular" if joint.kind == "hinge" else "linear"
         if not stage.has(prim, f"PhysicsDriveAPI:{which}"):
             return
 
@@ -158,7 +202,7 @@ class UsdJoints:
             self.scene.note("drives of acceleration are left out", joint.name)
             return
         # a torque [mass length2 / s2] per degree, or a force [mass length / s2] per length
-        effort = stage.mass_unit * stage.unit ** (2 if which == "angular" else 1)
+        effort = stage.mass_unit * stage.unit ** (2 if joint.kind == "hinge" else 1)
         stiffness, damping = said("stiffness", 0.0) * effort / unit, said("damping", 0.0) * effort / unit
         limit = said("maxForce", np.inf) * effort
         if limit <= 0.0:

@@ -22,9 +22,7 @@ ORDER = {"X": (1, 2, 0), "Y": (0, 2, 1), "Z": (0, 1, 2)}
 """Two axes across and the one along."""
 
 
-def usd_shape(
-    scene: SceneDescription, stage: UsdStage, prim: Any, name: str, moves: bool
-) -> tuple[Shape, Pose] | None:
+def usd_shape(scene: SceneDescription, stage: UsdStage, prim: Any, name: str, moves: bool) -> tuple[Shape, Pose] | None:
     """Return a prim's shape and where that is in the world; None, with a note, for what Nuno has no shape for.
 
     Raises:
@@ -63,7 +61,7 @@ def usd_shape(
         return _cone(radius, height, sizes, turned)
     if kind.endswith("_1") and float(stage.value(prim, "radiusBottom", default)) != radius:
         scene.note("a cylinder or capsule with two radii has that of its top", name)
-    if np.ptp(sizes[:2]) > 1e-6 * sizes.max() or kind.startswith("Capsule") and np.ptp(sizes) > 1e-6 * sizes.max():
+    if np.ptp(sizes[:2]) > 1e-6 * sizes.max() or (kind.startswith("Capsule") and np.ptp(sizes) > 1e-6 * sizes.max()):
         scene.note("a cylinder or capsule that is stretched is a hull", name)
         shape = Capsule(radius, height) if kind.startswith("Capsule") else Cylinder(radius, height)
         return _stretched(shape, sizes, turned)

@@ -137,23 +137,23 @@ class UsdWriter:
 
     def _mass(self, prim: Any, body: SceneBody) -> None:
         usd = self.usd
-        assert isinstance(body.material, Rigid)
+        material: Any = body.material
         rigid = usd.UsdPhysics.RigidBodyAPI.Apply(prim)
         back = quat.inverse(body.quaternion)
         if body.velocity is not None:
             rigid.CreateVelocityAttr(self.vec3f(quat.rotate(back, body.velocity)))
         if body.angular_velocity is not None:
             rigid.CreateAngularVelocityAttr(self.vec3f(np.degrees(quat.rotate(back, body.angular_velocity))))
-        moments, axes = np.linalg.eigh(body.material.inertia)
+        moments, axes = np.linalg.eigh(material.inertia)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
         matrix = usd.Gf.Matrix3d(*(float(value) for value in axes.T.ravel()))  # USD's vectors are rows
         turn = matrix.ExtractRotation().GetQuat()
         mass = usd.UsdPhysics.MassAPI.Apply(prim)
-        mass.CreateMassAttr(float(body.material.mass))
-        mass.CreateCenterOfMassAttr(self.vec3f(body.material.centre_of_mass))
+        mass.CreateMassAttr(float(material.mass))
+        mass.CreateCenterOfMassAttr(self.vec3f(material.centre_of_mass))
         mass.CreateDiagonalInertiaAttr(self.vec3f(moments))
         mass.CreatePrincipalAxesAttr(self.quatf([turn.GetReal(), *turn.GetImaginary()]))
-        if body.material.air_drag:
+        if material.air_drag:
             self.scene.note("air drag is read by Nuno alone", body.name)
 
     def _material(self, path: str, body: SceneBody) -> Any:
@@ -234,7 +234,7 @@ class UsdWriter:
         for name, value in values.items():
             bound.CreateAttribute(f"physics:{name}", types.Float, False).Set(value)
         usd.UsdShade.MaterialBindingAPI.Apply(sim).Bind(material, materialPurpose="physics")
-        if np.any(body.material.air_drag):
+        if np.any(getattr(body.material, "air_drag", 0.0)):
             self.scene.note("air drag is read by Nuno alone", body.name)
 
     def _elasticity(self, body: SceneBody) -> dict[str, float]:
