@@ -112,6 +112,9 @@ if TYPE_CHECKING:
     from nuno.robot.wire.client import WireRobot
     from nuno.robot.wire.names import Names
     from nuno.robot.wire.server import RobotServer
+    from nuno.scenes.load_scene import LoadedScene, load_scene
+    from nuno.scenes.save_scene import save_scene
+    from nuno.scenes.scene_report import SceneReport
     from nuno.search.knots import Knots
     from nuno.search.minimise import Minimum, minimise
     from nuno.search.planner import Plan, plan
@@ -180,6 +183,7 @@ __all__ = [
     "Layers",
     "LiftResult",
     "Links",
+    "LoadedScene",
     "Material",
     "MaterialFit",
     "MeshError",
@@ -214,6 +218,7 @@ __all__ = [
     "RobotTimeoutError",
     "Ros1Driver",
     "Ros2Server",
+    "SceneReport",
     "SensorModel",
     "Sensors",
     "ServoCommand",
@@ -275,6 +280,7 @@ __all__ = [
     "improve_fold",
     "lattice_tetrahedra",
     "lift_soft_cube",
+    "load_scene",
     "locate_marker",
     "mesh",
     "minimise",
@@ -289,6 +295,7 @@ __all__ = [
     "read_sweep",
     "replan",
     "replay_fold",
+    "save_scene",
     "segment_after",
     "segment_before",
     "sheet",
@@ -356,6 +363,9 @@ _LAZY = {
         "nuno.robot.wire.client": "WireRobot",
         "nuno.robot.wire.names": "Names",
         "nuno.robot.wire.server": "RobotServer",
+        "nuno.scenes.load_scene": "LoadedScene load_scene",
+        "nuno.scenes.save_scene": "save_scene",
+        "nuno.scenes.scene_report": "SceneReport",
         "nuno.search.knots": "Knots",
         "nuno.search.minimise": "Minimum minimise",
         "nuno.search.planner": "Plan plan",

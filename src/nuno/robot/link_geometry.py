@@ -153,7 +153,7 @@ class Geometry:
         return str(self._robot.model.frames[part.parentFrame].name)
 
     def _link_shape(self, part: Any, as_hull: bool) -> LinkShape:
-        shape, offset = _shape_of(part, as_hull)
+        shape, offset = shape_of(part, as_hull)
         placement = part.placement
         position = placement.translation + placement.rotation @ offset
         color = tuple(float(c) for c in np.clip(part.meshColor[:3], 0.0, 1.0))
@@ -169,7 +169,7 @@ def _set_pairs(model: Any, pairs: Sequence[tuple[int, int]]) -> None:
         model.addCollisionPair(pin.CollisionPair(m, n))
 
 
-def _shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
+def shape_of(part: Any, as_hull: bool) -> tuple[Shape, np.ndarray]:
     """Return a shape, and where its centre is in the frame of the geometry."""
     own, origin = part.geometry, np.zeros(3)
     kind = type(own).__name__
