@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 ENGINES = {
     "nuno": "nuno.engines.builtin_engine:BuiltinEngine",
     "mujoco": "nuno.engines.mujoco.mujoco_engine:MujocoEngine",
+    "newton": "nuno.engines.newton.newton_engine:NewtonEngine",
 }
 """Where the class of each engine is; its module imports the engine's package only when an instance is made."""
 
