@@ -4,7 +4,7 @@ A cloth is a flex of triangles. Its membrane is that of Saint Venant and Kirchho
 stiffness along warp and weft and against shear, C = diag(stretch_warp, stretch_weft, shear), is written into each
 triangle's stiffness matrix, without a Poisson's ratio. Its bending is MuJoCo's hinge at each inner edge with the plate
 energy B kappa^2 / 2; an edge that lies at an angle takes B = (sqrt(B_warp) n_u^2 + sqrt(B_weft) n_v^2)^2 of its normal
-n. A soft body is a flex of tetrahedra with MuJoCo's stable neo-Hookean law and the material's two numbers.
+n, and a sheet's are corrected by `nuno.engines.mujoco.mujoco_bending`. A soft body is a flex of tetrahedra with MuJoCo's stable neo-Hookean law and the material's two numbers.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.shape_topology import element_count
+from nuno.engines.mujoco.mujoco_bending import BEND, bending_factors
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.shapes.shape import ClothMesh, Sheet
 
@@ -24,8 +25,6 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries of a triangle's symmetric stiffness, in MuJoCo's order."""
 ROW = 21
 """Numbers of an element in ``flex_stiffness``."""
-BEND = 17
-"""Numbers of an edge in ``flex_bending``."""
 LEAST = 1e-9
 """[N m] The least bending rigidity, so that a cloth without any compiles."""
 
@@ -38,11 +37,13 @@ class FlexMesh:
         elements: (m, 3 or 4) int, triangles or tetrahedra.
         owner: (m,) int, the material's element that each is part of.
         axes: (m, 2, 3) float, warp and weft of each triangle in the frame of ``rest``; None of tetrahedra.
+        factors: What the bending along warp and weft is multiplied by.
     """
 
     def __init__(self, dynamics: ArrayParticles) -> None:
         shape: Any = dynamics.shape
         self.axes: np.ndarray | None = None
+        self.factors = (1.0, 1.0)
         if shape.is_soft:
             made = shape.tetrahedra()
             self.rest, self.elements = np.asarray(made.vertices), np.asarray(made.tets)
@@ -51,8 +52,10 @@ class FlexMesh:
         vertices, faces = shape.mesh()
         if isinstance(shape, Sheet):
             self.rest = np.asarray(vertices)
-            self.elements, self.owner = _sheet_triangles(*shape.cells)
+            self.elements, self.owner = sheet_triangles(*shape.cells)
             self.axes = np.broadcast_to(np.eye(3)[:2], (len(self.elements), 2, 3))
+            length, width = (size / cells for size, cells in zip(shape.size, shape.cells, strict=True))
+            self.factors = bending_factors(1.0, round(width / length, 6))
             return
         assert isinstance(shape, ClothMesh)
         rest: Any = shape.rest
@@ -135,7 +138,10 @@ def _bending(model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np
     compiled = model.flex_bending[first : first + BEND * count].reshape(count, BEND)
     unit = local / np.linalg.norm(local, axis=-1, keepdims=True)
     # the normal of an edge (u, v) is (-v, u)
-    warp, weft = (np.sqrt(by_element(f"bending_rigidity_{way}"))[:, :, None] for way in ("warp", "weft"))
+    warp, weft = (
+        np.sqrt(factor * by_element(f"bending_rigidity_{way}"))[:, :, None]
+        for factor, way in zip(mesh.factors, ("warp", "weft"), strict=True)
+    )
     wanted = (warp * unit[..., 1] ** 2 + weft * unit[..., 0] ** 2) ** 2
     total = np.zeros((len(wanted), count))
     number = np.bincount(sides.ravel(), minlength=count)
@@ -146,7 +152,7 @@ def _bending(model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np
     return (ratio[:, :, None] * compiled).reshape(len(total), -1)
 
 
-def _sheet_triangles(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
+def sheet_triangles(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
     """Return triangles (m, 3) of a sheet's cells, whose diagonals alternate, and the cell of each (m,)."""
     i, j = np.meshgrid(np.arange(nx), np.arange(ny))
     a = (j * (nx + 1) + i).ravel()

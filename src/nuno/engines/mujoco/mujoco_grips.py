@@ -18,6 +18,7 @@ from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
 from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import apply
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
@@ -227,6 +228,23 @@ class Holds:
                 found.append((own, led_points(own.grip, start, frame, times)))
             elif own.ghost is not None:
                 found.append((own, led_hold(own.grip, start, end, times, self._world.world_count)))
+        return found
+
+    def present(self, time: float, step: float) -> list[tuple[Held, Any]]:
+        """Return of each led grip where it leads at a time [s] and a ``step`` [s] on; nothing is noted as led."""
+        found: list[tuple[Held, Any]] = []
+        for own in self._held:
+            spec, target = own.grip.spec, own.grip.target
+            if isinstance(spec, GripSpec):
+                times = np.array([time, time + step])
+                if target is None or own.grip.offsets is None:
+                    found.append((own, spec.at(times)))
+                else:
+                    now = np.broadcast_to(apply(target.pose(), own.grip.offsets), own.grip.offsets.shape)
+                    found.append((own, np.stack([now, now], axis=2)))
+            elif own.ghost is not None:
+                places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
+                found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
         return found
 
     def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float) -> None:
