@@ -11,7 +11,7 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.led import led_poses
-from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.materials import Material, Rigid
 from nuno.shapes import quaternion as quat
 
@@ -107,18 +107,23 @@ class MujocoEngine(Engine):
             if own.role == "moving"
         ]
         targets = scene.holds.targets(start, end, times)
-        if not moving and not targets:
-            batch.step(nstep=count)
-        else:
-            from nuno.engines.mujoco.mujoco_grips import send
-
-            for k in range(count):
-                for own, (place, turn) in moving:
-                    address = int(own.qpos[0]), int(own.dof[0])
-                    send(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
-                scene.holds.write(targets, batch, k, step)
-                batch.step()
+        with warnings_logged():
+            if not moving and not targets:
+                batch.step(nstep=count)
+            else:
+                self._step_led(count, step, moving, targets)
         self._read()
+
+    def _step_led(self, count: int, step: float, moving: Any, targets: Any) -> None:
+        """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
+        from nuno.engines.mujoco.mujoco_grips import send
+
+        batch, holds = self._scene.batch, self._scene.holds
+        for k in range(count):
+            for own, (place, turn) in moving:
+                send(batch, (int(own.qpos[0]), int(own.dof[0])), place[:, k : k + 2], turn[:, k : k + 2], step)
+            holds.write(targets, batch, k, step)
+            batch.step()
 
     def write(self, time: float) -> None:
         """Write all states and pushes into the batch."""

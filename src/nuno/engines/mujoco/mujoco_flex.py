@@ -24,13 +24,21 @@ if TYPE_CHECKING:
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries of a triangle's symmetric stiffness, in MuJoCo's order."""
 ROW = 21
-"""Numbers of an element in ``flex_stiffness``."""
-LEAST = 1e-9
-"""[N m] The least bending rigidity, so that a cloth without any compiles."""
+"""Numbers of a triangle in ``flex_stiffness``."""
+SOLID_ROW = 24
+"""Numbers of a tetrahedron in ``flex_stiffness``: 22 in proportion to the shear modulus mu, one to lambda + 2 mu, and one
+of its shape."""
+STRETCH, BENDING = 1000.0, 1e-4
+"""[N/m], [N m] What a cloth is compiled with; the numbers of its material are written afterwards."""
+YOUNG, POISSON = 1e4, 0.3
+"""[Pa] and a ratio, what a soft body is compiled with, likewise."""
 
 
 class FlexMesh:
     """The elements of a flex.
+
+    Args:
+        dynamics: Of the body.
 
     Attributes:
         rest: (n, 3) float [m], the vertices at rest.
@@ -72,7 +80,6 @@ class FlexMesh:
 def add_flex(spec: Any, name: str, mesh: FlexMesh, dynamics: ArrayParticles) -> tuple[Any, list[Any]]:
     """Add a flex and its vertices' bodies to a spec; return both."""
     mujoco = mujoco_package()
-    values = dynamics.material.resolved(dynamics.world_count, element_count(dynamics.shape))
     slide, axes = mujoco.mjtJoint.mjJNT_SLIDE, np.eye(3)
     bodies = []
     for k, (place, mass) in enumerate(zip(mesh.rest, dynamics.mass[0], strict=True)):
@@ -85,17 +92,44 @@ def add_flex(spec: Any, name: str, mesh: FlexMesh, dynamics: ArrayParticles) -> 
     flex = spec.add_flex(name=name, dim=mesh.elements.shape[1] - 1)
     flex.vertbody = [f"{name}.{k}" for k in range(len(bodies))]
     flex.elem = mesh.elements.ravel().tolist()
-    flex.damping = float(values["damping"][0].mean())
+    flex.damping = float(np.max(dynamics.material.damping))  # without one there is no room for any
     if mesh.axes is None:
-        flex.young, flex.poisson = float(values["youngs_modulus"][0].mean()), float(values["poisson_ratio"][0].mean())
+        flex.young, flex.poisson = YOUNG, POISSON
         flex.elastic3d, flex.radius = 1, 0.0
         return flex, bodies
-    stretch = float(np.mean([values[f"stretch_stiffness_{way}"][0].mean() for way in ("warp", "weft")]))
-    bending = max(float(np.mean([values[f"bending_rigidity_{way}"][0].mean() for way in ("warp", "weft")])), LEAST)
-    thickness = float(np.sqrt(12.0 * bending / stretch))
-    flex.young, flex.poisson, flex.thickness = stretch / thickness, 0.0, thickness
-    flex.elastic2d, flex.radius = 3, 0.5 * float(values["thickness"][0].mean())
+    thickness = float(np.sqrt(12.0 * BENDING / STRETCH))
+    flex.young, flex.poisson, flex.thickness = STRETCH / thickness, 0.0, thickness
+    flex.elastic2d, flex.radius = 3, 0.5 * float(np.max(dynamics.material.thickness))
     return flex, bodies
+
+
+def write_flex(model: Any, batch: Any, flex: int, mesh: FlexMesh, dynamics: ArrayParticles) -> None:
+    """Write the numbers of a flex's material into a batch, one world's after the other's."""
+    values = dynamics.material.resolved(dynamics.world_count, element_count(dynamics.shape))
+    batch.expand("flex_damping")[:, flex] = values["damping"][:, 0]
+    if mesh.axes is not None:
+        batch.expand("flex_radius")[:, flex] = 0.5 * values["thickness"][:, 0]
+        rows = cloth_numbers(model, flex, mesh, dynamics)
+    else:
+        scale = _solid_scale(values["youngs_modulus"], values["poisson_ratio"]) * dynamics.topology.fraction[:, None]
+        first = int(model.flex_stiffnessadr[flex])
+        own = model.flex_stiffness[first : first + SOLID_ROW * len(mesh.elements)].reshape(-1, SOLID_ROW)
+        own = np.concatenate([own[:, :-1] * scale, np.broadcast_to(own[:, -1:], (*scale.shape[:2], 1))], axis=-1)
+        rows = {"flex_stiffness": own.reshape(len(own), -1)}
+    start = {"flex_stiffness": model.flex_stiffnessadr, "flex_bending": model.flex_bendingadr}
+    for name, numbers in rows.items():
+        first = int(start[name][flex])
+        batch.expand(name)[:, first : first + numbers.shape[1]] = numbers
+
+
+def _solid_scale(young: np.ndarray, poisson: np.ndarray) -> np.ndarray:
+    """Return by what the numbers of a solid are multiplied, (worlds, elements or 1, 23), but for the last of each."""
+    young, poisson = (np.asarray(array, dtype=np.float64) for array in (young, poisson))
+    shear = young / (2.0 * (1.0 + poisson))
+    both = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)) + 2.0 * shear
+    compiled = YOUNG / (2.0 * (1.0 + POISSON))
+    compiled_both = YOUNG * POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON)) + 2.0 * compiled
+    return np.stack([*22 * [shear / compiled], both / compiled_both], axis=-1)
 
 
 def cloth_numbers(model: Any, flex: int, mesh: FlexMesh, dynamics: ArrayParticles) -> dict[str, np.ndarray]:
@@ -147,9 +181,7 @@ def _bending(model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np
     number = np.bincount(sides.ravel(), minlength=count)
     for world, own in enumerate(wanted):
         total[world] = np.bincount(sides.ravel(), own.ravel(), minlength=count) / np.maximum(number, 1)
-    plain = [by_element(f"bending_rigidity_{way}")[0].mean() for way in ("warp", "weft")]
-    ratio = total / max(float(np.mean(plain)), LEAST)
-    return (ratio[:, :, None] * compiled).reshape(len(total), -1)
+    return ((total / BENDING)[:, :, None] * compiled).reshape(len(total), -1)
 
 
 def sheet_triangles(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:

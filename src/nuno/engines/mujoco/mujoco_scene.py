@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
-from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, cloth_numbers
+from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
-from nuno.engines.mujoco.mujoco_package import mujoco_package
-from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks
+from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
 from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ class Placed:
         geoms, assets: Its geoms, and the meshes that they need.
         flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
         mesh: Of one that deforms, its elements.
+        friction: (worlds,), the coefficient of its shapes.
         id: Of the first of its bodies in the model.
         qpos, dof: Addresses (n,) of each body's coordinates and velocities; empty of a static one.
     """
@@ -54,6 +55,7 @@ class Placed:
     assets: list[Any] = field(default_factory=list)
     flexes: list[Any] = field(default_factory=list)
     mesh: FlexMesh | None = None
+    friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
     id: int = -1
     qpos: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     dof: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
@@ -118,12 +120,14 @@ class MujocoScene:
         self.holds.add(self.spec, self.placed)
         self.spec.option.timestep, self.shortened = substep, False
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        self.model = self.spec.compile()
+        with warnings_logged():
+            self.model = self.spec.compile()
         self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1)
         self.compilations += 1
         for own in self.placed.values():
             self._find(own)
         self._set_numbers(bodies)
+        write_friction(self.model, self.batch, bodies)
         self.holds.find(self.model, self.batch, self.placed, substep)
 
     def _delete(self, key: str) -> None:
@@ -179,42 +183,28 @@ class MujocoScene:
     def _set_numbers(self, bodies: list[tuple[Body, Placed]]) -> None:
         """Write what a spec has no place for, or what differs between worlds."""
         model, batch = self.model, self.batch
-        heavier = False
-        for body, own in bodies:
-            dynamics: Any = body._dynamics
-            if dynamics is None:
-                continue
+        worlds = self._world.world_count
+        moving: list[tuple[Any, Placed]] = [(b._dynamics, own) for b, own in bodies if b._dynamics is not None]
+        for dynamics, own in moving:
             ids = own.id + np.arange(len(own.bodies))
-            mass = dynamics.mass.reshape(self._world.world_count, -1)
-            if len(mass) > 1 and np.ptp(mass, axis=0).any():
-                batch.expand("body_mass")[:, ids] = mass
-                if own.role == "rigid":
-                    share = np.trace(dynamics.inertia, axis1=1, axis2=2)
-                    batch.expand("body_inertia")[:, own.id] = model.body_inertia[own.id] * (share / share[0])[:, None]
-                heavier = True
-        if heavier:
-            batch.set_const()
-        for body, own in bodies:
-            dynamics = body._dynamics
-            if dynamics is None:
-                continue
-            drag = dynamics.material.resolved(self._world.world_count, self._elements(body))["air_drag"][:, 0]
+            batch.expand("body_mass")[:, ids] = dynamics.mass.reshape(worlds, -1)
+            if own.role == "rigid":
+                share = np.trace(dynamics.inertia, axis1=1, axis2=2)
+                batch.expand("body_inertia")[:, own.id] = model.body_inertia[own.id] * (share / share[0])[:, None]
+        if moving:
+            batch.set_const()  # of all worlds, so that one is the same in any batch
+        for dynamics, own in moving:
+            drag = dynamics.material.resolved(worlds, self._elements(dynamics))["air_drag"][:, 0]
             if drag.any():
                 self._set_drag(own, dynamics, drag.astype(np.float64))
-            if own.mesh is not None and own.mesh.axes is not None:
-                flex = flex_id(model, own.flexes[0].name)
-                start = {
-                    "flex_stiffness": int(model.flex_stiffnessadr[flex]),
-                    "flex_bending": int(model.flex_bendingadr[flex]),
-                }
-                for name, rows in cloth_numbers(model, flex, own.mesh, dynamics).items():
-                    batch.expand(name)[:, start[name] : start[name] + rows.shape[1]] = rows
+            if own.mesh is not None:
+                write_flex(model, batch, flex_id(model, own.flexes[0].name), own.mesh, dynamics)
 
     @staticmethod
-    def _elements(body: Body) -> int:
+    def _elements(dynamics: Any) -> int:
         from nuno.bodies.shape_topology import element_count
 
-        return 1 if body._dynamics is None or body._dynamics.is_rigid else element_count(body.shape)
+        return 1 if dynamics.is_rigid else element_count(dynamics.shape)
 
     def _set_drag(self, own: Placed, dynamics: Any, drag: np.ndarray) -> None:
         """Let still air take the velocity away at a rate (worlds,) [1/s]."""

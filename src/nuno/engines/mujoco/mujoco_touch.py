@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -74,58 +75,72 @@ def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -
         spec.delete(pair)
     flexes = [(body, own) for body, own in bodies if own.role == "flex"]
     others = [(body, own) for body, own in bodies if own.role != "flex"]
-    values: dict[str, float] = {}
+    for body, own in flexes:
+        own.friction, own.flexes[0].priority = _by_world(world, body.friction), 0
+        own.flexes[0].friction = _triple(own.friction)
     for body, own in others:
         wanted = [(pair_friction(world, body, flex), flex) for flex, _ in flexes if world._rules.touch(body, flex)]
-        values[body.key] = wanted[0][0] if wanted else _first(body.friction)
+        own.friction = wanted[0][0] if wanted else _by_world(world, body.friction)
         for mu, flex in wanted[1:]:
-            _tell(body, flex, mu, values[body.key])
+            _tell(body, flex, mu, own.friction)
         for shape in (*own.geoms, *own.flexes):
-            shape.friction, shape.priority = _triple(values[body.key]), 1
-    for body, own in flexes:
-        own.flexes[0].friction, own.flexes[0].priority = _triple(_first(body.friction)), 0
-    for i, (body, _) in enumerate(flexes):
-        for other, _ in flexes[:i]:
-            mu, real = pair_friction(world, body, other), max(_first(body.friction), _first(other.friction))
-            _tell(body, other, real=real, mu=mu)
+            shape.friction, shape.priority = _triple(own.friction), 1
+    for i, (body, own) in enumerate(flexes):
+        for other, theirs in flexes[:i]:
+            if world._rules.touch(body, other):
+                _tell(body, other, pair_friction(world, body, other), np.maximum(own.friction, theirs.friction))
     for i, (body, own) in enumerate(others):
         for other, theirs in others[:i]:
-            if body._dynamics is None and other._dynamics is None or not world._rules.touch(body, other):
+            if (body._dynamics is None and other._dynamics is None) or not world._rules.touch(body, other):
                 continue
-            mu = pair_friction(world, body, other)
-            if abs(mu - max(values[body.key], values[other.key])) < 1e-9:
+            mu, taken = pair_friction(world, body, other), np.maximum(own.friction, theirs.friction)
+            if np.abs(mu - taken).max() < 1e-9:
                 continue
-            if own.flexes or theirs.flexes:
-                _tell(body, other, mu, max(values[body.key], values[other.key]))
+            if own.flexes or theirs.flexes or np.ptp(mu) > 0.0:
+                _tell(body, other, mu, taken)
+                continue
             for a in own.geoms:
                 for b in theirs.geoms:
                     pair = spec.add_pair(geomname1=a.name, geomname2=b.name)
-                    pair.condim, pair.friction = 3, [mu, mu, 0.005, 1e-4, 1e-4]
+                    pair.condim, pair.friction = 3, [float(mu[0]), float(mu[0]), 0.005, 1e-4, 1e-4]
                     pair.solref, pair.solimp = a.solref, a.solimp
 
 
-def pair_friction(world: Simulation, a: Body, b: Body) -> float:
-    """Return the coefficient of a pair, of the first world."""
+def write_friction(model: Any, batch: Any, bodies: list[tuple[Body, Any]]) -> None:
+    """Write coefficients that differ between worlds."""
+    mujoco = mujoco_package()
+    kinds = {"geom_friction": mujoco.mjtObj.mjOBJ_GEOM, "flex_friction": mujoco.mjtObj.mjOBJ_FLEX}
+    for _, own in bodies:
+        if np.ptp(own.friction) == 0.0:
+            continue
+        for name, shapes in (("geom_friction", own.geoms), ("flex_friction", own.flexes)):
+            for shape in shapes:
+                batch.expand(name)[:, mujoco.mj_name2id(model, kinds[name], shape.name), 0] = own.friction
+
+
+def pair_friction(world: Simulation, a: Body, b: Body) -> np.ndarray:
+    """Return the coefficient of a pair, (worlds,)."""
     own = world._rules.friction.get(frozenset((a.key, b.key)))
     if own is not None:
-        return _first(own)
-    return float(np.sqrt(_first(a.friction) * _first(b.friction)))
+        return _by_world(world, own)
+    return np.sqrt(_by_world(world, a.friction) * _by_world(world, b.friction))
 
 
-def _first(value: Any) -> float:
-    return float(np.atleast_1d(value)[0])
+def _by_world(world: Simulation, value: Any) -> np.ndarray:
+    return np.array(np.broadcast_to(np.asarray(value, dtype=float), (world.world_count,)))
 
 
-def _triple(mu: float) -> list[float]:
-    return [mu, 0.005, 1e-4]
+def _triple(mu: np.ndarray) -> list[float]:
+    return [float(mu[0]), 0.005, 1e-4]
 
 
-def _tell(a: Body, b: Body, mu: float, real: float) -> None:
+def _tell(a: Body, b: Body, mu: np.ndarray, real: np.ndarray) -> None:
     """Warn once of a pair whose friction MuJoCo cannot have."""
     pair = frozenset((a.key, b.key))
-    if abs(mu - real) > 1e-6 and pair not in _told:
+    worst = int(np.argmax(np.abs(mu - real)))
+    if abs(mu[worst] - real[worst]) > 1e-6 and pair not in _told:
         _told.add(pair)
         log.warning(
             "on mujoco %r and %r have the friction %.4g in place of %.4g: it has one coefficient a shape where flexes "
-            "touch. Equal coefficients of all bodies mend that", a.name, b.name, real, mu,
+            "touch. Equal coefficients of all bodies mend that", a.name, b.name, real[worst], mu[worst],
         )  # fmt: skip
