@@ -62,6 +62,22 @@ class MissingPackageError(NunoError, ImportError):
         )
 
 
+class EngineCapabilityError(NunoError, RuntimeError):
+    """Something that a world's engine cannot do; nothing has changed.
+
+    Args:
+        engine: The engine's name.
+        capability: What it lacks, one of ``nuno.engines.engine.CAPABILITIES``.
+        others: The names of the engines that have it.
+        hint: What helps besides, or nothing.
+    """
+
+    def __init__(self, engine: str, capability: str, others: tuple[str, ...], hint: str = "") -> None:
+        self.engine, self.capability, self.others = engine, capability, others
+        have = f"engines that have: {', '.join(others) or 'none'}"
+        super().__init__(f"{engine} has no {capability}; {have}{'; ' if hint else ''}{hint}")
+
+
 class FileFormatError(NunoError, ValueError):
     """A file that Nuno cannot read: another format, a newer version, or damaged."""
 

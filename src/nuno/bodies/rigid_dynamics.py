@@ -214,7 +214,7 @@ class RigidDynamics(Dynamics):
         self.parts = parts_of(body, moves=True)
         self.deformed, self.thickness = body._deformed, body.thickness
         values = material.resolved(world.world_count)
-        self.mass, self.inertia, self.centre = _mass_of(body, material, values["density"][:, 0])
+        self.mass, self.inertia, self.centre = mass_of(body, material, values["density"][:, 0])
         place, turn = body.pose()
         self.scene = world._rigid_scene(place)
         self.solver = self.scene.solver
@@ -360,7 +360,7 @@ def _dynamics_of(body: Body) -> RigidDynamics | None:
     return own if isinstance(own, RigidDynamics) else None
 
 
-def _mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
     if material.mass is not None and material.inertia is not None and material.centre_of_mass is not None:
         mass = np.broadcast_to(np.asarray(material.mass, dtype=float), density.shape)

@@ -137,7 +137,7 @@ class Joint(Grip):
         """
         world = self._live()
         with world.lock:
-            return self._given(world._stepping.effort(self))
+            return self._given(world._engine.effort(self))
 
     @property
     def limits(self) -> tuple[Any, Any]:

@@ -10,6 +10,7 @@ from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON, Dynamics, ParticleDynamics
 from nuno.errors import SimulationDiverged
 from nuno.tables.kinematic_motion import arrive
+from nuno.world.engine_frames import step_frames
 from nuno.world.impacts import are_fast
 from nuno.world.run_start import RunStart
 from nuno.world.simulation import Simulation
@@ -34,14 +35,16 @@ class Advancing(Simulation):
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
         self._rests = False
-        if any(dynamics.is_rigid for dynamics in moving.values()):
+        if self._engine.is_builtin and any(dynamics.is_rigid for dynamics in moving.values()):
             # what a run goes back to has the static bodies that it met, and lists pairs as it did
             self._bring_rigid()
         before = RunStart(self, moving)
         self._bring_colliders()
         try:
             self._reported = start
-            while not self._go_through(moving, finish, look, instants, again is None):
+            if not self._engine.is_builtin:
+                step_frames(self, finish, look, instants)
+            while self._engine.is_builtin and not self._go_through(moving, finish, look, instants, again is None):
                 before.go_back()
                 if again is not None:
                     self._reported = start

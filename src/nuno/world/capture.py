@@ -9,31 +9,36 @@ import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import Dynamics
-from nuno.bodies.make_dynamics import make_dynamics
 from nuno.joints.grip import Grip
 from nuno.joints.joint import Joint, JointSpec
 from nuno.shapes.coordinates import compose, invert
 from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import GroupPath
 from nuno.world.rigid_layout import bring_static, layout_of, scene_for, settle
-from nuno.world.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+from nuno.world.snapshot import NEUTRAL, BodyRecord, DynamicsRecord, GripRecord, Snapshot
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 
-def capture(world: Simulation) -> Snapshot:
-    """Return everything that ``world`` is; arrays are copies or never written to."""
+def capture(world: Simulation, engine: str | None = None) -> Snapshot:
+    """Return everything that ``world`` is; arrays are copies or never written to.
+
+    Args:
+        world: The world.
+        engine: For a world of which engine; for another's than its own, states are neutral.
+    """
+    neutral = engine is not None and engine != world._engine.name
     rules = world._rules
     ignored = sorted((min(pair), max(pair)) for pair in rules.ignored)
     pairs = [(min(pair), max(pair), mu) for pair, mu in rules.friction.items()]
     return Snapshot(
         time=world.time, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
-        world_count=world.world_count, family=world._family,
-        bodies=tuple(_body_record(body, world) for body in world._bodies.values()),
+        world_count=world.world_count, family=world._family, engine=NEUTRAL if neutral else world._engine.name,
+        bodies=tuple(_body_record(body, world, neutral) for body in world._bodies.values()),
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
-        ignored=tuple(ignored), rigid=layout_of(world), summed=tuple(sorted(rules.summed)),
+        ignored=tuple(ignored), rigid=None if neutral else layout_of(world), summed=tuple(sorted(rules.summed)),
         drivers=tuple((driver, driver.save()) for driver in world.drivers), clock_shift=world._clock_shift,
     )  # fmt: skip
 
@@ -42,7 +47,14 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     """Make ``world`` what the snapshot is. Body and Grip objects that it still knows keep their identity.
 
     Solvers are made before anything changes, so that a failure leaves the world as it was.
+
+    Raises:
+        EngineCapabilityError: the world's engine lacks something that is in the snapshot.
     """
+    if snapshot.engine not in (NEUTRAL, world._engine.name):
+        snapshot = _neutral(snapshot, world)
+    neutral = snapshot.engine == NEUTRAL
+    _check_engine(snapshot, world)
     bodies = {record.key: _recorded_body(record, snapshot, world) for record in snapshot.bodies}
     before = (world.gravity, world.frame_rate, world.substeps, world.world_count)
     same_settings = before[:3] == (snapshot.gravity, snapshot.frame_rate, snapshot.substeps)
@@ -52,7 +64,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     try:
         world._rigid = scene_for(snapshot, bodies, world)
         made = {
-            record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings)
+            record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings, neutral)
             for record in snapshot.bodies if record.dynamics is not None
         }  # fmt: skip
     except BaseException:
@@ -76,7 +88,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     bring_static(snapshot.rigid, bodies, world)
     for record in snapshot.bodies:
         if record.dynamics is not None:
-            made[record.key].load_state(record.dynamics.state)
+            world._engine.load(bodies[record.key], record.dynamics.state, neutral)
     for grip in snapshot.grips:
         _restore_grip(grip, bodies, world)
     world._rules.friction = {frozenset((a, b)): mu for a, b, mu in snapshot.pair_friction}
@@ -91,11 +103,40 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
             driver.load(state)
 
 
-def _body_record(body: Body, world: Simulation) -> BodyRecord:
+def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
+    """Refuse a snapshot of what the world's engine lacks; dynamics are looked at as they are made."""
+    engine = world._engine
+    if engine.is_builtin:
+        return
+    moving = {record.key for record in snapshot.bodies if record.dynamics is not None}
+    for grip in snapshot.grips:
+        engine.allow_grip(grip.spec, grip.target in moving)
+    if any(record.path is not None for record in snapshot.bodies):
+        engine.require("moving shapes")
+    if snapshot.pair_friction:
+        engine.require("pair friction")
+    if snapshot.summed:
+        engine.require("impulses")
+    if snapshot.world_count > 1:
+        engine.require("batch")
+
+
+def _neutral(snapshot: Snapshot, world: Simulation) -> Snapshot:
+    """Return a snapshot of another engine's world with neutral states, by way of such a world."""
+    other = type(world)(device=world._device, engine=snapshot.engine)
+    apply(snapshot, other)
+    return replace(
+        capture(other, world._engine.name), family=snapshot.family, from_file=snapshot.from_file,
+        drivers=snapshot.drivers,
+    )  # fmt: skip
+
+
+def _body_record(body: Body, world: Simulation, neutral: bool = False) -> BodyRecord:
     dynamics = None
     if body._dynamics is not None:
         own = body._dynamics
-        dynamics = DynamicsRecord(own.material, own.friction, own.state(), tuple(own.pushes))
+        state = world._engine.neutral_state(body) if neutral else own.state()
+        dynamics = DynamicsRecord(own.material, own.friction, state, tuple(own.pushes))
     parent = body._parent if isinstance(body._parent, Body) and body._parent._world is world else None
     pose = (body._position, body._quaternion) if parent or body._dynamics else body.pose()
     deformed, base = body._deformed if body._deformed is not None else (None, (None, None))
@@ -145,16 +186,17 @@ def same_shape(a: Shape, b: Shape) -> bool:
 
 
 def _dynamics_for(
-    record: BodyRecord, own: DynamicsRecord, body: Body, world: Simulation, same_settings: bool
+    record: BodyRecord, own: DynamicsRecord, body: Body, world: Simulation, same_settings: bool, neutral: bool
 ) -> Dynamics:
     current: Any = body._dynamics
     if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
-        if not current.is_rigid or current.scene is world._rigid:
+        if not current.is_rigid or not world._engine.is_builtin or current.scene is world._rigid:
             return current
     as_recorded = Body(record.shape)
     as_recorded.key = body.key
     _set_up(as_recorded, record)
-    return make_dynamics(as_recorded, own.material, own.state, own.friction, world)
+    world._engine.allow_dynamics(as_recorded, own.material)
+    return world._engine.make(as_recorded, own.material, own.state, own.friction, neutral)
 
 
 def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:

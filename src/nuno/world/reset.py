@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import Push
+from nuno.bodies.dynamics import ParticleDynamics, Push
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.rows_of_worlds import SOON, WorldRows, merge_path
 from nuno.shapes.coordinates import Pose
@@ -71,6 +71,8 @@ def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> N
     shift = np.zeros(snapshot.world_count) if snapshot.clock_shift is None else snapshot.clock_shift
     clocks = np.zeros(count) if world._clock_shift is None else world._clock_shift.copy()
     clocks[worlds] = world.time - snapshot.time + shift[taken]
+    if snapshot.engine != world._engine.name:
+        raise BodyStateError(f"reset takes a snapshot of the engine {world._engine.name!r}, not {snapshot.engine!r}")
     snapshot = snapshot.at(world.time)
     at = WorldRows(worlds, taken, (count, snapshot.world_count), world.time)
     records = _matched(world, snapshot, at)
@@ -102,10 +104,10 @@ def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> N
             continue
         dynamics: Any = body._dynamics
         state = {name: at.of_rows(np.asarray(v), np.ndim(v) - 1) for name, v in record.dynamics.state.items()}
-        if dynamics.is_rigid:
+        if "partner_slot" in state:
             state["partner_slot"] = renumbered[state["partner_slot"]]
         dynamics.load_worlds(worlds, state)
-        if not dynamics.is_rigid:
+        if isinstance(dynamics, ParticleDynamics):
             dynamics.solver.missed[worlds] = False
         body._quaternion = at.merged(body._quaternion, record.quaternion, 1)
         dynamics.pushes = pushes[body]

@@ -90,7 +90,8 @@ class Saving(Running):
             reset_worlds(self, checked_worlds(worlds, self.world_count), saved)
 
     def imagine(
-        self, n: int, device: str | None = None, *, world: int | None = None, thorough: bool = True
+        self, n: int, device: str | None = None, *, world: int | None = None, thorough: bool = True,
+        engine: str | None = None,
     ) -> World:  # fmt: skip
         """Return a batch of ``n`` copies of this world as it is now, with everything in it.
 
@@ -100,6 +101,8 @@ class Saving(Running):
             world: Which world of a batch is copied; None where this is a single world.
             thorough: Whether frames in which a fast cloth may pass through itself are gone through again with more
                 substeps, as in any other world. Without, a future is rougher there, and up to several times as fast.
+            engine: What moves the copies, as of ``World``; None is what moves this world. Another takes over shapes,
+                poses, velocities, grips and rules; contacts begin anew.
 
         A simulated robot goes along, with what it is about to do: ``robot`` of the batch commands its copies. Other
         drivers move this world only: what they move stands still in the copies, which is said once, as a warning.
@@ -107,13 +110,16 @@ class Saving(Running):
         Raises:
             BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
             InvalidInputError: no such world, or more copies than there is memory for.
+            UnknownNameError: there is no such engine.
+            EngineCapabilityError: the engine lacks something that is in this world.
         """
         worlds, careful = count("n", n), flag("thorough", thorough)
         with self._change("imagine"):
             chosen = self._chosen("imagine", world)
-            futures = cast("type[World]", type(self))(device=self._device if device is None else device)
+            other = self._engine.name if engine is None else engine
+            futures = cast("type[World]", type(self))(device=self._device if device is None else device, engine=other)
             check_memory(self, worlds, futures.device, chosen)
-            snapshot = capture(self).pick(chosen)
+            snapshot = capture(self, other).pick(chosen)
         apply(snapshot.spread(worlds), futures)
         futures._family, futures._quiet = self._family, self._quiet or not careful
         for driver in self.drivers:
@@ -139,7 +145,7 @@ class Saving(Running):
         if not isinstance(futures, Saving) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
         with futures._change("adopt"):
-            snapshot = capture(futures).pick(check_world_index(k, futures.world_count))
+            snapshot = capture(futures, self._engine.name).pick(check_world_index(k, futures.world_count))
         with self._change("adopt"):
             chosen = self._chosen("adopt", world)
             if self.world_count > 1:

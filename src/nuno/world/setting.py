@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,15 +69,15 @@ class Setting(Reading):
         with self._change("set_vertices"):
             own, count = self._own(body), self.world_count
             dynamics = own._dynamics
-            if not isinstance(dynamics, ParticleDynamics):
+            if dynamics is None or dynamics.is_rigid:
                 raise BodyStateError(f"{own.name!r} does not move as cloth or soft; see set_pose")
-            n = dynamics.solver.particle_count
+            n = len(own.shape.mesh()[0])
             places = finite_array("vertices", vertices, (n, 3), (count, n, 3))
             speeds = finite_array("velocities", np.zeros(3) if velocities is None else velocities,
                                   (3,), (n, 3), (count, n, 3))  # fmt: skip
             chosen = checked_worlds(np.arange(count) if worlds is None else worlds, count)
             shape = (count, n, 3)
-            dynamics.set_vertices(np.broadcast_to(places, shape), np.broadcast_to(speeds, shape), chosen)
+            cast(ParticleDynamics, dynamics).set_vertices(np.broadcast_to(places, shape), np.broadcast_to(speeds, shape), chosen)
 
     def set_pose(
         self, body: Body | str, position: ArrayLike | None = None, quaternion: ArrayLike | None = None,

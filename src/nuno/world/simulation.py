@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from nuno.bodies.body import Body
 from nuno.bodies.contact_rules import ContactRules
 from nuno.bodies.dynamics import Dynamics, ParticleDynamics, make_colliders
-from nuno.bodies.make_dynamics import make_dynamics
+from nuno.engines.engine import Engine
+from nuno.engines.engine_registry import make_engine
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
 from nuno.tables.kinematic_motion import Schedule, is_kinematic, make_schedule, path_batches_of
@@ -47,7 +48,7 @@ class Simulation:
 
     def __init__(
         self, *, device: str = "auto", gravity: ArrayLike = (0.0, 0.0, -9.81), frame_rate: float = 60.0,
-        substeps: int | None = None,
+        substeps: int | None = None, engine: str = "nuno",
     ) -> None:  # fmt: skip
         self._device = checked_device(device)
         if device.startswith("cuda"):  # "auto" and "cpu" are always there, and Warp is loaded when they are used
@@ -86,6 +87,7 @@ class Simulation:
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
         self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
+        self._engine = make_engine(engine, self)
 
     def __repr__(self) -> str:
         batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
@@ -110,6 +112,11 @@ class Simulation:
         """The device that dynamics run on, "cpu" or "cuda:0" ..."""
         self._device = found_device(self._device)
         return self._device
+
+    @property
+    def engine(self) -> Engine:
+        """The engine that moves what is dynamic: its ``name``, and its ``capabilities``."""
+        return self._engine
 
     @property
     def is_running(self) -> bool:
@@ -199,16 +206,19 @@ class Simulation:
 
     def _hold(self, grip: Grip) -> None:
         assert grip.body._dynamics is not None
+        self._engine.allow_grip(grip.spec, grip.target is not None and grip.target._dynamics is not None)
         grip._world = self
         self._grips_by_key[grip.key] = grip
         grip.body._dynamics.grips.append(grip)
         grip.body._dynamics.grips_changed = True
+        self._engine.changed()
         if grip.ignored:
             self._colliders_changed()
 
     def _drop_grip(self, grip: Grip) -> None:
         grip._world = None
         dynamics = grip.body._dynamics
+        self._engine.changed()
         if dynamics is not None:
             dynamics.grips = [other for other in dynamics.grips if other is not grip]
             dynamics.grips_changed = True
@@ -217,6 +227,7 @@ class Simulation:
 
     def _colliders_changed(self) -> None:
         self._collider_version += 1
+        self._engine.changed()
         self._rules.set_held(grip for dynamics in self._attached() for grip in dynamics.grips)
         self._colliders.clear()
         self._kinematic = None
@@ -233,7 +244,7 @@ class Simulation:
         dynamics = body._dynamics
         assert dynamics is not None
         state = dynamics.state()
-        renewed = make_dynamics(body, material, state, body.friction, self)
+        renewed = self._engine.make(body, material, state, body.friction)
         dynamics.release()
         renewed.grips, renewed.pushes, renewed.grips_changed = dynamics.grips, dynamics.pushes, True
         body._dynamics = renewed
@@ -275,7 +286,7 @@ class Simulation:
 
     def _wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
         """Return force [N] and torque [N m], (worlds, 3) each, that an active grip bears."""
-        return self._stepping.wrench(grip)
+        return self._engine.wrench(grip)
 
     def _kinematic_bodies(self) -> list[Body]:
         if self._kinematic is None:

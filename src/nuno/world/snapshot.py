@@ -27,6 +27,9 @@ from nuno.world.rigid_layout import RigidLayout
 if TYPE_CHECKING:
     pass
 
+NEUTRAL = "any"
+"""The engine of a snapshot whose states all engines take."""
+
 
 @dataclass(frozen=True, eq=False)
 class DynamicsRecord:
@@ -100,6 +103,7 @@ class Snapshot:
     summed: tuple[str, ...] = ()
     clock_shift: np.ndarray | None = None  # (worlds,) [s], what each world's own clock is behind ``time``
     from_file: bool = field(default=False)
+    engine: str = "nuno"  # whose states they are
     drivers: tuple[tuple[Any, Any], ...] = field(default=(), metadata={"file": False})  # and what each saved
 
     def __repr__(self) -> str:

@@ -12,7 +12,6 @@ from nuno.bodies.body import Body
 from nuno.bodies.body_facts import place_text
 from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
-from nuno.bodies.make_dynamics import start_dynamics
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.html_table import html_table
 from nuno.joints.grip import Grip, make_grip, warn_shared
@@ -38,9 +37,14 @@ class World(Setting):
         gravity: (3,) [m/s2].
         frame_rate: Frames per second of simulated time [1/s].
         substeps: Substeps of a frame; None lets each solver choose by its rule.
+        engine: What moves the dynamic bodies: "nuno", "mujoco" (the extra of that name) ... What an engine lacks is
+            refused with an EngineCapabilityError before anything moves.
 
     Raises:
         InvalidInputError: a value that is not finite or out of range.
+        UnknownNameError: there is no such engine.
+        MissingPackageError: the engine's package is not installed.
+        EngineCapabilityError: the engine does not run on the device.
     """
 
     def _repr_html_(self) -> str:
@@ -171,7 +175,8 @@ class World(Setting):
             ]
             if own._dynamics is None:
                 check_leader(own, not isinstance(chosen, Rigid), following)
-            dynamics = start_dynamics(own._as_static(), chosen, self)
+            self._engine.allow_dynamics(own, chosen)
+            dynamics = self._engine.attach(own._as_static(), chosen)
             if given is not None:
                 dynamics.set_velocity(own, given)
             if own._dynamics is not None:
@@ -217,6 +222,8 @@ class World(Setting):
         """
         with self._change("move"):
             own = self._own(body)
+            if to is not None:
+                self._engine.require("moving shapes")
             before = (own._path is None, own._position.ndim, own._quaternion.ndim)
             own._path = None if to is None else path_for(own, to, self.world_count)
             arrive([own], self._time)
@@ -239,6 +246,7 @@ class World(Setting):
                 raise BodyStateError(f"{own.name!r} moves as {kinds}; detach it to attach it as another kind")
             chosen: Any = material
             check_material(own.shape, chosen, self.world_count)
+            self._engine.allow_dynamics(own, chosen)
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
@@ -348,6 +356,7 @@ class World(Setting):
                 value = finite_array("mu", mu, (), (self.world_count,))
                 if (value < 0.0).any():
                     raise InvalidInputError(f"mu must be at least 0, got {mu!r}")
+                self._engine.require("pair friction")
                 self._rules.friction[pair] = float(value) if value.ndim == 0 else value
             self._colliders_changed()
 
@@ -372,5 +381,6 @@ class World(Setting):
         """
         with self._change("sum_impulses"):
             own = self._own(body)
-            flag("on", on)
+            if flag("on", on):
+                self._engine.require("impulses")
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)

@@ -1,0 +1,1 @@
+"""Engines: what makes dynamics and steps them, Nuno's own or another simulator's, behind one protocol."""

@@ -1,0 +1,195 @@
+"""The protocol of engines: what every engine of a world does, and the table of what each of them can."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from nuno.engines.engine_needs import needs_of_dynamics, needs_of_grip
+from nuno.errors import EngineCapabilityError
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.bodies.dynamics import Dynamics, State
+    from nuno.joints.grip import Grip
+    from nuno.materials import Material
+    from nuno.world.simulation import Simulation
+
+CAPABILITIES: dict[str, str] = {
+    "rigid bodies": "attach with Rigid",
+    "cloth": "attach a sheet or cloth mesh with Cloth",
+    "soft bodies": "attach a soft shape with Soft",
+    "self-contact of cloth": "layers of one cloth touch each other",
+    "self-contact of soft bodies": "Soft(self_contact=True)",
+    "restitution": "Rigid(restitution=...) above 0",
+    "directed stretch": "a stretch stiffness for warp and weft",
+    "directed bending": "a bending rigidity for warp and weft",
+    "elements' materials": "values of a material by element",
+    "worlds' materials": "values of a material by world",
+    "moving shapes": "static bodies that follow paths",
+    "pair friction": "set_friction",
+    "grips of vertices": "grip of vertices of a cloth or soft body",
+    "grips inside faces": "grip of points between vertices",
+    "grips of rigid bodies": "grip of a rigid body as a whole",
+    "sliding grips": "grip(free=...)",
+    "compliant grips": "grip(compliance=...) above 0",
+    "limited grips": "grip(max_force=...) of points",
+    "ties": "grip or weld of points to a body that moves",
+    "welds of rigid bodies": "grip or weld of a rigid body to another that moves",
+    "hinges": "hinge",
+    "sliders": "slider",
+    "ball joints": "ball_joint",
+    "fixed joints": "fixed_joint",
+    "joint drives": "motors, springs, friction and limits of joints",
+    "wrench": "what a grip or joint bears",
+    "effort": "what a joint's drives do",
+    "contacts": "World.contacts: points, normals, forces",
+    "impulses": "ContactPoints.impulses and sum_impulses",
+    "elastic energy": "Body.elastic_energy",
+    "air drag": "air_drag of a material",
+    "batch": "imagine(n) with n above 1",
+    "cuda": 'World(device="cuda")',
+    "robots": "simulated robots, whose links are moved by joints or paths",
+}
+"""What an engine may be able to do, and by what it is asked for."""
+
+
+class Engine(ABC):
+    """The engine of one world: it makes the dynamics of bodies and steps them.
+
+    A world asks `allow_dynamics` and `allow_grip` before it changes anything; what the engine lacks is refused there, by
+    name. Bodies, grips and rules are the world's own, to be read whenever the engine steps; `changed` says that any
+    of them is another now.
+
+    Attributes:
+        name: What ``World(engine=...)`` calls it.
+        capabilities: The names in `CAPABILITIES` that it has.
+        is_builtin: Whether it is Nuno's own, whose states and steps are the world's.
+        world: The world.
+
+    Args:
+        world: The world, still empty.
+
+    Raises:
+        MissingPackageError: the engine's package is not installed.
+        EngineCapabilityError: the world's device is one that it does not run on.
+    """
+
+    name: ClassVar[str]
+    capabilities: ClassVar[frozenset[str]]
+    is_builtin: ClassVar[bool] = False
+
+    def __init__(self, world: Simulation) -> None:
+        self.world = world
+
+    def __repr__(self) -> str:
+        return f"<engine {self.name!r}>"
+
+    # What it can do
+
+    def require(self, *names: str, hint: str = "") -> None:
+        """Refuse what the engine lacks.
+
+        Raises:
+            EngineCapabilityError: it lacks one of them.
+        """
+        for name in names:
+            if name not in self.capabilities:
+                from nuno.engines.engine_registry import engines_with
+
+                raise EngineCapabilityError(self.name, name, engines_with(name), hint)
+
+    def allow_dynamics(self, body: Body, material: Material) -> None:
+        """Refuse dynamics that the engine lacks, before anything changes.
+
+        Raises:
+            EngineCapabilityError: it cannot move such a body, or not of such a material.
+        """
+        if not self.is_builtin:
+            self.require(*needs_of_dynamics(body, material, self.world))
+
+    def allow_grip(self, spec: Any, on_moving: bool) -> None:
+        """Refuse a grip, weld or joint that the engine lacks, before anything changes.
+
+        Args:
+            spec: Its numbers, ``Grip.spec``.
+            on_moving: Whether the other body is dynamic.
+
+        Raises:
+            EngineCapabilityError: it cannot hold that.
+        """
+        if not self.is_builtin:
+            self.require(*needs_of_grip(spec, on_moving))
+
+    # Dynamics
+
+    @abstractmethod
+    def attach(self, body: Body, material: Any) -> Dynamics:
+        """Return dynamics for a static body in the shape that it has now, at rest."""
+
+    @abstractmethod
+    def make(self, body: Body, material: Material, state: State, friction: Any, neutral: bool = False) -> Dynamics:
+        """Return dynamics for a body in a state that ``Dynamics.state`` gave, or `neutral_state` where ``neutral``."""
+
+    def neutral_state(self, body: Body) -> State:
+        """Return a dynamic body's state as every engine takes it, in numbers of double precision.
+
+        Of cloth and soft bodies "positions" [m] and "velocities" [m/s] (worlds, n, 3). Of rigid ones "place" [m] and
+        "turn" (w, x, y, z), of the body's frame, "velocity" [m/s] of its centre of mass and "spin" [rad/s] (worlds, 3
+        or 4).
+        """
+        dynamics = body._dynamics
+        assert dynamics is not None
+        if not dynamics.is_rigid:
+            return {"positions": dynamics.vertices(body).copy(), "velocities": dynamics.velocities(body).copy()}
+        worlds = self.world.world_count
+        place, turn = (np.array(np.broadcast_to(part, (worlds, part.shape[-1]))) for part in dynamics.pose(body))
+        motion = dynamics.motion(body)
+        return {"place": place, "turn": turn, "velocity": motion.velocity, "spin": motion.angular_velocity}
+
+    @abstractmethod
+    def load(self, body: Body, state: State, neutral: bool = False) -> None:
+        """Set a dynamic body's state, see `make`; all bodies are in the world by now."""
+
+    @abstractmethod
+    def changed(self) -> None:
+        """Be told that bodies came, went or were moved, or that grips, rules or friction have changed."""
+
+    # Time
+
+    @abstractmethod
+    def step(self, start: float, end: float) -> None:
+        """Advance all dynamic bodies from ``start`` to ``end`` [s], a frame or a part of one.
+
+        Kinematic bodies are where ``world._schedule`` says, grips lead where `nuno.engines.led` says, and a body is
+        pushed by ``Dynamics.pushing(start)`` throughout.
+        """
+
+    def keep(self) -> Any:
+        """Return what `put_back` takes, all that a step changes."""
+        return [(dynamics, dynamics.state()) for dynamics in self.world._attached()]
+
+    def put_back(self, kept: Any) -> None:
+        """Set all that a step changes to what it was at `keep`."""
+        for dynamics, state in kept:
+            dynamics.load_state(state)
+
+    # What it tells
+
+    def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+        """Return the force [N] and torque [N m], (worlds, 3) each, that a grip or joint bears; see ``Grip.wrench``."""
+        self.require("wrench")
+        raise NotImplementedError
+
+    def effort(self, joint: Grip) -> np.ndarray:
+        """Return (worlds,), what a joint's drives do; see ``Joint.effort``."""
+        self.require("effort")
+        raise NotImplementedError
+
+    def contacts(self, body: Body, itself: bool) -> Iterable[tuple[Any, ...]]:
+        """Return a dynamic body's contacts: rows of point, normal, force, the other's name, and the world."""
+        self.require("contacts")
+        raise NotImplementedError

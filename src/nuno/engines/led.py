@@ -1,0 +1,51 @@
+"""Led motion: where kinematic bodies are, and where grips lead, at instants of a step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nuno.joints.grip import Grip, GripSpec
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import Pose
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+
+def led_poses(world: Simulation, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
+    """Return where a static body is at ``times`` (k,) [s] of a step: (worlds, k, 3) [m] and (worlds, k, 4)."""
+    shape = (world.world_count, len(times))
+    schedule = world._schedule
+    if schedule is None or body.key not in schedule.poses:
+        place, turn = (part[..., None, :] for part in body.pose())
+        return np.broadcast_to(place, (*shape, 3)), np.broadcast_to(turn, (*shape, 4))
+    return _between(*schedule.in_frame(body.key, 0), (times - start) / (end - start), shape)
+
+
+def led_points(grip: Grip, start: float, frame: float, times: np.ndarray) -> np.ndarray:
+    """Return where a grip of points leads them at ``times`` (k,) [s]: (worlds, points, k, 3) [m].
+
+    It must be asked once a step, as a leading body's last place is where the next step begins.
+    """
+    spec = grip.spec_for(start, frame)
+    assert isinstance(spec, GripSpec)
+    return spec.at(times)
+
+
+def led_hold(grip: Grip, start: float, end: float, times: np.ndarray, worlds: int) -> Pose:
+    """Return where a grip leads a rigid body's frame at ``times`` (k,) [s]: (worlds, k, 3) [m] and (worlds, k, 4)."""
+    if grip.target is None or grip.offsets is None:
+        found = [grip.spec.at(float(time)) for time in times]
+        return np.stack([place for place, _ in found], axis=1), np.stack([turn for _, turn in found], axis=1)
+    before, goal = grip.lead(start, worlds)
+    return _between(before, goal, (times - start) / (end - start), (worlds, len(times)))
+
+
+def _between(first: Pose, last: Pose, share: np.ndarray, shape: tuple[int, int]) -> Pose:
+    """Return poses (worlds, k, 3) and (worlds, k, 4) at shares (k,) of the way from one to the next."""
+    a, b = (np.broadcast_to(pose[0][..., None, :], (*shape, 3)) for pose in (first, last))
+    c, d = (np.broadcast_to(pose[1][..., None, :], (*shape, 4)) for pose in (first, last))
+    return a + share[:, None] * (b - a), quat.slerp(c, d, share)

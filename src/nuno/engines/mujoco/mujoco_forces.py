@@ -1,0 +1,103 @@
+"""Forces in MuJoCo: what grips and joints bear, and where bodies touch, of the state that the world is in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.joints.grip import Grip
+from nuno.joints.joint import JointSpec
+from nuno.shapes import quaternion as quat
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.engines.mujoco.mujoco_engine import MujocoEngine
+
+
+def forwarded(engine: MujocoEngine) -> list[tuple[Any, Any]]:
+    """Return a model and data of each world, with the forces of its present state worked out."""
+    mujoco, scene, time = mujoco_package(), engine.scene, engine.world.time
+    engine.write(time)
+    step = engine.substep
+    # where grips lead now, with the velocity of the substep to come
+    scene.holds.write(scene.holds.present(time, step), scene.batch, 0, step)
+    found = []
+    for world in range(engine.world.world_count):
+        model, data = scene.batch.get_model(world), scene.batch.get_data(world)
+        mujoco.mj_forward(model, data)
+        found.append((model, data))
+    return found
+
+
+def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force [N] and torque [N m], (worlds, 3) each, that a grip or joint bears."""
+    mujoco, scene = mujoco_package(), engine.scene
+    worlds = engine.world.world_count
+    force, torque = np.zeros((worlds, 3)), np.zeros((worlds, 3))
+    rows = scene.holds.rows_of(grip)
+    own = scene.placed[grip.body.key]
+    dynamics: Any = grip.body._dynamics
+    if rows is None or engine.world.time == 0.0:
+        return force, torque
+    for world, (model, data) in enumerate(forwarded(engine)):
+        kind = mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        mine = (data.efc_type == kind) & np.isin(data.efc_id, rows)
+        given = np.zeros(model.nv)
+        mujoco.mj_mulJacTVec(model, data, given, np.where(mine, data.efc_force, 0.0))
+        if own.role == "flex":
+            each = given[own.dof[:, None] + np.arange(3)]
+            held = np.abs(each).sum(axis=1) > 0.0
+            places = dynamics.values["positions"][world]
+            middle = places[held].mean(axis=0) if held.any() else np.zeros(3)
+            force[world], torque[world] = -each.sum(axis=0), -np.cross(places - middle, each).sum(axis=0)
+            continue
+        at, turn = int(own.dof[0]), dynamics.values["turn"][world]
+        force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
+        if isinstance(grip.spec, JointSpec):  # told at the joint's point
+            arm = quat.rotate(turn, grip.spec.place[world])
+            torque[world] -= np.cross(arm, force[world])
+    return force, torque
+
+
+def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[Any, ...]]:
+    """Return a dynamic body's contacts: rows of point, normal towards it, force on it, the other's name and the world."""
+    mujoco = mujoco_package()
+    found: list[tuple[Any, ...]] = []
+    for world, (model, data) in enumerate(forwarded(engine)):
+        owners = _owners(engine, model)
+        for k in range(data.ncon):
+            contact = data.contact[k]
+            keys = [
+                owners["geom"].get(int(geom)) if geom >= 0 else owners["flex"].get(int(flex))
+                for geom, flex in zip(contact.geom, contact.flex, strict=True)
+            ]
+            if body.key not in keys or (keys[0] == keys[1] and not itself):
+                continue
+            own = np.zeros(6)
+            mujoco.mj_contactForce(model, data, k, own)
+            axes = contact.frame.reshape(3, 3)
+            force = axes.T @ own[:3]  # on the second body, along its normal out of the first
+            if not np.any(force):
+                continue
+            second = keys[1] == body.key
+            sign = 1.0 if second else -1.0
+            other = keys[0] if second else keys[1]
+            name = engine.world._bodies[other].name if other is not None else ""
+            found.append((contact.pos.copy(), sign * axes[0], sign * force, name, world))
+            if keys[0] == keys[1]:
+                found.append((contact.pos.copy(), -axes[0], -force, name, world))
+    return found
+
+
+def _owners(engine: MujocoEngine, model: Any) -> dict[str, dict[int, str]]:
+    """Return the keys of the bodies that own each geom and each flex of a model."""
+    mujoco = mujoco_package()
+    kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "flex": mujoco.mjtObj.mjOBJ_FLEX}
+    found: dict[str, dict[int, str]] = {"geom": {}, "flex": {}}
+    for key, own in engine.scene.placed.items():
+        for kind, elements in (("geom", own.geoms), ("flex", own.flexes)):
+            for element in elements:
+                found[kind][int(mujoco.mj_name2id(model, kinds[kind], element.name))] = key
+    return found

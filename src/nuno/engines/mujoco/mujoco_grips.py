@@ -1,0 +1,308 @@
+"""Grips and joints in MuJoCo, as equality constraints whose targets are written before each substep.
+
+A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
+weighted sum, by fixed tendons. A rigid body is welded to what leads it: another body, or a heavy one without a shape that
+is sent along the path. Hinges are two connected points of the axis, ball joints one, fixed joints welds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.engines.led import led_hold, led_points
+from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.joints.grip import Grip, GripSpec
+from nuno.joints.joint import JointSpec
+from nuno.joints.tie import HoldSpec, TieSpec, corners_of
+from nuno.shapes import quaternion as quat
+from nuno.shapes.coordinates import apply
+
+if TYPE_CHECKING:
+    from nuno.world.simulation import Simulation
+
+STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""``solimp`` of all equalities."""
+CLOSING = 2.0
+"""Time constant of all equalities, in substeps."""
+REACH = 0.1
+"""[m] Half the distance of the two points of an axis by which a hinge is held."""
+GHOST = 1e6
+"""[kg] and [kg m2] Of the body that leads a rigid one along a path."""
+
+
+@dataclass(eq=False)
+class Held:
+    """A grip as it is in the spec.
+
+    Attributes:
+        grip: The grip.
+        names: Its equalities.
+        rows: Their numbers in the model.
+        point: (worlds, k) int, of each held point its number among the grip's distinct points, -1 for none.
+        rest: (points, 3) [m], of each distinct point its place at rest, which coordinates are counted from.
+        ghost: The body that leads, or None.
+        address: Its first coordinate and its first velocity in the model.
+    """
+
+    grip: Grip
+    names: list[str] = field(default_factory=list)
+    rows: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    point: np.ndarray | None = None
+    rest: np.ndarray | None = None
+    ghost: Any = None
+    address: tuple[int, int] = (-1, -1)
+
+
+class Holds:
+    """All grips and joints of a world.
+
+    Args:
+        world: The world.
+    """
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        self._held: list[Held] = []
+        self._elements: list[Any] = []
+        self._spec: Any = None
+        self._made = 0
+
+    @property
+    def is_led(self) -> bool:
+        """Return True if any target must be written as time goes on."""
+        return any(isinstance(own.grip.spec, GripSpec) or own.ghost is not None for own in self._held)
+
+    # The spec
+
+    def add(self, spec: Any, placed: dict[str, Any]) -> None:
+        """Put all present grips into the spec, in place of those that were there."""
+        if self._spec is spec:
+            for element in self._elements:
+                spec.delete(element)
+        self._spec, self._held, self._elements = spec, [], []
+        for dynamics in self._world._attached():
+            for grip in dynamics.grips:
+                own = Held(grip)
+                self._held.append(own)
+                if isinstance(grip.spec, GripSpec | TieSpec):
+                    self._add_points(own, placed)
+                elif isinstance(grip.spec, HoldSpec):
+                    self._add_hold(own, placed)
+                else:
+                    self._add_joint(own, placed)
+
+    def _equality(self, own: Held, kind: str, name1: str, name2: str = "", objtype: str | None = None) -> Any:
+        mujoco = mujoco_package()
+        self._made += 1
+        made = self._spec.add_equality(name=f"e{self._made}", type=getattr(mujoco.mjtEq, f"mjEQ_{kind}"), name1=name1)
+        if name2:
+            made.name2 = name2
+        if objtype:
+            made.objtype = getattr(mujoco.mjtObj, f"mjOBJ_{objtype}")
+        made.solimp = STIFF
+        own.names.append(made.name)
+        self._elements.append(made)
+        return made
+
+    def _add_points(self, own: Held, placed: dict[str, Any]) -> None:
+        spec = own.grip.spec
+        mine = placed[own.grip.body.key]
+        corners, weights = corners_of(spec)
+        other_corners, other_weights = getattr(spec, "other_corners", None), getattr(spec, "other_weights", None)
+        rigid = isinstance(spec, TieSpec) and spec.places is not None
+        target = placed[own.grip.target.key] if own.grip.target is not None else None
+        known: dict[Any, int] = {}
+        rest: list[np.ndarray] = []
+        own.point = np.full(corners.shape[:2], -1)
+        for world, k in np.ndindex(corners.shape[:2]):
+            terms = [(int(c), float(w)) for c, w in zip(corners[world, k], weights[world, k], strict=True)
+                     if c >= 0 and w > 0.0]  # fmt: skip
+            if not terms:
+                continue
+            others: list[tuple[int, float]] = []
+            if other_corners is not None and other_weights is not None:
+                others = [(int(c), -float(w)) for c, w in
+                          zip(other_corners[world, k], other_weights[world, k], strict=True) if w > 0.0]  # fmt: skip
+            key = (tuple(terms), tuple(others), k if rigid else -1)
+            if key not in known:
+                known[key] = len(rest)
+                place = sum(w * mine.mesh.rest[c] for c, w in terms)
+                if others:
+                    place = place + sum(w * target.mesh.rest[c] for c, w in others)
+                rest.append(np.asarray(place))
+                if rigid:
+                    self._equality(own, "CONNECT", mine.bodies[terms[0][0]].name, target.bodies[0].name, "BODY")
+                else:
+                    self._add_coordinates(own, mine, terms, target, others)
+            own.point[world, k] = known[key]
+        own.rest = np.array(rest).reshape(-1, 3)
+
+    def _add_coordinates(self, own: Held, mine: Any, terms: Any, target: Any, others: Any) -> None:
+        """Add an equality of each coordinate of a point of a flex."""
+        for letter in "xyz":
+            if len(terms) == 1 and not others:
+                self._equality(own, "JOINT", f"{mine.bodies[terms[0][0]].name}.{letter}")
+                continue
+            self._made += 1
+            tendon = self._spec.add_tendon(name=f"t{self._made}")
+            for part, its in ((mine, terms), (target, others)):
+                for corner, weight in its:
+                    tendon.wrap_joint(f"{part.bodies[corner].name}.{letter}", weight)
+            self._elements.append(tendon)
+            self._equality(own, "TENDON", tendon.name)
+
+    def _add_hold(self, own: Held, placed: dict[str, Any]) -> None:
+        grip = own.grip
+        if grip.target is not None:
+            leader = placed[grip.target.key].bodies[0].name
+        else:
+            self._made += 1
+            own.ghost = self._spec.worldbody.add_body(
+                name=f"g{self._made}", mass=GHOST, inertia=[GHOST] * 3, explicitinertial=True, gravcomp=1.0
+            )
+            own.ghost.add_freejoint(name=own.ghost.name)
+            self._elements.append(own.ghost)
+            leader = own.ghost.name
+        self._equality(own, "WELD", leader, placed[grip.body.key].bodies[0].name, "BODY")
+
+    def _add_joint(self, own: Held, placed: dict[str, Any]) -> None:
+        grip, mine = own.grip, placed[own.grip.body.key].bodies[0].name
+        other = "world" if grip.target is None else placed[grip.target.key].bodies[0].name
+        if grip.spec.kind == "fixed":
+            self._equality(own, "WELD", other, mine, "BODY")
+            return
+        for _ in range(2 if grip.spec.kind == "hinge" else 1):
+            self._equality(own, "CONNECT", other, mine, "BODY")
+
+    # The model
+
+    def find(self, model: Any, batch: Any, placed: dict[str, Any], step: float) -> None:
+        """Note where the equalities are in a compiled model, and write what does not change with time."""
+        if not self._held:
+            return
+        worlds = self._world.world_count
+        data, active = batch.expand("eq_data"), batch.bind("eq_active")
+        batch.expand("eq_solref")[:] = (CLOSING * step, 1.0)
+        for own in self._held:
+            own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
+            spec = own.grip.spec
+            if own.ghost is not None:
+                body = model.body(own.ghost.name).id
+                own.address = int(model.jnt_qposadr[model.body_jntadr[body]]), int(model.body_dofadr[body])
+            if isinstance(spec, GripSpec | TieSpec):
+                self._find_points(own, data, active)
+            elif isinstance(spec, HoldSpec):
+                place, turn = np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1))
+                if own.ghost is None:
+                    place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
+                _weld(data, int(own.rows[0]), place, turn)
+            else:
+                _joint(data, own.rows, spec)
+
+    def _find_points(self, own: Held, data: np.ndarray, active: np.ndarray) -> None:
+        spec = own.grip.spec
+        assert own.point is not None and own.rest is not None
+        each = 1 if isinstance(spec, TieSpec) and spec.places is not None else 3
+        rows = own.rows.reshape(-1, each)
+        active[:, own.rows] = 0.0
+        for world, points in enumerate(own.point):
+            for k, point in enumerate(points):
+                if point < 0:
+                    continue
+                active[world, rows[point]] = 1.0
+                if isinstance(spec, TieSpec):
+                    if spec.places is not None:
+                        data[world, rows[point, 0], :6] = (0.0, 0.0, 0.0, *spec.places[world, k])
+                    else:
+                        data[world, rows[point], :5] = 0.0
+                        data[world, rows[point], 0] = -own.rest[point]
+
+    def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
+        """Return of each led grip where it leads at ``times`` (k + 1,) [s], from ``start`` to ``end``; see `write`."""
+        frame, found = 1.0 / self._world.frame_rate, []
+        for own in self._held:
+            if isinstance(own.grip.spec, GripSpec):
+                found.append((own, led_points(own.grip, start, frame, times)))
+            elif own.ghost is not None:
+                found.append((own, led_hold(own.grip, start, end, times, self._world.world_count)))
+        return found
+
+    def present(self, time: float, step: float) -> list[tuple[Held, Any]]:
+        """Return of each led grip where it leads at a time [s] and a ``step`` [s] on; nothing is noted as led."""
+        found: list[tuple[Held, Any]] = []
+        for own in self._held:
+            spec, target = own.grip.spec, own.grip.target
+            if isinstance(spec, GripSpec):
+                times = np.array([time, time + step])
+                if target is None or own.grip.offsets is None:
+                    found.append((own, spec.at(times)))
+                else:
+                    now = np.broadcast_to(apply(target.pose(), own.grip.offsets), own.grip.offsets.shape)
+                    found.append((own, np.stack([now, now], axis=2)))
+            elif own.ghost is not None:
+                places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
+                found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
+        return found
+
+    def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float) -> None:
+        """Write where led grips lead in substep ``k``, which takes ``step`` [s]."""
+        for own, led in targets:
+            if own.ghost is not None:
+                place, turn = (part[:, k : k + 2] for part in led)
+                send(batch, own.address, place, turn, step)
+                continue
+            data = batch.expand("eq_data")
+            velocity = (led[:, :, k + 1] - led[:, :, k]) / step
+            # the spring and damper of an equality lag behind a moving target by as much
+            goal = led[:, :, k + 1] + 2.0 * STIFF[0] * CLOSING * step * velocity
+            assert own.point is not None and own.rest is not None
+            world, point = np.nonzero(own.point >= 0)
+            which = own.point[world, point]
+            data[world[:, None], own.rows.reshape(-1, 3)[which], 0] = goal[world, point] - own.rest[which]
+
+    def rows_of(self, grip: Grip) -> np.ndarray | None:
+        """Return the numbers of a grip's equalities in the model; None where it is not known there."""
+        return next((own.rows for own in self._held if own.grip is grip), None)
+
+
+def send(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:
+    """Put a heavy body where it is at the start of a substep, with the velocity that brings it to its end.
+
+    Args:
+        batch: The batch.
+        address: Its first coordinate and its first velocity.
+        place: (worlds, 2, 3) [m].
+        turn: (worlds, 2, 4).
+        step: [s].
+    """
+    qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
+    at, to = address
+    qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = place[:, 0], turn[:, 0]
+    own = quat.multiply(quat.inverse(turn[:, 0]), turn[:, 1])
+    own = np.where(own[:, :1] < 0.0, -own, own)
+    sine = np.linalg.norm(own[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, own[:, :1])
+    axis = np.divide(own[:, 1:], sine, out=np.zeros_like(own[:, 1:]), where=sine > 0.0)
+    qvel[:, to : to + 3] = (place[:, 1] - place[:, 0]) / step
+    qvel[:, to + 3 : to + 6] = axis * angle / step  # along the body's axes
+
+
+def _weld(data: np.ndarray, row: int, place: np.ndarray, turn: np.ndarray) -> None:
+    """Write where the second body of a weld is in the frame of the first, (worlds, 3) [m] and (worlds, 4)."""
+    data[:, row, 0:3], data[:, row, 3:6], data[:, row, 6:10], data[:, row, 10] = 0.0, place, turn, 1.0
+
+
+def _joint(data: np.ndarray, rows: np.ndarray, spec: JointSpec) -> None:
+    if spec.kind == "fixed":
+        turn = quat.multiply(spec.other_turn, quat.inverse(spec.turn))
+        place = spec.other_place - quat.rotate(turn, spec.place)
+        _weld(data, int(rows[0]), place, turn)
+        return
+    shifts = (-REACH, REACH) if spec.kind == "hinge" else (0.0,)
+    for row, shift in zip(rows, shifts, strict=True):
+        along = np.broadcast_to((0.0, 0.0, shift), spec.place.shape)
+        data[:, row, 0:3] = spec.other_place + quat.rotate(spec.other_turn, along)
+        data[:, row, 3:6] = spec.place + quat.rotate(spec.turn, along)

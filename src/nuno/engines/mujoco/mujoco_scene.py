@@ -1,0 +1,238 @@
+"""The scene of a MuJoCo engine: a spec that follows the world's bodies, the compiled model, and its batch.
+
+Only what has changed is edited in the spec. The states are the bodies' own arrays, so that nothing is lost as the model
+is compiled anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
+from nuno.engines.mujoco.mujoco_geoms import add_parts
+from nuno.engines.mujoco.mujoco_grips import Holds
+from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
+from nuno.tables.kinematic_motion import is_kinematic
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+HEAVY = 1e6
+"""[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
+CONTACT = (0.004, 1.0)
+"""``solref`` of contacts: time constant [s] and damping ratio. MuJoCo's default is 0.02 s, in which a towel sinks 5 mm
+into a table."""
+IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
+"""``solimp`` of contacts."""
+
+
+@dataclass(eq=False)
+class Placed:
+    """What a body is in the spec.
+
+    Attributes:
+        role: "static", "moving" (it follows a path), "rigid" or "flex".
+        signature: What it was made of; another means that it is made anew.
+        bodies: Its bodies in the spec, one, or of a flex one a vertex.
+        geoms, assets: Its geoms, and the meshes that they need.
+        flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
+        mesh: Of one that deforms, its elements.
+        friction: (worlds,), the coefficient of its shapes.
+        id: Of the first of its bodies in the model.
+        qpos, dof: Addresses (n,) of each body's coordinates and velocities; empty of a static one.
+    """
+
+    role: str
+    signature: tuple[Any, ...]
+    bodies: list[Any]
+    geoms: list[Any] = field(default_factory=list)
+    assets: list[Any] = field(default_factory=list)
+    flexes: list[Any] = field(default_factory=list)
+    mesh: FlexMesh | None = None
+    friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    id: int = -1
+    qpos: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    dof: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+
+class MujocoScene:
+    """The spec, the model and the batch.
+
+    Attributes:
+        placed: What each body is, by its key.
+        model: The compiled model.
+        batch: The batch of as many simulations as there are worlds.
+        holds: The grips and joints as equality constraints.
+        compilations: How often the model was compiled.
+        shortened: Whether a substep was of another length than the model's.
+
+    Args:
+        world: The world.
+    """
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        self._mujoco = mujoco_package()
+        self._made = 0
+        self.placed: dict[str, Placed] = {}
+        self.holds = Holds(world)
+        self.model: Any = None
+        self.batch: Any = None
+        self.compilations = 0
+        self.shortened = False  # whether the substep has been another than the model's
+        self._settings: tuple[Any, ...] = ()
+        self._begin()
+
+    def _begin(self) -> None:
+        mujoco, spec = self._mujoco, self._mujoco.MjSpec()
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        spec.option.impratio = 10.0
+        spec.option.gravity = self._world.gravity
+        self.spec = spec
+        self.placed = {}
+        self._settings = (self._world.gravity, self._world.world_count)
+
+    def bring(self, substep: float) -> None:
+        """Edit the spec to what the world is now, and compile it, for substeps so long [s]."""
+        world = self._world
+        if self._settings != (world.gravity, world.world_count):
+            self._begin()
+        for key in [key for key in self.placed if key not in world._bodies]:
+            self._delete(key)
+        for key, body in world._bodies.items():
+            own, role = self.placed.get(key), _role(body)
+            signature = _signature(body, role)
+            if own is None or own.signature != signature:
+                if own is not None:
+                    self._delete(key)
+                self.placed[key] = self._place(body, role, signature)
+        bodies = [(body, self.placed[key]) for key, body in world._bodies.items()]
+        set_masks(world, bodies)
+        set_friction(self.spec, world, bodies)
+        self.holds.add(self.spec, self.placed)
+        self.spec.option.timestep, self.shortened = substep, False
+        self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        with warnings_logged():
+            self.model = self.spec.compile()
+        self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1)
+        self.compilations += 1
+        for own in self.placed.values():
+            self._find(own)
+        self._set_numbers(bodies)
+        write_friction(self.model, self.batch, bodies)
+        self.holds.find(self.model, self.batch, self.placed, substep)
+
+    def _delete(self, key: str) -> None:
+        own = self.placed.pop(key)
+        for element in [*own.flexes, *own.bodies, *own.assets]:
+            self.spec.delete(element)
+
+    def _place(self, body: Body, role: str, signature: tuple[Any, ...]) -> Placed:
+        self._made += 1
+        name, dynamics = f"b{self._made}", body._dynamics
+        spec = self.spec
+        if isinstance(dynamics, ArrayParticles):
+            mesh = FlexMesh(dynamics)
+            flex, bodies = add_flex(spec, name, mesh, dynamics)
+            flex.selfcollide = 4 if self._world._rules.touches_itself(body) and mesh.axes is not None else 0
+            own = Placed(role, signature, bodies, flexes=[flex], mesh=mesh)
+        else:
+            from nuno.bodies.rigid_dynamics import parts_of
+
+            made = spec.worldbody.add_body(name=name)
+            if isinstance(dynamics, ArrayRigid):
+                inertia = dynamics.inertia[0]
+                made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]), dynamics.centre, True
+                made.fullinertia = [
+                    inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
+                ]  # fmt: skip
+                made.add_freejoint(name=name)
+                parts = dynamics.parts
+            else:
+                parts = parts_of(body, moves=False)
+                if role == "moving":
+                    made.mass, made.inertia, made.explicitinertial, made.gravcomp = HEAVY, [HEAVY] * 3, True, 1.0
+                    made.add_freejoint(name=name)
+                else:
+                    made.mocap = True
+            geoms, assets, flexes = add_parts(spec, made, name, parts)
+            own = Placed(role, signature, [made], geoms, assets, flexes)
+        for shape in (*own.geoms, *own.flexes):
+            shape.solref, shape.solimp, shape.condim = CONTACT, IMPEDANCE, 3
+        return own
+
+    def _find(self, own: Placed) -> None:
+        """Note where a body's coordinates are in the compiled model."""
+        model = self.model
+        own.id = int(model.body(own.bodies[0].name).id)
+        if own.role == "static":
+            return
+        ids = own.id + np.arange(len(own.bodies))
+        assert model.body(own.bodies[-1].name).id == ids[-1]
+        own.dof = model.body_dofadr[ids]
+        own.qpos = model.jnt_qposadr[model.body_jntadr[ids]]
+
+    def _set_numbers(self, bodies: list[tuple[Body, Placed]]) -> None:
+        """Write what a spec has no place for, or what differs between worlds."""
+        model, batch = self.model, self.batch
+        worlds = self._world.world_count
+        moving: list[tuple[Any, Placed]] = [(b._dynamics, own) for b, own in bodies if b._dynamics is not None]
+        for dynamics, own in moving:
+            ids = own.id + np.arange(len(own.bodies))
+            batch.expand("body_mass")[:, ids] = dynamics.mass.reshape(worlds, -1)
+            if own.role == "rigid":
+                share = np.trace(dynamics.inertia, axis1=1, axis2=2)
+                batch.expand("body_inertia")[:, own.id] = model.body_inertia[own.id] * (share / share[0])[:, None]
+        if moving:
+            batch.set_const()  # of all worlds, so that one is the same in any batch
+        for dynamics, own in moving:
+            drag = dynamics.material.resolved(worlds, self._elements(dynamics))["air_drag"][:, 0]
+            if drag.any():
+                self._set_drag(own, dynamics, drag.astype(np.float64))
+            if own.mesh is not None:
+                write_flex(model, batch, flex_id(model, own.flexes[0].name), own.mesh, dynamics)
+
+    @staticmethod
+    def _elements(dynamics: Any) -> int:
+        from nuno.bodies.shape_topology import element_count
+
+        return 1 if dynamics.is_rigid else element_count(dynamics.shape)
+
+    def _set_drag(self, own: Placed, dynamics: Any, drag: np.ndarray) -> None:
+        """Let still air take the velocity away at a rate (worlds,) [1/s]."""
+        damping = self.batch.expand("dof_damping")
+        if own.role == "flex":
+            for axis in range(3):
+                damping[:, own.dof + axis] = drag[:, None] * dynamics.mass
+            return
+        spin = np.trace(dynamics.inertia, axis1=1, axis2=2) / 3.0
+        for axis in range(3):
+            damping[:, own.dof[0] + axis] = drag * dynamics.mass
+            damping[:, own.dof[0] + 3 + axis] = drag * spin
+
+
+def flex_id(model: Any, name: str) -> int:
+    """Return the number of a flex in a model."""
+    mujoco = mujoco_package()
+    return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, name))
+
+
+def _role(body: Body) -> str:
+    if body._dynamics is not None:
+        return "rigid" if body._dynamics.is_rigid else "flex"
+    return "moving" if is_kinematic(body) else "static"
+
+
+def _signature(body: Body, role: str) -> tuple[Any, ...]:
+    if body._dynamics is not None:
+        # another material makes other dynamics
+        return role, id(body._dynamics), body._world is not None and body._world._rules.touches_itself(body)
+    return role, id(body.shape), id(body._deformed), body.thickness

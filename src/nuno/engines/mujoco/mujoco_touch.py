@@ -1,0 +1,146 @@
+"""Touching: which pairs collide, as bit masks, and the friction of each pair."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.world.simulation import Simulation
+
+log = logging.getLogger(__name__)
+
+BITS = 31
+"""Bits of a mask that tell bodies apart."""
+_told: set[frozenset[str]] = set()
+
+
+def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
+    """Give all geoms and flexes the masks by which exactly those pairs collide that touch in the world.
+
+    MuJoCo's rule is an or, Nuno's an and: each class of bodies that touch the same others has a bit of its own.
+
+    Raises:
+        InvalidInputError: there are more than 31 such classes.
+    """
+    n = len(bodies)
+    touches = np.zeros((n, n), dtype=bool)
+    for i, (a, _) in enumerate(bodies):
+        for j, (b, _) in enumerate(bodies[:i]):
+            moves = a._dynamics is not None or b._dynamics is not None
+            touches[i, j] = touches[j, i] = moves and world._rules.touch(a, b)
+    classes: list[list[int]] = []
+    for i in range(n):
+        for members in classes:
+            first = members[0]
+            others = np.ones(n, dtype=bool)
+            others[[*members, i]] = False
+            inner = {bool(touches[a, b]) for a in (*members, i) for b in (*members, i) if a != b}
+            if np.array_equal(touches[i, others], touches[first, others]) and len(inner) == 1:
+                members.append(i)
+                break
+        else:
+            classes.append([i])
+    if len(classes) > BITS:
+        raise InvalidInputError(
+            f"mujoco tells {BITS} classes of bodies apart that touch different others, and here are {len(classes)}; "
+            "let more bodies touch alike (groups, ignore_contact)"
+        )
+    for k, members in enumerate(classes):
+        mask = 0
+        for other, theirs in enumerate(classes):
+            a = members[0]
+            b = next((m for m in theirs if m != a), None)
+            if b is not None and touches[a, b]:
+                mask |= 1 << other
+        for member in members:
+            placed = bodies[member][1]
+            for shape in (*placed.geoms, *placed.flexes):
+                shape.contype, shape.conaffinity = 1 << k, mask
+
+
+def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
+    """Give all geoms and flexes the coefficients of their pairs.
+
+    MuJoCo takes of two the larger coefficient, or that of the shape with the higher priority; Nuno's pair takes the
+    geometric mean. A geom against a flex tells the pair's own; two geoms that differ from theirs are an explicit pair.
+    """
+    for pair in list(spec.pairs):
+        spec.delete(pair)
+    flexes = [(body, own) for body, own in bodies if own.role == "flex"]
+    others = [(body, own) for body, own in bodies if own.role != "flex"]
+    for body, own in flexes:
+        own.friction, own.flexes[0].priority = _by_world(world, body.friction), 0
+        own.flexes[0].friction = _triple(own.friction)
+    for body, own in others:
+        wanted = [(pair_friction(world, body, flex), flex) for flex, _ in flexes if world._rules.touch(body, flex)]
+        own.friction = wanted[0][0] if wanted else _by_world(world, body.friction)
+        for mu, flex in wanted[1:]:
+            _tell(body, flex, mu, own.friction)
+        for shape in (*own.geoms, *own.flexes):
+            shape.friction, shape.priority = _triple(own.friction), 1
+    for i, (body, own) in enumerate(flexes):
+        for other, theirs in flexes[:i]:
+            if world._rules.touch(body, other):
+                _tell(body, other, pair_friction(world, body, other), np.maximum(own.friction, theirs.friction))
+    for i, (body, own) in enumerate(others):
+        for other, theirs in others[:i]:
+            if (body._dynamics is None and other._dynamics is None) or not world._rules.touch(body, other):
+                continue
+            mu, taken = pair_friction(world, body, other), np.maximum(own.friction, theirs.friction)
+            if np.abs(mu - taken).max() < 1e-9:
+                continue
+            if own.flexes or theirs.flexes or np.ptp(mu) > 0.0:
+                _tell(body, other, mu, taken)
+                continue
+            for a in own.geoms:
+                for b in theirs.geoms:
+                    pair = spec.add_pair(geomname1=a.name, geomname2=b.name)
+                    pair.condim, pair.friction = 3, [float(mu[0]), float(mu[0]), 0.005, 1e-4, 1e-4]
+                    pair.solref, pair.solimp = a.solref, a.solimp
+
+
+def write_friction(model: Any, batch: Any, bodies: list[tuple[Body, Any]]) -> None:
+    """Write coefficients that differ between worlds."""
+    mujoco = mujoco_package()
+    kinds = {"geom_friction": mujoco.mjtObj.mjOBJ_GEOM, "flex_friction": mujoco.mjtObj.mjOBJ_FLEX}
+    for _, own in bodies:
+        if np.ptp(own.friction) == 0.0:
+            continue
+        for name, shapes in (("geom_friction", own.geoms), ("flex_friction", own.flexes)):
+            for shape in shapes:
+                batch.expand(name)[:, mujoco.mj_name2id(model, kinds[name], shape.name), 0] = own.friction
+
+
+def pair_friction(world: Simulation, a: Body, b: Body) -> np.ndarray:
+    """Return the coefficient of a pair, (worlds,)."""
+    own = world._rules.friction.get(frozenset((a.key, b.key)))
+    if own is not None:
+        return _by_world(world, own)
+    return np.sqrt(_by_world(world, a.friction) * _by_world(world, b.friction))
+
+
+def _by_world(world: Simulation, value: Any) -> np.ndarray:
+    return np.array(np.broadcast_to(np.asarray(value, dtype=float), (world.world_count,)))
+
+
+def _triple(mu: np.ndarray) -> list[float]:
+    return [float(mu[0]), 0.005, 1e-4]
+
+
+def _tell(a: Body, b: Body, mu: np.ndarray, real: np.ndarray) -> None:
+    """Warn once of a pair whose friction MuJoCo cannot have."""
+    pair = frozenset((a.key, b.key))
+    worst = int(np.argmax(np.abs(mu - real)))
+    if abs(mu[worst] - real[worst]) > 1e-6 and pair not in _told:
+        _told.add(pair)
+        log.warning(
+            "on mujoco %r and %r have the friction %.4g in place of %.4g: it has one coefficient a shape where flexes "
+            "touch. Equal coefficients of all bodies mend that", a.name, b.name, real[worst], mu[worst],
+        )  # fmt: skip

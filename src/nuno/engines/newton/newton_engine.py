@@ -1,0 +1,130 @@
+"""The Newton engine: cloth, soft and rigid bodies in one system by Newton's vertex block descent (SolverVBD)."""
+
+from __future__ import annotations
+
+import logging
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.bodies.dynamics import Dynamics, State
+from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.engine import Engine
+from nuno.engines.led import led_hold, led_points, led_poses
+from nuno.errors import MissingPackageError
+from nuno.joints.tie import HoldSpec
+from nuno.materials import Material, Rigid
+
+if TYPE_CHECKING:
+    from nuno.bodies.body import Body
+    from nuno.engines.newton.newton_model import NewtonModel
+    from nuno.engines.newton.newton_substeps import NewtonSubsteps
+    from nuno.world.simulation import Simulation
+
+logger = logging.getLogger(__name__)
+
+SUBSTEPS = 60
+"""Of a frame where the world gives no number: with few, block descent leaves a stiff cloth far too limp."""
+ITERATIONS = 5
+"""Of a substep."""
+
+
+class NewtonEngine(Engine):
+    """Newton's SolverVBD on the CPU or CUDA, its substeps recorded once and replayed for each frame."""
+
+    name = "newton"
+    capabilities = frozenset(
+        {
+            "rigid bodies", "cloth", "soft bodies", "self-contact of cloth", "worlds' materials", "moving shapes",
+            "grips of vertices", "grips of rigid bodies", "elastic energy", "air drag", "batch", "cuda",
+        }
+    )  # fmt: skip
+
+    def __init__(self, world: Simulation) -> None:
+        super().__init__(world)
+        if find_spec("newton") is None:
+            raise MissingPackageError("newton", "newton", 'World(engine="newton")')
+        self._made: NewtonModel | None = None
+        self._substeps: NewtonSubsteps | None = None
+
+    def attach(self, body: Body, material: Any) -> Dynamics:
+        """Return dynamics for a static body in the shape that it has now, at rest."""
+        worlds = self.world.world_count
+        if isinstance(material, Rigid):
+            place, turn = (np.array(np.broadcast_to(p, (worlds, p.shape[-1])), float) for p in body.pose())
+            still = np.zeros((worlds, 3))
+            return self.make(
+                body, material, {"place": place, "turn": turn, "velocity": still, "spin": still.copy()},
+                material.friction,
+            )  # fmt: skip
+        vertices = body._vertices()
+        positions = np.array(np.broadcast_to(vertices, (worlds, *vertices.shape[-2:])), float)
+        state = {"positions": positions, "velocities": np.zeros_like(positions)}
+        return self.make(body, material, state, material.friction)
+
+    def make(self, body: Body, material: Material, state: State, friction: Any, neutral: bool = False) -> Dynamics:
+        """Return dynamics for a body in a state."""
+        self.changed()
+        kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
+        made = kind(body, material, friction, self.world, state)
+        made.substeps = self._count()
+        return made
+
+    def load(self, body: Body, state: State, neutral: bool = False) -> None:
+        """Set a dynamic body's state."""
+        assert body._dynamics is not None
+        body._dynamics.load_state(state)
+
+    def changed(self) -> None:
+        """Build the model anew before the next step."""
+        self._made = self._substeps = None
+
+    def step(self, start: float, end: float) -> None:
+        """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
+        if self._made is None or any(dynamics.grips_changed for dynamics in self.world._attached()):
+            from nuno.engines.newton.newton_model import build_model
+
+            for dynamics in self.world._attached():
+                dynamics.grips_changed = False
+            self._made, self._substeps = build_model(self.world), None
+        if self._substeps is None:
+            from nuno.engines.newton.newton_substeps import NewtonSubsteps
+
+            self._substeps = NewtonSubsteps(self._made, self.world, ITERATIONS)
+        frame = 1.0 / self.world.frame_rate
+        span = end - start
+        count = max(2, 2 * round(0.5 * self._count() * span / frame + 1e-6))  # even: states change places
+        times = start + span * np.arange(1, count + 1) / count
+        substeps, worlds = self._substeps, self.world.world_count
+        for body in self._moving():
+            dynamics: Any = body._dynamics
+            if isinstance(dynamics, ArrayParticles):
+                substeps.put_particles(body, dynamics)
+                if substeps.held(body):
+                    from nuno.engines.newton.newton_model import held_vertices
+
+                    led = [(grip, v, led_points(grip, start, span, times)) for grip, v in held_vertices(body)]
+                    substeps.lead_particles(body, [(v, places) for _, v, places in led])
+            else:
+                substeps.put_body(body, dynamics.values)
+                if body.key in self._made.led_bodies:
+                    holds = [grip for grip in dynamics.grips if isinstance(grip.spec, HoldSpec)]
+                    ends = np.concatenate([[start], times])
+                    substeps.lead_body(body, *led_hold(holds[-1], start, end, ends, worlds), span / count)
+        for body in self.world._kinematic_bodies():
+            if body.key in self._made.led_bodies:
+                ends = np.concatenate([[start], times])
+                substeps.lead_body(body, *led_poses(self.world, body, start, end, ends), span / count)
+        for body in self._moving():
+            for push in body._dynamics.pushing(start):  # type: ignore[union-attr]
+                substeps.push(body, push.force)
+        substeps.run(count, span / count)
+        for body in self._moving():
+            substeps.read(body, body._dynamics)
+
+    def _count(self) -> int:
+        return self.world.substeps or SUBSTEPS
+
+    def _moving(self) -> list[Body]:
+        return [body for body in self.world._bodies.values() if body._dynamics is not None]
