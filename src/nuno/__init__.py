@@ -25,13 +25,16 @@ from nuno.bodies.make_bodies import (
 )
 from nuno.camera.camera import Camera
 from nuno.errors import (
+    BoardNotFoundError,
     BodyStateError,
+    CalibrationError,
     ClothNotFoundError,
     ConnectionLostError,
     EstimationError,
     FileFormatError,
     FileWriteError,
     ImageError,
+    ImageQualityError,
     InvalidInputError,
     MeshError,
     MessageError,
@@ -71,9 +74,17 @@ from nuno.world.world import World
 
 if TYPE_CHECKING:
     from nuno.bodies.element_state import ElementState, elements
+    from nuno.camera.calibration import Calibration, calibrate_camera, camera_over_table
+    from nuno.camera.calibration_board import CalibrationBoard
+    from nuno.camera.find_shape import FoundShape, find_shape
+    from nuno.camera.image_quality import ImageQuality, image_quality
+    from nuno.camera.marker_pose import find_marker
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
     from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
+    from nuno.camera.usb_camera import UsbCamera
+    from nuno.estimate.capture import Capture, capture_case
+    from nuno.estimate.capture_live import take_capture
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -139,11 +150,16 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ArmTracks",
+    "BoardNotFoundError",
     "Body",
     "BodyStateError",
     "Box",
+    "Calibration",
+    "CalibrationBoard",
+    "CalibrationError",
     "Camera",
     "Capsule",
+    "Capture",
     "CarryResult",
     "CarryTrial",
     "Chequer",
@@ -165,6 +181,7 @@ __all__ = [
     "FoldResult",
     "Footage",
     "Footstep",
+    "FoundShape",
     "Goal",
     "Grip",
     "Hand",
@@ -174,6 +191,8 @@ __all__ = [
     "Hull",
     "Humanoid",
     "ImageError",
+    "ImageQuality",
+    "ImageQualityError",
     "ImprovedFold",
     "InvalidInputError",
     "Joint",
@@ -249,6 +268,7 @@ __all__ = [
     "TriangleMesh",
     "Uniform",
     "UnknownNameError",
+    "UsbCamera",
     "Viewer",
     "ViewerError",
     "Walk",
@@ -260,7 +280,10 @@ __all__ = [
     "boundary_faces",
     "box",
     "box_tetrahedra",
+    "calibrate_camera",
+    "camera_over_table",
     "capsule",
+    "capture_case",
     "carry_mat",
     "cloth_mesh",
     "compound",
@@ -273,10 +296,13 @@ __all__ = [
     "estimate_pick",
     "export_body",
     "find_layers",
+    "find_marker",
+    "find_shape",
     "fit_material",
     "fitted_tetrahedra",
     "fixed_joint",
     "hinge",
+    "image_quality",
     "improve_fold",
     "lattice_tetrahedra",
     "lift_soft_cube",
@@ -310,6 +336,7 @@ __all__ = [
     "sphere",
     "stop_walk",
     "sweep",
+    "take_capture",
     "take_picture",
     "track_hands",
     "track_hands_in_stereo",
@@ -321,10 +348,18 @@ _LAZY = {
     name: module
     for module, names in {
         "nuno.bodies.element_state": "ElementState elements",
+        "nuno.camera.calibration": "Calibration calibrate_camera camera_over_table",
+        "nuno.camera.calibration_board": "CalibrationBoard",
+        "nuno.camera.find_shape": "FoundShape find_shape",
+        "nuno.camera.image_quality": "ImageQuality image_quality",
         "nuno.camera.lamp": "Lamp",
+        "nuno.camera.marker_pose": "find_marker",
         "nuno.camera.picture": "Chequer Picture take_picture",
         "nuno.camera.segmentation": "segment_after segment_before",
         "nuno.camera.table": "Table",
+        "nuno.camera.usb_camera": "UsbCamera",
+        "nuno.estimate.capture": "Capture capture_case",
+        "nuno.estimate.capture_live": "take_capture",
         "nuno.estimate.case": "PickCase read_case",
         "nuno.estimate.fit_material": "MaterialFit fit_material",
         "nuno.estimate.fold": "replay_fold",

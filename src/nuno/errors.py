@@ -99,12 +99,24 @@ class ImageError(InvalidInputError):
     """An image that cannot be read or does not fit its camera."""
 
 
+class BoardNotFoundError(ImageError):
+    """An image that does not show the calibration board, or the marker, that is looked for."""
+
+
+class ImageQualityError(ImageError):
+    """An image that is blurred, overexposed or too dark to measure in."""
+
+
 class ClothNotFoundError(NunoError, RuntimeError):
     """No cloth was found in the image."""
 
 
 class EstimationError(NunoError, RuntimeError):
     """Valid input for which no answer could be computed."""
+
+
+class CalibrationError(EstimationError):
+    """Images of a board from which no camera follows: too few, too much alike, or not those of one camera."""
 
 
 class NotEnoughMemoryError(NunoError, MemoryError):
