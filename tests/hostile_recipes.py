@@ -466,7 +466,7 @@ UNCALLED = {
         "Grip.lead",
         "Grip.spec_for",
         "Joint.lead",
-        "Links.poses_of",
+        "Links.poses_at",
         "SimulatedRobot.imagined",
         "SimulatedRobot.take_future",
         "Joint.spec_for",

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from nuno.robot.spatial_arrays import placement_arrays, spatial_array
+from nuno.robot.spatial_arrays import placement_arrays, quaternions_of, spatial_array
 
 
 def test_arrays_show_what_pinocchio_has(still_talos):
@@ -37,3 +37,17 @@ def test_what_is_written_acts(still_talos):
     found, expected = (pin.rnea(model, model.createData(), q, still, still, own) for own in (one, other))
     np.testing.assert_array_equal(found, expected)
     assert not np.array_equal(found, pin.rnea(model, model.createData(), q, still, still))
+
+
+def test_quaternions_are_pinocchios_to_the_bit():
+    """Random turns, of which a good third has a negative trace, and half turns about each axis."""
+    random = np.random.default_rng(5)
+    turns = [pin.Quaternion(own / np.linalg.norm(own)).toRotationMatrix() for own in random.normal(size=(3000, 4))]
+    turns += [np.diag(own) for own in ((1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))]
+    matrix = pin.rpy.rpyToMatrix
+    turns += [matrix(*own) @ matrix(own[1], 3.1, own[0]) for own in random.normal(size=(500, 3))]
+    rotations = np.array(turns)
+    assert 0.2 < (np.trace(rotations, axis1=1, axis2=2) < 0.0).mean() < 0.8
+    expected = np.array([pin.SE3ToXYZQUAT(pin.SE3(own, np.zeros(3)))[3:] for own in turns])
+    np.testing.assert_array_equal(quaternions_of(rotations), expected)
+    np.testing.assert_array_equal(quaternions_of(rotations[:12].reshape(3, 4, 3, 3)), expected[:12].reshape(3, 4, 4))

@@ -82,3 +82,27 @@ def test_a_company_goes_where_its_last_path_batch_goes():
     world.restore(saved)
     assert [body._path for body in bodies] == kept[1][1]
     assert path_batches_of(bodies)[0][0][0] is kept[1][0]
+
+
+def test_worlds_apart_go_where_each_would_alone():
+    """A group whose paths differ by world: schedule and arrival are each world's own, to the bit."""
+    bodies = [nuno.box((0.1, 0.1, 0.1), name=str(k)) for k in range(4)]
+    random, times = np.random.default_rng(3), np.array([0.0, 0.1])
+    turns = random.normal(size=(4, 3, 2, 4))
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    places = random.normal(size=(4, 3, 2, 3))
+    group = KinematicGroup(tuple(body.key for body in bodies))
+    found = []
+    for world in (slice(None), 0, 1, 2):
+        group.path_batch = PathBatch(group.keys, times, places[:, world].copy(), turns[:, world].copy())
+        for body, path in zip(bodies, group.paths, strict=True):
+            body._path = path
+        poses = make_schedule(bodies, 0.03, 0.09, 1 / 60).poses
+        arrive(bodies, 0.05)
+        found.append(([poses[body.key] for body in bodies], group.arrived(bodies, 0.05, places[:, world].shape[1:-2])))
+    for k in range(3):
+        for together, alone in zip(found[0][0], found[k + 1][0], strict=True):
+            for a, b in zip(together, alone, strict=True):
+                np.testing.assert_array_equal(a[k], b)
+        for a, b in zip(found[0][1], found[k + 1][1], strict=True):
+            np.testing.assert_array_equal(a[:, k], b)

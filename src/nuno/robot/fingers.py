@@ -130,14 +130,19 @@ class FingerBodies:
         self._known: tuple[list[float], np.ndarray] | None = None  # joints' positions, and offsets
 
     def offset(self, offsets: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """Return where bodies are in the frames of their joints (n, 3) [m], from where they are with open hands.
+        """Return where bodies are in the frames of their joints (..., n, 3) [m], from where they are with open hands.
 
         Args:
             offsets: (n, 3) [m], with open hands.
-            angles: (dof,) of the robot's joints.
+            angles: (dof,) of the robot's joints, or (worlds, dof).
         """
         if not self._moved:
             return offsets
+        if angles.ndim > 1:
+            all_moved = np.repeat(offsets[None], len(angles), axis=0)
+            slides = np.stack([finger.slide(angles) for finger in self._moved], axis=-1)
+            all_moved[:, self._rows] += slides[..., None] * self._inward
+            return all_moved
         now, known = [angles[row] for row in self._joints], self._known
         if known is not None and known[0] == now:
             return known[1]

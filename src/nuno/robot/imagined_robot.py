@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
+from nuno.robot.link_batch import LinkBatch
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.robot.wanted_motion import WantedMotion
-from nuno.shapes.path import Path
 from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ class ImaginedRobot:
             self._guards[k].load(found)
             own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
+        self._batch = LinkBatch(original.links, world, self._links)
 
     def __repr__(self) -> str:
         return f"<ImaginedRobot {self.original.actual.name!r} in {self.world.world_count} worlds>"
@@ -179,7 +180,8 @@ class ImaginedRobot:
             return
         moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
         if moved:
-            self._lead(start, end, aims)
+            configurations = [aim.q for aim in aims]
+            self._batch.lead(start, end, configurations, np.array([own.robot._angles for own in self._motions]))
         self._states = aims
 
     def end_frame(self) -> None:
@@ -237,16 +239,6 @@ class ImaginedRobot:
     def _is_whole(self) -> bool:
         """Return True as long as no link was removed from the batch; without all of them the robot does nothing."""
         return all(body._world is self.world for body in self._links)
-
-    def _lead(self, start: float, end: float, aims: list[RobotState]) -> None:
-        """Send the links to where the robots are at the end of the frame, on a path for each world."""
-        poses = [self.original.links.poses_of(own.robot) for own in self._motions]
-        places, turns = (np.array(part) for part in zip(*poses, strict=True))
-        worlds, times = self.world.world_count, np.array([start, end])
-        for k, body in enumerate(self._links):
-            place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
-            path = Path(times, np.stack([place, places[:, k]], axis=1), np.stack([turn, turns[:, k]], axis=1))
-            self.world.move(body, path)
 
     def _serve(self, before: RobotState, others: Any, base: Any, span: float) -> tuple[np.ndarray, Any]:
         return self._servo.rows, self._servo.step(before, others, base, span, None)

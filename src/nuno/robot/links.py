@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from nuno.bodies.body import Body
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.robot.fingers import FingerBodies
 from nuno.robot.pinocchio import pin
-from nuno.robot.spatial_arrays import placement_arrays
+from nuno.robot.spatial_arrays import placement_arrays, quaternions_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
-from nuno.tables.kinematic_motion import KinematicGroup, PathBatch
+from nuno.tables.kinematic_motion import KinematicGroup
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:
@@ -73,6 +73,7 @@ class Links:
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
         # by which the quaternion of its joint is multiplied for that of a shape
         self._turned_by = np.stack([quat.multiply(row, self._turns) for row in np.eye(4)], axis=2)
+        self._turned_by_all = self._turned_by  # the same for each world of a batch, one after the other
         self._placements = robot.data.oMi.tolist()
         self._joint_axes, self._joint_places = placement_arrays(self._placements)
         self._inside = True
@@ -93,20 +94,41 @@ class Links:
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot has its shapes now: positions (n, 3) [m] and quaternions (n, 4)."""
         self.robot.update()
-        return self._poses_at(self._placements, self._joint_axes, self._joint_places, self.robot)
+        joints, offsets = self._rows, self.finger_bodies.offset(self._offsets, self.robot.angle_vector())
+        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
+        return self._placed(
+            self._joint_axes[joints], self._joint_places[joints], turns[joints], offsets, self._turned_by
+        )
 
-    def poses_of(self, robot: Humanoid) -> tuple[np.ndarray, np.ndarray]:
-        """Return where another robot of the same model has such shapes now, as ``poses`` does."""
-        placements = robot.update().oMi.tolist()
-        return self._poses_at(placements, *placement_arrays(placements), robot)
+    def poses_at(self, axes: np.ndarray, origins: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the shapes of robots of this model are whose joints are elsewhere, as ``poses`` does to the bit.
 
-    def _poses_at(
-        self, placements: Any, axes: np.ndarray, origins: np.ndarray, robot: Humanoid
+        Args:
+            axes: (worlds, joints, 3, 3), rotation matrices of Pinocchio's joints.
+            origins: (worlds, joints, 3) [m], where they are.
+            angles: (worlds, dof) of the joints.
+
+        Returns:
+            Positions (worlds, n, 3) [m] and quaternions (worlds, n, 4).
+        """
+        worlds, joints = len(axes), self._rows
+        if self._turned_by_all.shape[0] != worlds * len(joints):
+            self._turned_by_all = np.tile(self._turned_by, (worlds, 1, 1))
+        offsets = np.broadcast_to(self.finger_bodies.offset(self._offsets, angles), (worlds, len(joints), 3))
+        # one long list, of matrices that lie column by column as Pinocchio's do: otherwise einsum would round otherwise
+        by_column, own_origins, turns = (
+            part[:, joints].reshape(-1, *part.shape[2:])
+            for part in (np.swapaxes(axes, -1, -2), origins, quaternions_of(axes)[..., [3, 0, 1, 2]])
+        )
+        own_axes = np.swapaxes(np.ascontiguousarray(by_column), -1, -2)
+        places, turned = self._placed(own_axes, own_origins, turns, offsets.reshape(-1, 3), self._turned_by_all)
+        return places.reshape(worlds, -1, 3), turned.reshape(worlds, -1, 4)
+
+    def _placed(
+        self, axes: np.ndarray, origins: np.ndarray, turns: np.ndarray, offsets: np.ndarray, turned_by: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        joints, offsets = self._rows, self.finger_bodies.offset(self._offsets, robot.angle_vector())
-        places = origins[joints] + np.einsum("kij,kj->ki", axes[joints], offsets)
-        turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
-        return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
+        """Return where shapes are whose joints are there: (k, 3) [m] and quaternions (k, 4)."""
+        return origins + np.einsum("kij,kj->ki", axes, offsets), np.einsum("kij,kj->ki", turned_by, turns)
 
     def follow(self, seconds: float) -> None:
         """Let the bodies move from where they are to where the robot is now, in ``seconds`` [s] from the world's time.
@@ -120,7 +142,7 @@ class Links:
         self._check_inside()
         positions, quaternions = self.poses()
         with self.world.lock:
-            start, now = self._arrived(), self.world.time
+            start, now = self._kinematic_group.arrived(self.bodies, self.world.time), self.world.time
             if duration == 0.0:
                 times, places, turns = np.array([now]), positions[:, None], quaternions[:, None]
             else:
@@ -128,14 +150,7 @@ class Links:
                 places, turns = np.empty((len(positions), 2, 3)), np.empty((len(positions), 2, 4))
                 places[:, 0], places[:, 1] = start[0], positions
                 turns[:, 0], turns[:, 1] = start[1], quaternions
-            kinematic_group = self._kinematic_group
-            kinematic_group.path_batch = PathBatch(self._keys, times, places, turns)
-            if [body._path for body in self.bodies] != kinematic_group.paths:
-                for body, path in zip(self.bodies, kinematic_group.paths, strict=True):
-                    if body._path is None:  # the first time, and after anything else took the body elsewhere
-                        self.world.move(body, path)
-                    else:  # what ``World.move`` does to a body that follows a path already
-                        body._path = path
+            self._kinematic_group.lead(self.bodies, self.world, times, places, turns)
             if duration == 0.0:
                 for body, place, turn in zip(self.bodies, positions, quaternions, strict=True):
                     body._position, body._quaternion = place, turn
@@ -147,15 +162,6 @@ class Links:
             for body in self.bodies:
                 if body._path is not None:
                     self.world.move(body, None)
-
-    def _arrived(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the bodies are: positions (n, 3) [m] and quaternions (n, 4)."""
-        path_batch = self._kinematic_group.path_batch
-        if path_batch is not None and path_batch.arrived is not None and path_batch.arrived[0] == self.world.time:
-            if [body._path for body in self.bodies] == self._kinematic_group.paths:
-                return path_batch.arrived[1:]
-        places, turns = [body._position for body in self.bodies], [body._quaternion for body in self.bodies]
-        return np.array(places).reshape(-1, 3), np.array(turns).reshape(-1, 4)
 
     def leave(self) -> None:
         """Take the bodies out of the world.

@@ -17,6 +17,37 @@ def placement_arrays(placements: Any) -> tuple[np.ndarray, np.ndarray]:
     return _joined(own.rotation for own in placements), _joined(own.translation for own in placements)
 
 
+def quaternions_of(rotations: np.ndarray) -> np.ndarray:
+    """Return the quaternions (..., 4), (x, y, z, w), of rotation matrices (..., 3, 3), to the bit as Pinocchio does.
+
+    By the largest of the trace and the diagonal (Shepperd, Journal of Guidance and Control 1, 1978), in Eigen's order.
+    """
+    m = np.moveaxis(rotations, (-2, -1), (0, 1))
+    trace = m[0, 0] + (m[1, 1] + m[2, 2])
+    found = np.empty((*trace.shape, 4))
+    turns_little = trace > 0.0
+    root = np.sqrt(np.where(turns_little, trace, 0.0) + 1.0)
+    found[..., 3], scale = 0.5 * root, 0.5 / root
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        found[..., i] = (m[k, j] - m[j, k]) * scale
+    if turns_little.all():
+        return found
+    largest = np.where(m[1, 1] > m[0, 0], 1, 0)
+    largest = np.where(m[2, 2] > np.where(largest == 1, m[1, 1], m[0, 0]), 2, largest)
+    for i in range(3):
+        own = ~turns_little & (largest == i)
+        if own.any():
+            j, k = (i + 1) % 3, (i + 2) % 3
+            root = np.sqrt(m[i, i][own] - m[j, j][own] - m[k, k][own] + 1.0)
+            scale = 0.5 / root
+            part = np.empty((len(root), 4))
+            part[:, i], part[:, 3] = 0.5 * root, (m[k, j][own] - m[j, k][own]) * scale
+            part[:, j], part[:, k] = (m[j, i] + m[i, j])[own] * scale, (m[k, i] + m[i, k])[own] * scale
+            found[own] = part
+    return found
+
+
 def spatial_array(quantities: Any) -> np.ndarray:
     """Return n motions or forces as (n, 6): along the axes, then about them."""
     return _joined(own.vector for own in quantities)

@@ -162,7 +162,10 @@ class Colliders:
                 place[:, slots[key]], turn[:, slots[key]] = pose
         for keys, places, turns in schedule.path_batches:
             own, rows = self._slots_of(keys)
-            place[:, own], turn[:, own] = places[rows], turns[rows]
+            if places.ndim == 4:  # each world has its own
+                place[:, own], turn[:, own] = places[rows].swapaxes(0, 1), turns[rows].swapaxes(0, 1)
+            else:
+                place[:, own], turn[:, own] = places[rows], turns[rows]
         if self._has_centres:
             place += quat.rotate(turn, self._centres[:, :, None])
         # the short way round between neighbours, which the kernels blend number by number

@@ -17,6 +17,7 @@ from nuno.shapes.path import Path
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +27,9 @@ class PathBatch:
     Attributes:
         keys: Of the bodies, n of them.
         times: (k,) float [s].
-        positions: (n, k, 3) float [m].
-        quaternions: (n, k, 4) float.
-        arrived: Where the bodies were last put: the time [s], positions (n, 3) and quaternions (n, 4).
+        positions: (n, k, 3) float [m], or (n, worlds, k, 3).
+        quaternions: (n, k, 4) float, or (n, worlds, k, 4).
+        arrived: Where the bodies were last put: the time [s], positions (n, ..., 3) and quaternions (n, ..., 4).
     """
 
     keys: tuple[str, ...]
@@ -54,8 +55,8 @@ class PathBatch:
     def at(self, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
         """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path.keys_around`` says of times."""
         first, last, s = between
-        a, b = self.positions[:, first], self.positions[:, last]
-        return a + s[..., None] * (b - a), quat.slerp(self.quaternions[:, first], self.quaternions[:, last], s)
+        a, b, turns = self.positions[..., first, :], self.positions[..., last, :], self.quaternions
+        return a + s[..., None] * (b - a), quat.slerp(turns[..., first, :], turns[..., last, :], s)
 
 
 class KinematicGroup:
@@ -77,6 +78,46 @@ class KinematicGroup:
         self.path_batch: PathBatch | None = None
         self.paths: list[Path] = [GroupPath(self, k) for k in range(len(keys))]
 
+    def lead(
+        self, bodies: Sequence[Body], world: World, times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray
+    ) -> None:
+        """Send the bodies on a path each, from now on.
+
+        Args:
+            bodies: Those of the keys, in their order.
+            world: Where they are.
+            times: (k,) [s].
+            positions: (n, k, 3) [m], or (n, worlds, k, 3).
+            quaternions: (n, k, 4), or (n, worlds, k, 4).
+        """
+        self.path_batch = PathBatch(self.keys, times, positions, quaternions)
+        before = [body._path for body in bodies]
+        if before == self.paths:
+            return
+        for body, path, own in zip(bodies, self.paths, before, strict=True):
+            # the first time, after anything else took the body elsewhere, and where worlds part
+            if own is None or own.world_count != path.world_count:
+                world.move(body, path)
+            else:  # what ``World.move`` does to a body that follows a path already
+                body._path = path
+
+    def arrived(self, bodies: Sequence[Body], time: float, shape: tuple[int, ...] = ()) -> Pose:
+        """Return where the bodies are now: positions (n, *shape, 3) [m] and quaternions (n, *shape, 4).
+
+        Args:
+            bodies: Those of the keys, in their order.
+            time: Now [s].
+            shape: (), or (worlds,) of a batch.
+        """
+        batch, count = self.path_batch, len(bodies)
+        if batch is not None and batch.arrived is not None and batch.arrived[0] == time:
+            if [body._path for body in bodies] == self.paths and batch.arrived[1].shape == (count, *shape, 3):
+                return batch.arrived[1:]
+        places, turns = np.empty((count, *shape, 3)), np.empty((count, *shape, 4))
+        for k, body in enumerate(bodies):
+            places[k], turns[k] = body._position, body._quaternion
+        return places, turns
+
 
 class GroupPath(Path):
     """The path of the k-th body of a kinematic group, which is another one when that is sent on another path batch."""
@@ -94,12 +135,12 @@ class GroupPath(Path):
 
     @property
     def positions(self) -> np.ndarray:  # type: ignore[override]
-        """(keys, 3) float [m]."""
+        """(keys, 3) float [m], or (worlds, keys, 3)."""
         return self._path_batch.positions[self.k]
 
     @property
     def quaternions(self) -> np.ndarray:  # type: ignore[override]
-        """(keys, 4) float."""
+        """(keys, 4) float, or (worlds, keys, 4)."""
         return self._path_batch.quaternions[self.k]
 
     def as_it_is(self) -> Path:
@@ -120,7 +161,7 @@ class Schedule:
     Attributes:
         times: (k,) float [s].
         alone: By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4).
-        path_batches: Keys of bodies, n each, their positions (n, k, 3) and quaternions (n, k, 4).
+        path_batches: Keys of bodies, n each, positions (n, k, 3) and quaternions (n, k, 4), or (n, worlds, k, ...).
     """
 
     times: np.ndarray
