@@ -7,6 +7,7 @@ upper one is picked.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,6 +84,7 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
     if pixels.min() < 10 or (pixels > (629, 469)).any():
         return []
     world = World(device=device, substeps=SUBSTEPS)
+    logging.getLogger("nuno").setLevel(logging.ERROR)  # it tells that these steps make a stiff cloth softer
     world.add(box((1.0, 1.3, table.thickness), name="table", position=(0.1, 0.0, table.height - table.thickness / 2)))
     world.add(plane(name="floor"))
     cloth = world.add(cloth_mesh(placed, faces, rest, name="cloth"))
@@ -103,7 +105,7 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
     hand = begin + np.stack([reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.3, 0.5, picks)], axis=1)
     futures.grip(body, vertex[:, None], to=Path((0.1, 1.6), np.stack([begin, hand], axis=1), None, "minimum_jerk"))
     futures.run(1.6 + rng.uniform(1.5, 2.5), progress=False)
-    after = futures.masks(camera, body).numpy()
+    after = futures.masks(camera, body).numpy().reshape(picks, camera.height, camera.width)
     area = 0.5 * np.linalg.norm(np.cross(*(rest[faces[:, k]] - rest[faces[:, 0]] for k in (1, 2))), axis=1).sum()
     cases = []
     for k in range(picks):

@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from nuno.bodies.body import Body
+from nuno.bodies.garment import Garment, garment
 from nuno.bodies.make_bodies import (
     box,
     capsule,
