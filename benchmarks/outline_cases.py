@@ -47,9 +47,11 @@ def cut(shape: str, rng: np.random.Generator, layers: int, scale: float) -> tupl
         flat = np.pad(points - points.mean(axis=0), ((0, 0), (0, 1)))
         return flat, faces, flat
     usual = garment(shape)
-    made = garment(shape, cell=0.027 * size**0.5, **{
-        name: value * (1.0 if name == "slope" else size * rng.uniform(0.93, 1.07)) for name, value in usual.measures.items()
-    })  # fmt: skip
+    sizes = {
+        name: value * (1.0 if name == "slope" else size * rng.uniform(0.93, 1.07))
+        for name, value in usual.measures.items()
+    }
+    made = garment(shape, cell=0.027 * size**0.5, **sizes)
     if layers == 2 or made.layers == 1:
         return made.vertices, made.faces, made.rest
     front = made.faces[made.face_layer == 0]

@@ -83,6 +83,9 @@ if TYPE_CHECKING:
     from nuno.estimate.footage import Footage
     from nuno.estimate.hand_path import HandPath
     from nuno.estimate.hand_tracking import HandTrack, track_hands
+    from nuno.estimate.hold import estimate_hold
+    from nuno.estimate.hold_result import HoldResult
+    from nuno.estimate.imagined_holds import HoldGuess, Holds, imagine_holds
     from nuno.estimate.layers import Layers, find_layers
     from nuno.estimate.pick import estimate_pick
     from nuno.estimate.pick_result import PickResult
@@ -163,12 +166,16 @@ __all__ = [
     "FoldResult",
     "Footage",
     "Footstep",
+    "Garment",
     "Goal",
     "Grip",
     "Hand",
     "HandPath",
     "HandTrack",
     "HeadCameras",
+    "HoldGuess",
+    "HoldResult",
+    "Holds",
     "Hull",
     "Humanoid",
     "ImageError",
@@ -266,13 +273,16 @@ __all__ = [
     "draw",
     "each",
     "elements",
+    "estimate_hold",
     "estimate_pick",
     "export_body",
     "find_layers",
     "fit_material",
     "fitted_tetrahedra",
     "fixed_joint",
+    "garment",
     "hinge",
+    "imagine_holds",
     "improve_fold",
     "lattice_tetrahedra",
     "lift_soft_cube",
@@ -327,6 +337,9 @@ _LAZY = {
         "nuno.estimate.footage": "Footage",
         "nuno.estimate.hand_path": "HandPath",
         "nuno.estimate.hand_tracking": "HandTrack track_hands",
+        "nuno.estimate.hold": "estimate_hold",
+        "nuno.estimate.hold_result": "HoldResult",
+        "nuno.estimate.imagined_holds": "HoldGuess Holds imagine_holds",
         "nuno.estimate.layers": "Layers find_layers",
         "nuno.estimate.pick": "estimate_pick",
         "nuno.estimate.pick_result": "PickResult",

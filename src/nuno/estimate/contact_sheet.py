@@ -38,8 +38,8 @@ def contact_sheet(result: PickResult) -> Figure:
     _real(figure.add_subplot(above[1]), result, after=True)
     _imagined(figure, figure.add_subplot(sheet[1]), result, n, m)
     figure.suptitle(
-        f"picked at {_name(result, result.best)}, confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
-        f"{result.rectangle.short_m * 100:.1f} cm; best future turned by "
+        f"picked at {_name(result, result.best)}, confidence {result.confidence:.2f}; cloth "
+        f"{result.rectangle.long_m * 100:.1f} x {result.rectangle.short_m * 100:.1f} cm; best future turned by "
         f"{np.degrees(result.turn):.0f} degrees\nbelow: real outline orange, imagined blue, both pale;  "
         f"rank: {'position' if result.by_position else '(i, j)'}  {result.score_name} | eq. (1)",
         fontsize=9, y=1.0 - 0.08 / height, va="top",
@@ -67,8 +67,9 @@ def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) ->
         x, y = column * across + below[1], row * down + below[0]
         image[y : y + high, x : x + columns] = _compared(result.real.mask[y0:y1, x0:x1], result.masks[k, y0:y1, x0:x1])
         rank = int(np.nonzero(result.order == k)[0][0]) + 1
+        name = _name(result, label)
         axes.text(
-            x + 0.5 * columns, y - 0.03 * high, f"{rank}: {_name(result, label)}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}",
+            x + 0.5 * columns, y - 0.03 * high, f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}",
             fontsize=6.5, weight="bold" if rank == 1 else "normal", ha="center", va="bottom",
         )  # fmt: skip
         color, line = ("#b3261e", 2.5) if rank == 1 else ("#cccccc", 0.6)

@@ -45,7 +45,10 @@ def outline_points(cloth: ClothOutline, spacing: float) -> np.ndarray:
 
 
 def usual_spacing(cloth: ClothOutline) -> float:
-    """Return the spacing [m] that gives about `USUAL` candidates: n = length / s + (area - length s / 2) / (s^2 0.87)."""
+    """Return the spacing [m] that gives about `USUAL` candidates.
+
+    Of a spacing s there are about n = length / s + (area - length s / 2) / (0.87 s^2).
+    """
     length, area, cell = cloth.perimeter, cloth.area, np.sqrt(0.75)
     half = 0.5 * length * (1.0 - 0.5 / cell)
     spacing = (half + np.sqrt(half**2 + USUAL * area / cell)) / USUAL
@@ -83,7 +86,8 @@ def with_outline_candidates(settings: PickSettings, cloth: ClothRectangle, spaci
         if cloth.perimeter / wanted + cloth.area / wanted**2 > MAX_CANDIDATES:
             raise InvalidInputError(f"spacing {wanted:g} m gives more than {MAX_CANDIDATES} candidates on this cloth")
         positions = outline_points(cloth, wanted)
-    return replace(settings, labels=positions, uv=positions / sides, grid=(2, 2))
+    # what a network has learned of rectangles is not asked about other shapes
+    return replace(settings, labels=positions, uv=positions / sides, grid=(2, 2), learned=False)
 
 
 def nearest_on_outline(polygon: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -68,11 +68,11 @@ def estimate_pick(
 ) -> PickResult:
     """Estimate where a flat cloth was picked up, from an image before and one after.
 
-    The cloth's rectangle, or the outline that it has, is measured in the image before. Then every candidate is picked in simulation under a few
-    guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it
-    and compared with the real silhouette. Where both images are given, the cloth's pattern is carried along and
-    compared too, each at several turns about the hand's vertical. What counts is how likely all this is, averaged over
-    all guesses.
+    The cloth's rectangle, or the outline that it has, is measured in the image before. Then every candidate is picked
+    in simulation under a few guesses at the material, on several meshes, and moved to the hand; each result is drawn as
+    the camera would see it and compared with the real silhouette. Where both images are given, the cloth's pattern is
+    carried along and compared too, each at several turns about the hand's vertical. What counts is how likely all this
+    is, averaged over all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -101,7 +101,8 @@ def estimate_pick(
         turns: Angles [rad] about the hand's vertical by which every future is turned to be compared, 0 among them;
             "chamfer", "iou" and "eq1" look at 0 only.
         learned: Whether a network that was trained on imagined picks has a say in the likelihood of silhouettes
-            (`nuno.estimate.learned`); "chamfer", "iou" and "eq1" are without it.
+            (`nuno.estimate.learned`), of rectangular cloths alone, such as it was trained on; "chamfer", "iou" and
+            "eq1" are without it.
         sideways: How far sideways the hand went, as a share of how high it went, which half of all lifts are taken to
             stay below: points about under the hand are likelier before the image after is seen
             (`nuno.estimate.lift_prior`). None takes all candidates as alike: right where the hand was led to the side

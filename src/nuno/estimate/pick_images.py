@@ -68,7 +68,10 @@ def read_images(
 
 
 def find_cloth_before(
-    images: PickImages, rectangle: ClothRectangle | None, hint: ArrayLike | None, settings: PickSettings,
+    images: PickImages,
+    rectangle: ClothRectangle | None,
+    hint: ArrayLike | None,
+    settings: PickSettings,
     shape: str = "auto",
 ) -> tuple[PickImages, ClothRectangle]:
     """Find the cloth's mask and rectangle, or outline, in the image before, as far as they are needed and not given.

@@ -1,8 +1,8 @@
 """Patterns of garments: the outlines of flat panels, and which of their sides are sewn to each other.
 
-A pattern's panels lie in the plane, x to the wearer's left and y up. Where a garment is symmetric, sides are those of its
-half x >= 0, anticlockwise from the middle below to the middle above. The shapes are of our own drawing, with nominal
-measures.
+A pattern's panels lie in the plane, x to the wearer's left and y up. Where a garment is symmetric, sides are those of
+its half x >= 0, anticlockwise from the middle below to the middle above. The shapes are of our own drawing, with
+nominal measures.
 """
 
 from __future__ import annotations
