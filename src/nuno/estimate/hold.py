@@ -21,7 +21,7 @@ from nuno.estimate.hold_views import HoldView, compare_holds, hold_mask, hold_vi
 from nuno.estimate.imagined_holds import Holds, imagine_holds
 from nuno.validation import checked, count, finite_array, instance, number
 
-TURNS = 36
+TURNS = 24
 """Turns about the vertical at which garments are compared, over the whole circle."""
 MAX_IMAGES = 16
 
