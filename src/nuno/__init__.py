@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from nuno.bodies.body import Body
+from nuno.bodies.garment import Garment, garment
 from nuno.bodies.make_bodies import (
     box,
     capsule,
@@ -93,6 +94,9 @@ if TYPE_CHECKING:
     from nuno.estimate.footage import Footage
     from nuno.estimate.hand_path import HandPath
     from nuno.estimate.hand_tracking import HandTrack, track_hands
+    from nuno.estimate.hold import estimate_hold
+    from nuno.estimate.hold_result import HoldResult
+    from nuno.estimate.imagined_holds import HoldGuess, Holds, imagine_holds
     from nuno.estimate.layers import Layers, find_layers
     from nuno.estimate.pick import estimate_pick
     from nuno.estimate.pick_result import PickResult
@@ -182,12 +186,16 @@ __all__ = [
     "Footage",
     "Footstep",
     "FoundShape",
+    "Garment",
     "Goal",
     "Grip",
     "Hand",
     "HandPath",
     "HandTrack",
     "HeadCameras",
+    "HoldGuess",
+    "HoldResult",
+    "Holds",
     "Hull",
     "Humanoid",
     "ImageError",
@@ -293,6 +301,7 @@ __all__ = [
     "draw",
     "each",
     "elements",
+    "estimate_hold",
     "estimate_pick",
     "export_body",
     "find_layers",
@@ -301,8 +310,10 @@ __all__ = [
     "fit_material",
     "fitted_tetrahedra",
     "fixed_joint",
+    "garment",
     "hinge",
     "image_quality",
+    "imagine_holds",
     "improve_fold",
     "lattice_tetrahedra",
     "lift_soft_cube",
@@ -368,6 +379,9 @@ _LAZY = {
         "nuno.estimate.footage": "Footage",
         "nuno.estimate.hand_path": "HandPath",
         "nuno.estimate.hand_tracking": "HandTrack track_hands",
+        "nuno.estimate.hold": "estimate_hold",
+        "nuno.estimate.hold_result": "HoldResult",
+        "nuno.estimate.imagined_holds": "HoldGuess Holds imagine_holds",
         "nuno.estimate.layers": "Layers find_layers",
         "nuno.estimate.pick": "estimate_pick",
         "nuno.estimate.pick_result": "PickResult",

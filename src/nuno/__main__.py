@@ -36,6 +36,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--sideways", metavar="SHARE", default=str(SIDEWAYS),
         help=f"how far sideways hands go that lift a cloth, as a share of how high; none: any way (default {SIDEWAYS})",
     )  # fmt: skip
+    pick.add_argument(
+        "--shape", choices=("auto", "rectangle", "outline"), default="auto",
+        help="auto (default) takes a rectangular cloth as a rectangle, any other by its outline; outline: any as it is",
+    )  # fmt: skip
+    pick.add_argument("--spacing", type=float, metavar="M", help="of candidates on an outline [m] (default: about 40)")
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
@@ -124,12 +129,14 @@ def _pick(options: argparse.Namespace) -> int:
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
     result = case.estimate(
-        candidates=grid, sideways=sideways, device=options.device, engine=options.engine, progress=options.progress
-    )
+        candidates=grid, sideways=sideways, shape=options.shape, spacing=options.spacing, device=options.device,
+        engine=options.engine, progress=options.progress,
+    )  # fmt: skip
     result.save(options.out)
-    i, j = result.best
+    a, b = result.best
+    place = f"({100.0 * a:.1f}, {100.0 * b:.1f}) cm from C00" if result.by_position else f"({a}, {b})"
     sys.stdout.write(
-        f"picked at ({i}, {j}), confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
+        f"picked at {place}, confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'} and result.png\n"
     )
     return ANSWERED

@@ -112,7 +112,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
     if not mask.any():
         raise ClothNotFoundError("the mask is empty, so there is no cloth to measure")
     warnings: list[str] = []
-    mask = _main_part(mask, warnings)
+    mask = main_part(mask, warnings)
     pose = _spanning(mask, camera, plane_height)
     soft_mask = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     for _ in range(3):
@@ -130,7 +130,8 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
     return _labelled(pose, camera, plane_height, residual, warnings)
 
 
-def _main_part(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
+def main_part(mask: np.ndarray, warnings: list[str]) -> np.ndarray:
+    """Return the largest part of a mask (h, w) that is not empty; a warning is added where others are not tiny."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA]
     if areas.max() < 0.95 * areas.sum():
@@ -268,6 +269,24 @@ def _judge_shape(mask: np.ndarray, pose: _Pose, camera: Camera, height: float, w
         )
     if overlap < 0.95:
         warnings.append(f"the cloth is not quite a rectangle: it shares {overlap:.0%} with the best one")
+
+
+def rectangle_around(points: np.ndarray, camera: Camera, height: float, warnings: list[str]) -> ClothRectangle:
+    """Return the smallest rectangle around points (n, 2) [m] of a horizontal plane, its corners by the label rule.
+
+    Args:
+        points: x and y in the world [m].
+        camera: The camera whose image the corners are named by.
+        height: z of the plane [m].
+        warnings: What there is to tell already.
+
+    Raises:
+        EstimationError: a corner behind the camera.
+    """
+    middle = points.mean(axis=0)
+    centre, size, angle = cv2.minAreaRect((points - middle).astype(np.float32))
+    pose = _Pose(middle + centre, float(np.deg2rad(angle)), np.array(size, dtype=float))
+    return _labelled(pose, camera, height, 0.0, warnings)
 
 
 def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warnings: list[str]) -> ClothRectangle:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from nuno.camera.cloth_outline import ClothOutline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,12 +37,11 @@ def contact_sheet(result: PickResult) -> Figure:
     _real(figure.add_subplot(above[0]), result, after=False)
     _real(figure.add_subplot(above[1]), result, after=True)
     _imagined(figure, figure.add_subplot(sheet[1]), result, n, m)
-    i, j = result.best
     figure.suptitle(
-        f"picked at ({i}, {j}), confidence {result.confidence:.2f}; cloth {result.rectangle.long_m * 100:.1f} x "
-        f"{result.rectangle.short_m * 100:.1f} cm; best future turned by "
+        f"picked at {_name(result, result.best)}, confidence {result.confidence:.2f}; cloth "
+        f"{result.rectangle.long_m * 100:.1f} x {result.rectangle.short_m * 100:.1f} cm; best future turned by "
         f"{np.degrees(result.turn):.0f} degrees\nbelow: real outline orange, imagined blue, both pale;  "
-        f"rank: (i, j)  {result.score_name} | eq. (1)",
+        f"rank: {'position' if result.by_position else '(i, j)'}  {result.score_name} | eq. (1)",
         fontsize=9, y=1.0 - 0.08 / height, va="top",
     )  # fmt: skip
     return figure
@@ -66,7 +67,7 @@ def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) ->
         x, y = column * across + below[1], row * down + below[0]
         image[y : y + high, x : x + columns] = _compared(result.real.mask[y0:y1, x0:x1], result.masks[k, y0:y1, x0:x1])
         rank = int(np.nonzero(result.order == k)[0][0]) + 1
-        name = f"({label[0]}, {label[1]})" if on_grid else f"({label[0]:.2f}, {label[1]:.2f})"
+        name = _name(result, label)
         axes.text(
             x + 0.5 * columns, y - 0.03 * high, f"{rank}: {name}  {result.scores[k]:.2f} | {result.eq1[k]:.3f}",
             fontsize=6.5, weight="bold" if rank == 1 else "normal", ha="center", va="bottom",
@@ -77,6 +78,14 @@ def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) ->
     _bare(axes)
     axes.set_frame_on(False)
     axes.imshow(image, interpolation="nearest")
+
+
+def _name(result: PickResult, label: Any) -> str:
+    """A candidate's label as the sheet shows it: (i, j), fractions, or a position in cm."""
+    a, b = label
+    if result.by_position:
+        return f"({100.0 * a:.0f}, {100.0 * b:.0f}) cm"
+    return f"({a}, {b})" if np.issubdtype(result.labels.dtype, np.integer) else f"({a:.2f}, {b:.2f})"
 
 
 def _near_square(count: int) -> tuple[int, int]:
@@ -117,14 +126,17 @@ def _real(axes: Axes, result: PickResult, *, after: bool) -> None:
         axes.contour(mask.astype(float), levels=[0.5], colors=["#00e5ff"], linewidths=1.0)
     if not after:
         corners = result.rectangle.corners
-        uv = np.asarray(result.labels, dtype=float)
-        if np.issubdtype(result.labels.dtype, np.integer):
-            uv = uv / (np.asarray(result.grid) - 1)
+        uv = result.fractions
         points = corners[0] + uv[:, :1] * (corners[1] - corners[0]) + uv[:, 1:] * (corners[3] - corners[0])
         pixels = result.camera.project(points)
         axes.plot(
             pixels[:, 0], pixels[:, 1], ".", color="white", markersize=4, markeredgecolor="black", markeredgewidth=0.4
         )
+        if isinstance(result.rectangle, ClothOutline):
+            around = result.camera.project(np.concatenate([result.rectangle.outline, result.rectangle.outline[:1]]))
+            axes.plot(around[:, 0], around[:, 1], "-", color="#ffb300", linewidth=0.8)
+            ring = result.camera.project(np.concatenate([corners, corners[:1]]))
+            axes.plot(ring[:, 0], ring[:, 1], ":", color="white", linewidth=0.8)
         u, v = pixels[result.order[0]]
         axes.plot(u, v, "o", color="none", markeredgecolor="#b3261e", markersize=10, markeredgewidth=2)
         for k, name in ((0, "C00"), (1, "CI"), (3, "CJ")):

@@ -10,9 +10,11 @@ import numpy as np
 
 from nuno.bodies.dynamics import ParticleDynamics
 from nuno.bodies.make_bodies import box, plane, sheet
+from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.hypotheses import Discretisation, cell_counts
+from nuno.estimate.outline_body import grips_on, outline_body
 from nuno.materials import Cloth
 from nuno.shapes.path import Path
 from nuno.shapes.surface import SurfacePoints
@@ -92,6 +94,8 @@ def table_world(
             world.add(plane(name="floor"))
     else:
         world.add(plane(name="table", position=(0.0, 0.0, table.height)))
+    if isinstance(rectangle, ClothOutline):
+        return world, world.add(outline_body(rectangle, max(cells), BODY_NAME))
     along = rectangle.corners[1] - rectangle.corners[0]
     cloth = sheet((rectangle.long_m, rectangle.short_m), cells=cells, name=BODY_NAME, position=rectangle.centre)
     cloth.rotate(math.atan2(along[1], along[0]), (0.0, 0.0, 1.0), wrt="world")
@@ -120,6 +124,8 @@ def begin_picks(
 ) -> Futures:
     """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
+    if isinstance(rectangle, ClothOutline):
+        cells = (discretisation.cells, 1)
     substeps = discretisation.substeps if engine == "nuno" else None  # they are those of Nuno's solver
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=substeps)
     k, hypotheses = len(candidates), discretisation.hypotheses
@@ -148,16 +154,18 @@ def begin_picks(
         uv[:, 1] = 1.0 - uv[:, 1]
     at = uv * cells
     start = np.asarray(body.vertices)[0]
-    if np.abs(at - np.round(at)).max() < 1e-6:
+    where: np.ndarray | SurfacePoints
+    if isinstance(rectangle, ClothOutline):
+        points, begin = grips_on(rectangle, np.asarray(candidates, dtype=float), cloth)
+        where = _each_hypothesis(points, len(hypotheses))
+    elif np.abs(at - np.round(at)).max() < 1e-6:
         vertex = np.round(at[:, 1]).astype(int) * (cells[0] + 1) + np.round(at[:, 0]).astype(int)
-        where: np.ndarray | SurfacePoints = np.tile(vertex, len(hypotheses))[:, None]
+        where = np.tile(vertex, len(hypotheses))[:, None]
         begin = start[vertex]
     else:
         points = cloth.at(uv[:, 0], uv[:, 1])
         begin = points.positions(start, np.asarray(body.faces))
-        where = SurfacePoints(
-            np.tile(points.faces, len(hypotheses)), np.tile(points.barycentric, (len(hypotheses), 1))
-        ).per_world()
+        where = _each_hypothesis(points, len(hypotheses))
     ends = np.broadcast_to(np.asarray(hand, dtype=float), begin.shape)
     path = Path(
         np.array((0.0, lift_seconds)),
@@ -167,6 +175,11 @@ def begin_picks(
     )
     futures.grip(body, where, to=path)
     return Futures(futures, body, world, k, discretisation)
+
+
+def _each_hypothesis(points: SurfacePoints, count: int) -> SurfacePoints:
+    """Return k points as one for each world, of ``count`` hypotheses one after the other."""
+    return SurfacePoints(np.tile(points.faces, count), np.tile(points.barycentric, (count, 1))).per_world()
 
 
 def imagine_picks(

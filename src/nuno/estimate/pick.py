@@ -19,6 +19,8 @@ from nuno.estimate.compile_ahead import compile_ahead
 from nuno.estimate.futures import LIFT_SECONDS
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.lift_prior import SIDEWAYS
+from nuno.estimate.outline_candidates import with_outline_candidates
+from nuno.estimate.outline_or_rectangle import SHAPES
 from nuno.estimate.pick_images import PickImages, find_cloth_before, read_images
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_settings import PickSettings, check_settings, check_table
@@ -27,6 +29,7 @@ from nuno.estimate.ranking import SURE
 from nuno.estimate.rotations import TURNS
 from nuno.estimate.seeing import begin_to_see
 from nuno.kernels.compile_watch import Stages, compiling_watched
+from nuno.validation import choice, number
 from nuno.world.progress import with_clock
 
 log = logging.getLogger(__name__)
@@ -57,6 +60,8 @@ def estimate_pick(
     turns: Sequence[float] = TURNS,
     learned: bool = True,
     sideways: float | None = SIDEWAYS,
+    shape: str = "auto",
+    spacing: float | None = None,
     score: str = "evidence",
     device: str = "auto",
     engine: str = "nuno",
@@ -64,11 +69,11 @@ def estimate_pick(
 ) -> PickResult:
     """Estimate where a flat cloth was picked up, from an image before and one after.
 
-    The cloth's rectangle is measured in the image before. Then every candidate is picked in simulation under a few
-    guesses at the material, on several meshes, and moved to the hand; each result is drawn as the camera would see it
-    and compared with the real silhouette. Where both images are given, the cloth's pattern is carried along and
-    compared too, each at several turns about the hand's vertical. What counts is how likely all this is, averaged over
-    all guesses.
+    The cloth's rectangle, or the outline that it has, is measured in the image before. Then every candidate is picked
+    in simulation under a few guesses at the material, on several meshes, and moved to the hand; each result is drawn as
+    the camera would see it and compared with the real silhouette. Where both images are given, the cloth's pattern is
+    carried along and compared too, each at several turns about the hand's vertical. What counts is how likely all this
+    is, averaged over all guesses.
 
     Args:
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
@@ -81,7 +86,7 @@ def estimate_pick(
         table_centre: x, y of the top's middle [m].
         table_thickness: Thickness of the top [m].
         candidates: A grid (n along the longer side, m along the shorter), or points (k, 2) as fractions (u, v) of the
-            sides from corner C00.
+            sides from corner C00. A cloth that is no rectangle has no grid: see ``shape``.
         rest_height: Height of the cloth's middle surface above the table [m].
         hand_radius: Radius of what hides the cloth around the hand [m].
         lift_seconds: Duration of the hand's straight motion with minimum jerk [s].
@@ -97,11 +102,17 @@ def estimate_pick(
         turns: Angles [rad] about the hand's vertical by which every future is turned to be compared, 0 among them;
             "chamfer", "iou" and "eq1" look at 0 only.
         learned: Whether a network that was trained on imagined picks has a say in the likelihood of silhouettes
-            (`nuno.estimate.learned`); "chamfer", "iou" and "eq1" are without it.
+            (`nuno.estimate.learned`), of rectangular cloths alone, such as it was trained on; "chamfer", "iou" and
+            "eq1" are without it.
         sideways: How far sideways the hand went, as a share of how high it went, which half of all lifts are taken to
             stay below: points about under the hand are likelier before the image after is seen
             (`nuno.estimate.lift_prior`). None takes all candidates as alike: right where the hand was led to the side
             on purpose. "chamfer", "iou" and "eq1" are without it.
+        shape: "auto" takes a rectangular cloth as a rectangle and any other by its outline, with a warning;
+            "rectangle" refuses others; "outline" takes any by its outline. A cloth that is taken by its outline has
+            candidates along it and inside, labelled by their positions [m] along the longer and shorter side of the
+            smallest rectangle around it, from that one's corner C00 (docs/picks.md).
+        spacing: Of an outline's candidates [m]; None gives about 40 of them.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -119,6 +130,8 @@ def estimate_pick(
         MissingPackageError: its package is not installed.
         EngineCapabilityError: it cannot do that, or not on the device.
     """
+    if spacing is not None:
+        number("spacing", spacing, above=0.0)
     stages = Stages("read", "see", "compile", "imagine", "compare")
     settings = check_settings(
         table=check_table(table_height, table_half_extents, table_centre, table_thickness), camera=camera, hand=hand,
@@ -129,7 +142,8 @@ def estimate_pick(
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
-    images, rectangle = find_cloth_before(images, rectangle, hint, settings)
+    images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES))
+    settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(
         images.before, images.after, images.mask_before, images.mask_after, camera=settings.camera,
         table=settings.table, rectangle=rectangle, hand=settings.hand, hand_radius=hand_radius, hidden=images.hidden,

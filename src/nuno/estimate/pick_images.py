@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, check_mask, read_image
-from nuno.camera.rectangle import ClothRectangle, fit_rectangle
+from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
 from nuno.errors import InvalidInputError
+from nuno.estimate.outline_or_rectangle import fit_cloth
 from nuno.estimate.pick_settings import PickSettings
 
 RIM = 0.006
@@ -67,9 +68,13 @@ def read_images(
 
 
 def find_cloth_before(
-    images: PickImages, rectangle: ClothRectangle | None, hint: ArrayLike | None, settings: PickSettings
+    images: PickImages,
+    rectangle: ClothRectangle | None,
+    hint: ArrayLike | None,
+    settings: PickSettings,
+    shape: str = "auto",
 ) -> tuple[PickImages, ClothRectangle]:
-    """Find the cloth's mask and rectangle in the image before, as far as they are needed and not given.
+    """Find the cloth's mask and rectangle, or outline, in the image before, as far as they are needed and not given.
 
     Raises:
         InvalidInputError: too little is given to find the cloth before or after.
@@ -82,7 +87,8 @@ def find_cloth_before(
         images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
     if rectangle is None:
         assert images.mask_before is not None
-        rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
+        height = table.height + settings.rest_height
+        rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
         over = _border_warning(images.mask_before, camera, table)
         if over is not None:
             rectangle = replace(rectangle, warnings=(*rectangle.warnings, over))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.camera.camera import Camera
+from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.ranking import confidence, probabilities
 from nuno.estimate.rotations import turn
@@ -38,14 +39,15 @@ class PickResult:
     """The estimate of where a cloth was picked up: a ranking of the candidates.
 
     Attributes:
-        labels: (k, 2) the candidates: (i, j) of a grid, or the (u, v) that were given.
+        labels: (k, 2) the candidates: (i, j) of a grid, or the (u, v) that were given; of a cloth that is taken by its
+            outline positions [m] along the longer and shorter side of its smallest rectangle, from C00.
         order: (k,) int, candidates from best to worst.
         scores: (k,) float by candidate, higher is better.
         score_name: What the scores are: "log_evidence" (of silhouettes) or "log_evidence_with_pattern", both with the
             prior of the lift unless ``sideways`` was None, "negative_chamfer_px" (minus the symmetric mean contour
             distance in pixels of the image), "iou", "eq1".
         eq1: (k,) float by candidate, the similarity of the paper's eq. (1), of futures that are not turned.
-        rectangle: The cloth as it lay before.
+        rectangle: The cloth as it lay before, a ``ClothOutline`` where it was taken by its outline.
         camera: The camera.
         grid: Candidates along both sides; (2, 2) where points were given.
         seconds: Wall time by stage [s].
@@ -98,8 +100,21 @@ class PickResult:
 
     @property
     def best(self) -> tuple[Any, Any]:
-        """The best candidate, (i, j) of the grid or (u, v)."""
+        """The best candidate, (i, j) of the grid, (u, v), or the position [m] on a cloth taken by its outline."""
         return self._label(int(self.order[0]))
+
+    @property
+    def by_position(self) -> bool:
+        """Return True if candidates are labelled by position [m], as of a cloth that is taken by its outline."""
+        return isinstance(self.rectangle, ClothOutline)
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """(k, 2) float, the candidates as fractions of the (smallest rectangle's) sides, from C00."""
+        if self.by_position:
+            return np.asarray(self.labels / (self.rectangle.long_m, self.rectangle.short_m))
+        on_grid = np.issubdtype(self.labels.dtype, np.integer)
+        return np.asarray(self.labels, dtype=float) / ((np.asarray(self.grid) - 1) if on_grid else 1)
 
     @property
     def ranking(self) -> list[tuple[Any, Any, float]]:
@@ -171,7 +186,7 @@ class PickResult:
     def to_dict(self) -> dict[str, Any]:
         """The answer as plain data, as it is written to result.json."""
         likely = self.probabilities
-        return {
+        found: dict[str, Any] = {
             "format": 1,
             "pick": list(self.best),
             # JSON has no infinity: a future that diverged counts as worse than any other
@@ -190,6 +205,10 @@ class PickResult:
             },
             "seconds": {name: round(value, 4) for name, value in self.seconds.items()},
         }
+        if isinstance(self.rectangle, ClothOutline):
+            found["labels"] = "position_m"
+            found["cloth"] |= {"outline_m": self.rectangle.polygon.tolist(), "area_m2": self.rectangle.area}
+        return found
 
     def figure(self) -> Figure:
         """A contact sheet: the real images, and every candidate's future under the real outline."""

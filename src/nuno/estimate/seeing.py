@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nuno.camera.camera import Camera
+from nuno.camera.cloth_outline import cloth_colours
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.segmentation import look_after
 from nuno.camera.table import Table
@@ -88,7 +89,8 @@ def begin_to_see(
         coarse = _silhouette(mask, camera, ignored, TURNED_SCALE)
         pattern = None
         if with_pattern and before is not None and after is not None:
-            pattern = find_pattern(before, after, mask & ~ignored, rectangle, camera, hand)
+            colours = cloth_colours(before, mask_before, rectangle)
+            pattern = find_pattern(colours, after, mask & ~ignored, rectangle, camera, hand)
         return Seen(mask, ignored, small, silhouette, coarse, pattern, _oddities(mask, ignored) + _doubts(mask, doubt))
 
     if not meanwhile:

@@ -1,0 +1,124 @@
+"""Picked cloths of any outline, made with Nuno's own engine on triangles of another size and with another step.
+
+A scene is one flat cloth cut as a garment's front, an L, or a towel with round corners, on one table before one camera.
+Masks only, their edges displaced by smooth noise as in ``generated_cases``. Garments may have both layers, of which the
+upper one is picked.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from generated_cases import HAND_RADIUS, REST_HEIGHT, displaced, looking_at
+
+from nuno import Cloth, Path, World, box, cloth_mesh, garment, plane
+from nuno.camera.camera import Camera
+from nuno.camera.table import Table
+from nuno.mesh.triangulated import triangulate
+
+SHAPES = ("t-shirt", "trousers", "sock", "apron", "L", "towel")
+SUBSTEPS = 35
+SCALE = {"t-shirt": 0.8, "trousers": 0.7, "sock": 1.2, "apron": 0.75, "L": 1.0, "towel": 0.9}
+
+
+@dataclass
+class OutlineCase:
+    """One pick: what an estimator may see, and the truth."""
+
+    shape: str
+    camera: Camera
+    table: Table
+    hand: np.ndarray
+    mask_before: np.ndarray
+    mask_after: np.ndarray
+    picked: np.ndarray
+    """(3,) where the picked point was [m]."""
+    area: float
+
+
+def cut(shape: str, rng: np.random.Generator, layers: int, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return vertices (n, 3), faces (m, 3) and rest (n, 3) of a flat cloth around the origin, upper vertices first."""
+    size = SCALE[shape] * scale
+    if shape == "L":
+        a, b, c, d = 0.5 * size, 0.45 * size, 0.2 * size, 0.18 * size
+        points, faces, _ = triangulate(np.array([(0, 0), (a, 0), (a, c), (d, c), (d, b), (0, b)]), 0.023 * size)
+        flat = np.pad(points - points.mean(axis=0), ((0, 0), (0, 1)))
+        return flat, faces, flat
+    usual = garment(shape)
+    sizes = {
+        name: value * (1.0 if name == "slope" else size * rng.uniform(0.93, 1.07))
+        for name, value in usual.measures.items()
+    }
+    made = garment(shape, cell=0.027 * size**0.5, **sizes)
+    if layers == 2 or made.layers == 1:
+        return made.vertices, made.faces, made.rest
+    front = made.faces[made.face_layer == 0]
+    used = np.unique(front)
+    number = np.zeros(len(made.rest), dtype=int)
+    number[used] = np.arange(len(used))
+    return made.rest[used], number[front], made.rest[used]
+
+
+def generate(shapes: tuple[str, ...], picks: int, seed: int, device: str = "cpu", layers: int = 1) -> list[OutlineCase]:
+    """Make ``picks`` cases of each shape; the same seed makes the same cases on one device."""
+    cases: list[OutlineCase] = []
+    for k, shape in enumerate(shapes):
+        rng = np.random.default_rng((seed, k))
+        made: list[OutlineCase] = []
+        while not made:
+            made = _scene(shape, rng, picks, device, layers)
+        cases += made
+    return cases
+
+
+def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers: int) -> list[OutlineCase]:
+    table = Table(rng.uniform(0.70, 0.76), (0.5, 0.65), (0.1, 0.0))
+    eye = np.array([rng.uniform(-1.0, -0.8), rng.uniform(-0.12, 0.14), table.height + rng.uniform(0.55, 0.75)])
+    camera = looking_at(eye, np.array([0.1, 0.0, table.height + 0.1]), rng.uniform(430, 520))
+    vertices, faces, rest = cut(shape, rng, layers, rng.uniform(0.9, 1.05))
+    yaw = rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    low = table.height + REST_HEIGHT - vertices[:, 2].min()
+    placed = vertices @ turn.T + (rng.uniform(0.02, 0.12), rng.uniform(-0.05, 0.05), low)
+    pixels = camera.project(placed)
+    if pixels.min() < 10 or (pixels > (629, 469)).any():
+        return []
+    world = World(device=device, substeps=SUBSTEPS)
+    logging.getLogger("nuno").setLevel(logging.ERROR)  # it tells that these steps make a stiff cloth softer
+    world.add(box((1.0, 1.3, table.thickness), name="table", position=(0.1, 0.0, table.height - table.thickness / 2)))
+    world.add(plane(name="floor"))
+    cloth = world.add(cloth_mesh(placed, faces, rest, name="cloth"))
+    before = world.masks(camera, cloth).numpy()
+    futures = world.imagine(picks)
+    body = futures.find("cloth")
+    material = dict(
+        bending_rigidity=np.exp(rng.uniform(np.log(2e-5), np.log(1e-3), picks)),
+        area_density=rng.uniform(0.1, 0.3, picks), friction=rng.uniform(0.2, 0.8, picks),
+        thickness=rng.uniform(0.002, 0.0045, picks), air_drag=rng.uniform(0.5, 3.0, picks),
+    )  # fmt: skip
+    futures.find("table").friction = futures.find("floor").friction = material["friction"]
+    futures.attach(body, Cloth(**material))
+    upper = np.flatnonzero(placed[:, 2] > placed[:, 2].max() - 0.004)
+    vertex = rng.choice(upper, picks, replace=False)
+    begin = placed[vertex]
+    angle, reach = rng.uniform(0, 2 * np.pi, picks), rng.uniform(0.0, 0.12, picks)
+    hand = begin + np.stack([reach * np.cos(angle), reach * np.sin(angle), rng.uniform(0.3, 0.5, picks)], axis=1)
+    futures.grip(body, vertex[:, None], to=Path((0.1, 1.6), np.stack([begin, hand], axis=1), None, "minimum_jerk"))
+    futures.run(1.6 + rng.uniform(1.5, 2.5), progress=False)
+    after = futures.masks(camera, body).numpy().reshape(picks, camera.height, camera.width)
+    area = 0.5 * np.linalg.norm(np.cross(*(rest[faces[:, k]] - rest[faces[:, 0]] for k in (1, 2))), axis=1).sum()
+    cases = []
+    for k in range(picks):
+        u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+        centre, radius = camera.project(hand[k]), HAND_RADIUS * camera.fx / camera.depth_of(hand[k])
+        cover = (u - centre[0]) ** 2 + (v - centre[1]) ** 2 <= radius**2
+        rim = np.concatenate([after[k][0], after[k][-1], after[k][:, 0], after[k][:, -1]])
+        if rim.any() or after[k].sum() < 300:
+            continue
+        cases.append(OutlineCase(
+            shape, camera, table, hand[k], displaced(before, rng), displaced(after[k] & ~cover, rng, cover), begin[k],
+            float(area),
+        ))  # fmt: skip
+    return cases
