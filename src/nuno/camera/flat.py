@@ -90,8 +90,29 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
         if failed is None or 0.9 * other.sum() < on < 0.9 * surface.sum():
             return other, even
     if failed is not None:
+        # A cloth that hangs over the table's near border may fill most of the border's pixels.
+        with suppress(ClothNotFoundError):
+            return _beside_far_rim(small, rim, surface, xy, camera, pixel), surface
         raise ClothNotFoundError(f"{failed}; {_HELP}") from None
     return blob, surface
+
+
+def _beside_far_rim(
+    small: np.ndarray, rim: np.ndarray, surface: np.ndarray, xy: np.ndarray, camera: Camera, pixel: np.ndarray | None
+) -> np.ndarray:
+    """What differs from the far half of the table's rim alone, (h, w) bool; the arguments are those of `first_look`."""
+    away = np.linalg.norm(xy - camera.camera_to_world[:2, 3], axis=-1)
+    far = rim & (away > 0.5 * (away[rim].min() + away[rim].max()))
+    if far.sum() < 30:
+        raise ClothNotFoundError("no cloth: too little of the table's far rim is seen")
+    light = Illumination(small, far.astype(float), degree=1)
+    flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, small.shape[0]), slice(0, small.shape[1]))))
+    distance = _difference(cv2.blur(flat, (3, 3)), far, surface)
+    found = ((distance > _DIFFERENT) & surface).astype(np.uint8)
+    blob = _choose(cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), distance, pixel, xy)
+    if blob.sum() > 0.9 * surface.sum():
+        raise ClothNotFoundError("no cloth: the whole table differs from its far rim")
+    return blob
 
 
 def _texture(rgb: np.ndarray, h: int, w: int) -> np.ndarray:

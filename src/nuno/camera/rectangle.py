@@ -14,6 +14,8 @@ from nuno.camera.image import check_image, check_mask
 from nuno.camera.rim_shadow import cloth_at_shadow
 from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 
+SQUARE = "the sides, "
+"""How a warning begins that tells of a square cloth: it names the corners, and makes no number less sure."""
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _ENDS = 0.06  # share of a side next to a corner that is not measured: there the other side bends the edge
 _MIN_SHARE = 0.2  # share of a side that must show an edge
@@ -304,7 +306,7 @@ def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warni
         a, b = pixels[order[1]] - pixels[first], pixels[order[2]] - pixels[first]
         swap = a[0] * b[1] - a[1] * b[0] < 0
         warnings.append(
-            f"the sides, {ahead:.3f} and {behind:.3f} m, are within 2 %: "
+            f"{SQUARE}{ahead:.3f} and {behind:.3f} m, are within 2 %: "
             "i runs to the next corner clockwise in the image"
         )
     else:

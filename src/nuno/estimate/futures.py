@@ -14,9 +14,9 @@ from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.estimate.hypotheses import Discretisation, cell_counts
+from nuno.estimate.lift_path import paths_of_hands
 from nuno.estimate.outline_body import grips_on, outline_body
 from nuno.materials import Cloth
-from nuno.shapes.path import Path
 from nuno.shapes.surface import SurfacePoints
 from nuno.world.world import World
 
@@ -121,6 +121,8 @@ def begin_picks(
     device: str,
     lift_seconds: float = LIFT_SECONDS,
     engine: str = "nuno",
+    hand_std: float = 0.0,
+    hand_path: np.ndarray | None = None,
 ) -> Futures:
     """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
@@ -166,14 +168,7 @@ def begin_picks(
         points = cloth.at(uv[:, 0], uv[:, 1])
         begin = points.positions(start, np.asarray(body.faces))
         where = _each_hypothesis(points, len(hypotheses))
-    ends = np.broadcast_to(np.asarray(hand, dtype=float), begin.shape)
-    path = Path(
-        np.array((0.0, lift_seconds)),
-        np.tile(np.stack([begin, ends], axis=1), (len(hypotheses), 1, 1)),
-        None,
-        "minimum_jerk",
-    )
-    futures.grip(body, where, to=path)
+    futures.grip(body, where, to=paths_of_hands(begin, hand, hypotheses, lift_seconds, hand_std, hand_path))
     return Futures(futures, body, world, k, discretisation)
 
 
@@ -194,6 +189,8 @@ def imagine_picks(
     device: str,
     lift_seconds: float = LIFT_SECONDS,
     engine: str = "nuno",
+    hand_std: float = 0.0,
+    hand_path: np.ndarray | None = None,
 ) -> Futures:
     """Pick the cloth at every candidate under every hypothesis, move it to the hand and let it come to rest.
 
@@ -206,12 +203,14 @@ def imagine_picks(
         hand: (3,) float, where the picked point ends [m].
         rest_height: Height of the cloth's middle surface above the table [m].
         device: Where to simulate.
-        lift_seconds: Duration of the hand's motion [s], on a straight line with minimum jerk.
+        lift_seconds: Duration of the hand's motion [s].
         engine: What moves the cloths.
+        hand_std: Standard deviation of where the hand is [m], by which hypotheses may be off.
+        hand_path: (k, 3) float, where the hand went [m], at even times; None: as each hypothesis says.
     """
     futures = begin_picks(
         rectangle, candidates, grid, discretisation, table=table, hand=hand, rest_height=rest_height, device=device,
-        lift_seconds=lift_seconds, engine=engine,
+        lift_seconds=lift_seconds, engine=engine, hand_std=hand_std, hand_path=hand_path,
     )  # fmt: skip
     futures.world.run(lift_seconds, progress=False)
     settled = 0.0

@@ -130,8 +130,9 @@ def correction(outline: Outline, futures: Futures, comparison: Comparison, table
     if len(guess):
         turn = error[:, guess, candidate].argmin(axis=0)
         angles = comparison.turns[turn]
+        shifts = () if comparison.shifts is None else (comparison.shifts[turn],)
         masks = masks_of_turned(
-            futures, guess * looked.shape[1] + candidate, angles, outline.camera, table, hand
+            futures, guess * looked.shape[1] + candidate, angles, outline.camera, table, hand, *shifts
         )  # fmt: skip
         pair = [values[turn, guess, candidate] for values in (comparison.chamfer, comparison.iou)]
         of_guess = described(futures.discretisation.hypotheses, futures.discretisation.cells)[guess]

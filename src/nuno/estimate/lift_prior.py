@@ -21,6 +21,25 @@ SIDEWAYS = 0.5
 """Of the way up: half of all hands are taken to go no farther sideways."""
 LOWEST = 0.2
 """[m] A hand that is not as high counts as if it were: who drags a cloth over the table does not lift it."""
+TOUCH = 0.01
+"""[m] Where a path begins tells no better than this where the cloth was touched."""
+
+
+def log_prior_of_start(rectangle: ClothRectangle, uv: ArrayLike, start: ArrayLike, std: float) -> np.ndarray:
+    """(k,) float, logarithms of how likely each candidate is where a hand's path begins, 0 straight below it.
+
+    The hand may have gone sideways by half of how high it was by then; and it is known to its standard deviation only.
+
+    Args:
+        rectangle: The cloth before.
+        uv: (k, 2) float, the candidates as fractions of the sides from corner C00.
+        start: (3,) the first point of the path [m].
+        std: Standard deviation of where a hand is [m].
+    """
+    begin, start = _places(rectangle, uv), np.asarray(start, dtype=float)
+    away = np.linalg.norm(start[:2] - begin[:, :2], axis=1)
+    up = np.maximum(start[2] - begin[:, 2], 0.0)
+    return np.asarray(-2.0 * np.log1p((away / np.hypot(SIDEWAYS * up, max(std, TOUCH))) ** 2))
 
 
 def log_prior_of_lift(rectangle: ClothRectangle, uv: ArrayLike, hand: ArrayLike, sideways: float) -> np.ndarray:
@@ -32,9 +51,14 @@ def log_prior_of_lift(rectangle: ClothRectangle, uv: ArrayLike, hand: ArrayLike,
         hand: (3,) where the picked point is now [m].
         sideways: s as a share of the height of the lift, above 0.
     """
-    uv, hand = np.asarray(uv, dtype=float), np.asarray(hand, dtype=float)
-    along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
-    begin = rectangle.corners[0] + uv[:, :1] * along + uv[:, 1:] * across
+    begin, hand = _places(rectangle, uv), np.asarray(hand, dtype=float)
     away = np.linalg.norm(hand[:2] - begin[:, :2], axis=1)
     up = np.maximum(hand[2] - begin[:, 2], LOWEST)
     return np.asarray(-2.0 * np.log1p((away / (sideways * up)) ** 2))
+
+
+def _places(rectangle: ClothRectangle, uv: ArrayLike) -> np.ndarray:
+    """(k, 3) float, where points (k, 2) of the cloth lie, in fractions of its sides [m]."""
+    fractions = np.asarray(uv, dtype=float)
+    along, across = (rectangle.corners[k] - rectangle.corners[0] for k in (1, 3))
+    return np.asarray(rectangle.corners[0] + fractions[:, :1] * along + fractions[:, 1:] * across)

@@ -17,6 +17,8 @@ from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.compile_ahead import compile_ahead
 from nuno.estimate.futures import LIFT_SECONDS
+from nuno.estimate.hand_error import HAND_STD
+from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
 from nuno.estimate.lift_prior import SIDEWAYS
 from nuno.estimate.outline_candidates import with_outline_candidates
@@ -62,6 +64,8 @@ def estimate_pick(
     sideways: float | None = SIDEWAYS,
     shape: str = "auto",
     spacing: float | None = None,
+    hand_std: float = HAND_STD,
+    hand_path: ArrayLike | HandPath | None = None,
     score: str = "evidence",
     device: str = "auto",
     engine: str = "nuno",
@@ -113,6 +117,12 @@ def estimate_pick(
             candidates along it and inside, labelled by their positions [m] along the longer and shorter side of the
             smallest rectangle around it, from that one's corner C00 (docs/picks.md).
         spacing: Of an outline's candidates [m]; None gives about 40 of them.
+        hand_std: Standard deviation of where the hand is, along each axis [m]. Futures are compared as if it were there,
+            too (`nuno.estimate.hand_error`), and a few of them are imagined so.
+        hand_path: (k, 3) where the hand went [m], at even times from when it held the cloth on, to ``hand``, which took
+            it ``lift_seconds``; or a `nuno.HandPath`, of which the last hold counts. It replaces the guesses that the hand went
+            straight, or up first and sideways then, and the prior of the lift: where it began is where the picked
+            point lay, up to ``hand_std`` and to how high it was then.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -137,7 +147,7 @@ def estimate_pick(
         table=check_table(table_height, table_half_extents, table_centre, table_thickness), camera=camera, hand=hand,
         candidates=candidates, rest_height=rest_height, hand_radius=hand_radius, lift_seconds=lift_seconds,
         discretisations=discretisations, sure=sure, turns=turns, learned=learned, sideways=sideways, score=score,
-        device=device, engine=engine, progress=progress,
+        device=device, engine=engine, progress=progress, hand_std=hand_std, hand_path=hand_path,
     )  # fmt: skip
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)
@@ -170,9 +180,9 @@ def _result(
     futures, best_index = trials.batches[batch].whole(world)
     stages.end("compare")
     return PickResult(
-        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1,
+        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1, likely=ranked.likely,
         rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(), futures=futures,
-        best_index=best_index, turn=turn, hand=settings.hand, masks=masks, real=seen.silhouette,
+        best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks, real=seen.silhouette,
         image_before=images.before, image_after=images.after, mask_before=images.mask_before, mask_after=seen.mask,
-        seen_warnings=seen.warnings, sideways=settings.sideways if settings.with_evidence else None,
+        seen_warnings=(*seen.warnings, *trials.warnings), sideways=settings.sideways if settings.with_evidence else None,
     )  # fmt: skip

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
+from nuno.camera.flat import first_look
 from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.regions import grow
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
-from nuno.errors import InvalidInputError
+from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 from nuno.estimate.outline_or_rectangle import fit_cloth
 from nuno.estimate.pick_settings import PickSettings
 
@@ -23,6 +25,8 @@ RIM = 0.006
 """Distance from the table's border [m] within which a cloth's outline lies on it."""
 RIM_SHARE = 0.05
 """Share of a cloth's outline on the table's border from which the cloth is taken to hang over it."""
+ALIKE = 0.3
+"""Share of one region's pixels of another's from which both may be the cloth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,23 +85,29 @@ def find_cloth_before(
         ClothNotFoundError: no cloth in the image.
     """
     camera, table = settings.camera, settings.table
+    other = None
     if images.mask_before is None and (rectangle is None or images.mask_after is None):
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
         images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
+        if hint is None and rectangle is None:
+            other = other_cloth(images.before, images.mask_before, camera, table)
     if rectangle is None:
         assert images.mask_before is not None
+        over = border_warning(images.mask_before, camera, table)
         height = table.height + settings.rest_height
-        rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
-        over = _border_warning(images.mask_before, camera, table)
-        if over is not None:
-            rectangle = replace(rectangle, warnings=(*rectangle.warnings, over))
+        try:
+            rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
+        except EstimationError as error:
+            raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
+        found = tuple(warning for warning in (over, other) if warning is not None)
+        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *found))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
     return images, rectangle
 
 
-def _border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
+def border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
     """Return a warning where the outline of a mask (h, w) runs along the table's border: the cloth goes on there."""
     if table.half_extents is None:
         return None
@@ -111,6 +121,48 @@ def _border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | Non
     return (
         f"{100.0 * share:.0f} % of the cloth's outline lies on the table's border: what hangs over it is not seen, so "
         "the cloth may be larger and its points elsewhere; rectangle= takes its true corners"
+    )
+
+
+def why_no_rectangle(mask: np.ndarray) -> str:
+    """Return what may be the matter with a cloth whose mask (h, w) is no rectangle, and what helps."""
+    rim = np.concatenate([mask[:2].ravel(), mask[-2:].ravel(), mask[:, :2].ravel(), mask[:, -2:].ravel()])
+    if rim.any():
+        return "the cloth goes on beyond the image's border: rectangle= takes its true corners"
+    return "it may be folded, or lie behind a thing on the table: rectangle= takes the corners of the cloth laid flat"
+
+
+def other_cloth(before: np.ndarray, mask: np.ndarray, camera: Camera, table: Table) -> str | None:
+    """Return a warning where another thing on the table might be the cloth, of a similar size and a rectangle, too.
+
+    Args:
+        before: (h, w, 3) uint8, the image before.
+        mask: (h, w) bool, the cloth that was found.
+        camera: The camera.
+        table: The table.
+    """
+    if table.half_extents is None:
+        return None
+    hidden, ring = grow(mask, 6), grow(mask, 14) & ~grow(mask, 8)
+    if not ring.any():
+        return None
+    bare = before.copy()
+    bare[hidden] = np.random.default_rng(0).choice(before[ring], int(hidden.sum()))  # the table as it is beside it
+    try:
+        found, _ = first_look(bare, camera, table, None)
+    except ClothNotFoundError:
+        return None
+    whole = cv2.resize(found.astype(np.uint8), (camera.width, camera.height), interpolation=cv2.INTER_NEAREST) > 0
+    if (whole & hidden).any() or not ALIKE < whole.sum() / mask.sum() < 1.0 / ALIKE:
+        return None
+    try:
+        second = fit_rectangle(whole, None, camera, table.height)
+    except EstimationError:
+        return None
+    x, y = second.centre[:2]
+    return (
+        f"another thing on the table, {second.long_m:.2f} x {second.short_m:.2f} m at ({x:.2f}, {y:.2f}) m, may be the "
+        "cloth that is meant: hint= takes a point of it or a box around it"
     )
 
 

@@ -58,6 +58,8 @@ class PickResult:
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
         seen_warnings: What was odd about how it was seen.
+        likely: (k,) float by candidate, how likely each is as far as the evidence may be trusted
+            (`nuno.estimate.doubt`); None: as the scores say.
         sideways: Of the prior of the lift that is in scores of evidence (`nuno.estimate.lift_prior`); None is no prior.
     """
 
@@ -81,6 +83,7 @@ class PickResult:
     mask_before: np.ndarray | None = field(default=None, repr=False)
     mask_after: np.ndarray | None = field(default=None, repr=False)
     seen_warnings: tuple[str, ...] = ()
+    likely: np.ndarray | None = None
     sideways: float | None = None
 
     def __repr__(self) -> str:
@@ -128,12 +131,13 @@ class PickResult:
         Other scores tell no probability: there it is how much worse the second is, see
         `nuno.estimate.ranking.confidence`.
         """
-        return confidence(self.score_name, self.scores)
+        likely = self.likely
+        return confidence(self.score_name, self.scores) if likely is None else float(likely[self.order[0]])
 
     @property
     def probabilities(self) -> np.ndarray | None:
         """(k,) float by candidate, how likely each is; None where something else than evidence ranks."""
-        return probabilities(self.score_name, self.scores)
+        return probabilities(self.score_name, self.scores) if self.likely is None else self.likely
 
     @cached_property
     def warnings(self) -> list[str]:

@@ -12,13 +12,17 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table, table_margin
 from nuno.errors import InvalidInputError
+from nuno.estimate.hand_error import HAND_STD, Poses, poses_of
 from nuno.estimate.hypotheses import Discretisation
+from nuno.estimate.lift_path import checked_path
 from nuno.estimate.ranking import EVIDENCE, RANKINGS
 from nuno.estimate.rotations import checked_turns
 from nuno.validation import LONGEST_WAIT, finite_array, number
 from nuno.world.device import checked_device, found_device
 from nuno.world.world import World
 
+MAX_HAND_STD = 0.2
+"""[m] A hand that is known no better tells nothing of where a cloth hangs."""
 MAX_CANDIDATES = 1024
 """Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
 
@@ -34,6 +38,8 @@ class PickSettings:
         uv: (k, 2) float, the candidates as fractions of the sides.
         grid: Candidates along both sides; (2, 2) where points were given.
         turns: (t,) float [rad]; 0 alone where something else than evidence ranks.
+        poses: How futures are moved to be compared: turned, or shifted, for the hand may be elsewhere than told.
+        hand_path: (k, 3) float [m], from the time when it held to ``hand``; None is not known.
         device: "cpu" or "cuda:0" ...
         engine: What moves the imagined cloths.
     """
@@ -50,6 +56,9 @@ class PickSettings:
     discretisations: Sequence[Discretisation]
     sure: float
     turns: np.ndarray
+    poses: Poses
+    hand_std: float
+    hand_path: np.ndarray | None
     learned: bool
     sideways: float | None
     score: str
@@ -66,8 +75,8 @@ class PickSettings:
 def check_settings(
     *, camera: Camera | Mapping[str, Any], table: Table, hand: ArrayLike, candidates: tuple[int, int] | ArrayLike,
     discretisations: Sequence[Discretisation], turns: Sequence[float], score: str, device: str, rest_height: float,
-    lift_seconds: float, sure: float, sideways: float | None, engine: str = "nuno",
-    **others: Any,
+    lift_seconds: float, sure: float, sideways: float | None, engine: str = "nuno", hand_std: float = HAND_STD,
+    hand_path: Any = None, **others: Any,
 ) -> PickSettings:  # fmt: skip
     """Check the arguments of `nuno.estimate_pick` that are no images.
 
@@ -96,11 +105,14 @@ def check_settings(
         raise InvalidInputError(f"discretisations must be a sequence of Discretisation, got {discretisations!r}")
     if not discretisations or discretisations[0].best is not None:
         raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
-    angles = checked_turns(turns)
+    angles = checked_turns(turns) if score in EVIDENCE else np.zeros(1)
+    number("hand_std", hand_std, low=0.0, high=MAX_HAND_STD)
+    path = None if hand_path is None else checked_path(hand_path, hand, hand_std)
     return PickSettings(
         camera=camera, table=table, hand=hand, labels=labels, uv=uv, grid=grid, rest_height=rest_height,
         lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
-        turns=angles if score in EVIDENCE else np.zeros(1), sideways=sideways, score=score,
+        turns=angles, poses=poses_of(camera, angles, hand_std if score in EVIDENCE else 0.0), hand_std=hand_std,
+        hand_path=path, sideways=sideways, score=score,
         device=found_device(checked_device(device)), engine=engine, **others,
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from nuno.camera.table import Table
 from nuno.estimate import pattern, similarity
 from nuno.estimate.futures import DRAWN_THICKNESS, Futures
 from nuno.estimate.pattern import Pattern, begin_pattern
-from nuno.estimate.rotations import turn, view_of_turned
+from nuno.estimate.rotations import STILL, Pose, turn, view_of_turned
 from nuno.estimate.similarity import Silhouette, begin_scores
 
 MARGIN = 4
@@ -32,7 +32,7 @@ Ground = tuple[wp.array, wp.array] | None
 
 def score_futures(
     futures: Futures, camera: Camera, real: Silhouette, table: Table, *, pattern: Pattern | None = None,
-    turns: Sequence[float] | np.ndarray = (0.0,), hand: ArrayLike = (0.0, 0.0, 0.0),
+    turns: Sequence[float] | np.ndarray = (0.0,), shifts: np.ndarray | None = None, hand: ArrayLike = STILL,
     coarse: tuple[Camera, Silhouette] | None = None,
 ) -> Scores:  # fmt: skip
     """Draw every future's cloth as the camera would see it, and compare it with the real silhouette and pattern.
@@ -43,9 +43,10 @@ def score_futures(
         real: The real silhouette.
         table: The table.
         pattern: The cloth's pattern; None where there are no images: then "pattern" is 0 for all.
-        turns: Angles [rad] by which the futures are turned before they are compared.
+        turns: (t,) angles [rad] by which the futures are turned before they are compared.
+        shifts: (t, 3) how far they are moved after each turn [m]; None is not at all.
         hand: (3,) the point about whose vertical they are turned [m].
-        coarse: The camera and the silhouette at a lower resolution, with which turned futures are compared; None is
+        coarse: The camera and the silhouette at a lower resolution, with which moved futures are compared; None is
             the same for all.
 
     Returns:
@@ -53,21 +54,22 @@ def score_futures(
     """
     shape = (len(futures.discretisation.hypotheses), futures.candidates)
     device = futures.world.device
-    angles = [float(angle) for angle in turns]
+    moves = np.zeros((len(turns), 3)) if shifts is None else shifts
+    poses = [Pose(float(a), (float(s[0]), float(s[1]), float(s[2]))) for a, s in zip(turns, moves, strict=True)]
     positions = futures.positions
     faces = _on_device(futures.body.faces, wp.vec3i, device)
     finite = futures.finite.ravel()
-    seen = {angle: (camera, real) if coarse is None or angle == 0.0 else coarse for angle in angles}
-    regions = regions_of(positions, [view_of_turned(seen[a][0], hand, a) for a in angles], margin=MARGIN)
-    around = dict(zip(angles, regions, strict=True))
+    seen = {pose: (camera, real) if coarse is None or pose == Pose() else coarse for pose in poses}
+    regions = regions_of(positions, [view_of_turned(seen[p][0], hand, *p) for p in poses], margin=MARGIN)
+    around = dict(zip(poses, regions, strict=True))
     ground = _ground(futures, table, device)
     compare = None if pattern is None else _pattern_comparison(futures, positions, faces, pattern, ground, hand)
 
-    def begin(angle: float) -> Callable[[], Scores]:
-        seen_by, silhouette = seen[angle]
-        keys = _drawn(positions, faces, seen_by, around[angle], ground, angle, hand)
-        outline = begin_scores(keys, silhouette, region=around[angle])
-        inside = None if compare is None else compare(angle)
+    def begin(pose: Pose) -> Callable[[], Scores]:
+        seen_by, silhouette = seen[pose]
+        keys = _drawn(positions, faces, seen_by, around[pose], ground, pose, hand)
+        outline = begin_scores(keys, silhouette, region=around[pose])
+        inside = None if compare is None else compare(pose)
 
         def wait() -> Scores:
             scores = outline()
@@ -80,27 +82,27 @@ def score_futures(
 
     for silhouette in (real,) if coarse is None else (real, coarse[1]):
         silhouette.on(device)  # here, for every thread would do it for itself
-    found = _at_each(begin, angles, device)
+    found = _at_each(begin, poses, device)
     return {name: np.stack([scores[name] for scores in found]) for name in found[0]}
 
 
-def _at_each(begin: Callable[[float], Callable[[], Scores]], turns: list[float], device: str) -> list[Scores]:
-    """The scores at every turn: on CUDA all are begun before any is waited for, on the CPU each core takes one."""
+def _at_each(begin: Callable[[Pose], Callable[[], Scores]], poses: list[Pose], device: str) -> list[Scores]:
+    """The scores at every pose: on CUDA all are begun before any is waited for, on the CPU each core takes one."""
     cores = len(os.sched_getaffinity(0))
-    if min(cores, len(turns)) == 1 or not wp.get_device(device).is_cpu:
-        return [wait() for wait in [begin(angle) for angle in turns]]
+    if min(cores, len(poses)) == 1 or not wp.get_device(device).is_cpu:
+        return [wait() for wait in [begin(pose) for pose in poses]]
     for module in (raster, similarity, pattern):
         module.load(device)
-    with ThreadPoolExecutor(min(cores, len(turns))) as threads:
-        # 0 takes longest, so it goes first
-        waiting = {angle: threads.submit(lambda a: begin(a)(), angle) for angle in sorted(turns, key=abs)}
-        return [waiting[angle].result() for angle in turns]
+    with ThreadPoolExecutor(min(cores, len(poses))) as threads:
+        # what is not moved takes longest, so it goes first
+        waiting = {p: threads.submit(lambda p: begin(p)(), p) for p in sorted(poses, key=lambda p: p != Pose())}
+        return [waiting[pose].result() for pose in poses]
 
 
 def _pattern_comparison(
     futures: Futures, positions: wp.array, faces: wp.array, pattern: Pattern, ground: Ground, hand: ArrayLike
-) -> Callable[[float], Callable[[], np.ndarray]]:
-    """Return what scores, at a turn [rad], how well the pattern that every future carries explains the image.
+) -> Callable[[Pose], Callable[[], np.ndarray]]:
+    """Return what scores, at a pose, how well the pattern that every future carries explains the image.
 
     It returns a function that waits for the answer, (worlds,) float.
     """
@@ -109,11 +111,11 @@ def _pattern_comparison(
     uv = pattern.rectangle.fractions(np.asarray(futures.origin.find(futures.body.name).vertices))
     pattern.on(device)  # here, for every thread would do it for itself
 
-    def begin(angle: float) -> Callable[[], np.ndarray]:
+    def begin(pose: Pose) -> Callable[[], np.ndarray]:
         keys = raster.key_images(positions.shape[0], pattern.region, device, ids=True)
         raster.clear(keys, layer)
         # light is fitted in the frame of the cloth, which is turned as a whole
-        turned = replace(pattern, camera=view_of_turned(pattern.camera, hand, angle))
+        turned = replace(pattern, camera=view_of_turned(pattern.camera, hand, *pose))
         raster.draw(keys, positions, faces, view(turned.camera, pattern.region), None)
         return begin_pattern(keys, positions, faces, uv, turned)
 
@@ -136,15 +138,17 @@ def draw_futures(
     faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
     (region,) = regions_of(positions, [view_of_turned(camera, hand, angle)], margin=MARGIN)
     ground = _ground(futures, table, positions.device)
-    return _drawn(positions, faces, camera, region, ground, angle, hand), region
+    return _drawn(positions, faces, camera, region, ground, Pose(angle), hand), region
 
 
 def masks_of_turned(
-    futures: Futures, worlds: np.ndarray, turns: np.ndarray, camera: Camera, table: Table, hand: ArrayLike
-) -> np.ndarray:
-    """Masks (k, h, w) bool of some worlds (k,) of a batch, each at a turn (k,) [rad] of its own."""
+    futures: Futures, worlds: np.ndarray, turns: np.ndarray, camera: Camera, table: Table, hand: ArrayLike,
+    shifts: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Masks (k, h, w) bool of some worlds (k,) of a batch, each at a turn (k,) [rad] and shift (k, 3) [m] of its own."""
     positions = futures.positions
     moved = np.stack([turn(p, hand, a) for p, a in zip(positions.numpy()[worlds], turns, strict=True)])
+    moved = moved if shifts is None else moved + shifts[:, None]
     turned = _on_device(moved, wp.vec3, positions.device)
     (region,) = regions_of(turned, [camera], margin=MARGIN)
     faces = _on_device(futures.body.faces, wp.vec3i, positions.device)
@@ -164,13 +168,13 @@ def _ground(futures: Futures, table: Table, device: Any) -> Ground:
 
 
 def _drawn(
-    positions: wp.array, faces: wp.array, camera: Camera, region: Region, ground: Ground, angle: float = 0.0,
-    hand: ArrayLike = (0.0, 0.0, 0.0),
+    positions: wp.array, faces: wp.array, camera: Camera, region: Region, ground: Ground, pose: Pose = Pose(),
+    hand: ArrayLike = STILL,
 ) -> wp.array:  # fmt: skip
     device: Any = positions.device
     keys = raster.key_images(positions.shape[0], region, device)
     raster.clear(keys, _table_layer(ground, view(camera, region), 1, device))
-    looking = view(view_of_turned(camera, hand, angle), region)
+    looking = view(view_of_turned(camera, hand, *pose), region)
     raster.draw(keys, positions, faces, looking, 0, thickness=DRAWN_THICKNESS)
     return keys
 

@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.rectangle import SQUARE, ClothRectangle
 from nuno.errors import EstimationError
+from nuno.estimate.doubt import doubted, oddities
 from nuno.estimate.futures import Futures, imagine_picks
+from nuno.estimate.hand_error import GROSS_SHARE
+from nuno.estimate.hypotheses import Discretisation
 from nuno.estimate.learned import Outline, correction, outline_of
-from nuno.estimate.lift_prior import log_prior_of_lift
+from nuno.estimate.lift_prior import log_prior_of_lift, log_prior_of_start
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
-from nuno.estimate.ranking import Comparison, Ranked, rank
+from nuno.estimate.ranking import Comparison, Ranked
 from nuno.estimate.seeing import IMAGE_SCALE, Seen
 from nuno.estimate.together import Ahead, has_room
 from nuno.kernels.compile_watch import Stages
@@ -31,23 +34,25 @@ class PickTrials:
         batches: The futures that they are of.
         ranked: The ranking by all of them.
         seen: The image after.
+        warnings: What is odd about how the futures fit.
     """
 
     comparisons: list[Comparison]
     batches: list[Futures]
     ranked: Ranked
     seen: Seen
+    warnings: tuple[str, ...] = ()
 
-    def best_match(self, candidate: int, score: str) -> tuple[int, int, float]:
-        """Return the batch, the world in it, and its turn [rad], in which a candidate looks most like the image."""
-        found: list[tuple[float, int, int, float]] = []
+    def best_match(self, candidate: int, score: str) -> tuple[int, int, int]:
+        """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image."""
+        found: list[tuple[float, int, int, int]] = []
         for k, comparison in enumerate(self.comparisons):
             at = np.nonzero(comparison.candidates == candidate)[0]
             if len(at):
                 error = comparison.error(score)[..., at[0]]
                 turn, guess = np.unravel_index(int(error.argmin()), error.shape)
                 world = int(guess) * len(comparison.candidates) + int(at[0])
-                found.append((float(error[turn, guess]), k, world, float(comparison.turns[turn])))
+                found.append((float(error[turn, guess]), k, world, int(turn)))
         return min(found)[1:]
 
     def masks(self, settings: PickSettings) -> np.ndarray:
@@ -58,7 +63,10 @@ class PickTrials:
         masks = np.zeros((count, small.height, small.width), dtype=bool)
         for k in np.unique(batch):
             of = batch == k
-            masks[of] = masks_of_turned(self.batches[k], world[of], turn[of], small, settings.table, settings.hand)
+            masks[of] = masks_of_turned(
+                self.batches[k], world[of], settings.poses.turns[turn[of]], small, settings.table, settings.hand,
+                settings.poses.shifts[turn[of]],
+            )  # fmt: skip
         return masks
 
 
@@ -79,9 +87,10 @@ def try_picks(
     uv, table, hand = settings.uv, settings.table, settings.hand
     arguments: dict[str, Any] = dict(
         rectangle=rectangle, grid=settings.grid, table=table, hand=hand, rest_height=settings.rest_height,
-        device=settings.device, lift_seconds=settings.lift_seconds, engine=settings.engine,
+        device=settings.device, lift_seconds=settings.lift_seconds, engine=settings.engine, hand_std=settings.hand_std,
+        hand_path=settings.hand_path,
     )  # fmt: skip
-    prior = None if settings.sideways is None else log_prior_of_lift(rectangle, uv, hand, settings.sideways)
+    prior = _prior(settings, rectangle)
     comparisons: list[Comparison] = []
     batches: list[Futures] = []
     ranked: Ranked | None = None
@@ -104,25 +113,50 @@ def try_picks(
                 outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
             if outline is not None:
                 comparison = replace(comparison, correction=correction(outline, futures, comparison, table, hand))
-        comparisons.append(comparison)
+        comparisons.append(_weighed(comparison, discretisation))
         batches.append(futures)
-        ranked = rank(comparisons, settings.score, len(uv), prior)
+        ranked = doubted(comparisons, settings.score, len(uv), prior)
         stages.end("compare")
         if ranked.settled(settings.sure):
             break
     assert ranked is not None
     if not np.isfinite(ranked.scores).any():
         raise EstimationError("no imagined pick stayed finite; smaller steps or softer guesses are needed")
-    return PickTrials(comparisons, batches, ranked, seen)
+    best = int(ranked.order[0])
+    batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
+    guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
+    odd = oddities(comparisons, best, settings.score, guess)
+    told = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
+    ranked = doubted(comparisons, settings.score, len(uv), prior, told)
+    return PickTrials(comparisons, batches, ranked, seen, odd)
+
+
+def _weighed(comparison: Comparison, discretisation: Discretisation) -> Comparison:
+    """The comparison, with guesses that take the hand's place for a mistake as unlikely as they are."""
+    mistakes = np.array([hypothesis.mistake != 0.0 for hypothesis in discretisation.hypotheses])
+    if not mistakes.any():
+        return comparison
+    added = 0.0 if comparison.correction is None else comparison.correction
+    return replace(comparison, correction=added + np.log(np.where(mistakes, GROSS_SHARE, 1.0))[:, None])
+
+
+def _prior(settings: PickSettings, rectangle: ClothRectangle) -> np.ndarray | None:
+    """Logarithms of how likely each candidate is before the image after is seen; None is alike."""
+    if settings.hand_path is not None:
+        return log_prior_of_start(rectangle, settings.uv, settings.hand_path[0], settings.hand_std)
+    if settings.sideways is None:
+        return None
+    return log_prior_of_lift(rectangle, settings.uv, settings.hand, settings.sideways)
 
 
 def compare(futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings) -> Comparison:
     """Compare the futures of chosen candidates with the image after, at every turn about the hand's vertical."""
     values = score_futures(
-        futures, seen.camera, seen.silhouette, settings.table, pattern=seen.pattern, turns=settings.turns,
-        hand=settings.hand, coarse=seen.coarse,
+        futures, seen.camera, seen.silhouette, settings.table, pattern=seen.pattern, turns=settings.poses.turns,
+        shifts=settings.poses.shifts, hand=settings.hand, coarse=seen.coarse,
     )  # fmt: skip
     return Comparison(
-        chosen, settings.turns, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
-        None if seen.pattern is None else values["pattern"],
+        chosen, settings.poses.turns, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
+        None if seen.pattern is None else values["pattern"], shifts=settings.poses.shifts,
+        log_priors=settings.poses.log_priors,
     )  # fmt: skip

@@ -27,9 +27,8 @@ OVERLAP_WEIGHT = 10.0
 PATTERN_WEIGHT = 25.0
 EVIDENCE = ("evidence", "silhouette")
 """The rankings that average over guesses and turns."""
-SURE = 0.98
-"""A candidate as likely as this after some of the guesses stayed the best one after all, in all cases made for choosing
-(docs/reports/accuracy.md)."""
+SURE = 0.96
+"""A candidate as likely as this after some of the guesses, with and without the best of them, needs no more."""
 SHARE = 0.97
 """Further guesses look at the candidates that together hold so much of the probability."""
 
@@ -48,6 +47,9 @@ class Comparison:
         pattern: How badly the cloth's pattern fits, see `nuno.estimate.pattern`; None where only masks are known.
         correction: What is added to every guess's log likelihood, (guesses, c), see `nuno.estimate.learned`; None is
             nothing.
+        shifts: (turns, 3) float, how far the futures were moved after each turn [m]; None is not at all.
+        log_priors: (turns,) float, logarithms of the priors of turns and shifts, which add up to 1; None is
+            `nuno.estimate.rotations.log_prior` of the turns.
     """
 
     candidates: np.ndarray
@@ -58,6 +60,8 @@ class Comparison:
     finite: np.ndarray
     pattern: np.ndarray | None = None
     correction: np.ndarray | None = None
+    shifts: np.ndarray | None = None
+    log_priors: np.ndarray | None = None
 
     def error(self, score: str) -> np.ndarray:
         """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
@@ -68,7 +72,8 @@ class Comparison:
             error = CONTOUR_WEIGHT * np.log1p(self.chamfer) + OVERLAP_WEIGHT * (1.0 - self.iou)
             if score == "evidence" and self.pattern is not None:
                 error = error + PATTERN_WEIGHT * self.pattern
-            error = error - log_prior(self.turns)[:, None, None]
+            priors = log_prior(self.turns) if self.log_priors is None else self.log_priors
+            error = error - priors[:, None, None]
             if self.correction is not None:
                 error = error - self.correction
         else:
@@ -86,16 +91,24 @@ class Ranked:
             candidate's prior where there is one, "negative_chamfer_px", "iou" or "eq1".
         scores: (k,) float, higher is better; -inf where no future stayed finite.
         eq1: (k,) float, the paper's similarity, without a turn: the best guess of each mesh, averaged over meshes.
+        likely: (k,) float, how likely each candidate is as far as the evidence may be trusted (`nuno.estimate.doubt`);
+            None: as the scores say.
     """
 
     name: str
     scores: np.ndarray
     eq1: np.ndarray
+    likely: np.ndarray | None = None
 
     @property
     def order(self) -> np.ndarray:
         """(k,) int, candidates from best to worst."""
         return np.argsort(-self.scores, kind="stable")
+
+    @property
+    def probabilities(self) -> np.ndarray | None:
+        """(k,) float, how likely each candidate is; None where something else than evidence ranks."""
+        return probabilities(self.name, self.scores) if self.likely is None else self.likely
 
     def plausible(self, limit: int) -> np.ndarray:
         """The best candidates, in the order of their numbers: (m,) int.
@@ -105,20 +118,23 @@ class Ranked:
         Args:
             limit: No more than so many.
         """
-        order, likely = self.order, probabilities(self.name, self.scores)
+        order, likely = self.order, self.probabilities
+        if likely is not None and self.likely is not None:
+            order = np.argsort(-likely, kind="stable")
         if likely is not None:
             limit = min(limit, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), SHARE))))
         return np.sort(order[:limit])
 
     def settled(self, sure: float) -> bool:
         """Return True if one candidate is as likely as ``sure``, below 1, so that no more guesses are needed."""
-        likely = probabilities(self.name, self.scores)
+        likely = self.probabilities
         return sure < 1.0 and likely is not None and bool(likely.max() >= sure)
 
 
 def rank(
-    comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None = None
-) -> Ranked:
+    comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None = None,
+    *, without_best: bool = False,
+) -> Ranked:  # fmt: skip
     """Combine the comparisons of all meshes.
 
     The evidence of a candidate is the mean likelihood over all guesses that looked at it, times its prior where there
@@ -130,10 +146,12 @@ def rank(
         count: Number of candidates.
         log_prior_of_candidates: (count,) float, how likely each is before any image is seen
             (`nuno.estimate.lift_prior`), up to a constant; None is alike. Evidence alone asks for it.
+        without_best: Leave every candidate's best guess out of its evidence, if it has others: what a single guess
+            says may be chance.
     """
     looked, similar = np.zeros(count), np.zeros(count)
     total, guesses = np.zeros(count), np.zeros(count)
-    errors = np.zeros(count)
+    errors, best = np.zeros(count), np.zeros(count)
     # scaled by the best of all, for exp would underflow far from it
     kind = score if score in EVIDENCE else "evidence"
     offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(kind) for c in comparisons)), default=0.0)
@@ -143,12 +161,19 @@ def rank(
         looked[at] += 1
         similar[at] += 1.0 - np.minimum(comparison.error("eq1").min(axis=(0, 1)), 1.0)
         guesses[at] += len(comparison.finite)
-        total[at] += np.exp(offset - comparison.error(kind)).sum(axis=(0, 1))
+        likelihood = np.exp(offset - comparison.error(kind)).sum(axis=0)
+        total[at] += likelihood.sum(axis=0)
+        best[at] = np.maximum(best[at], likelihood.max(axis=0))
         errors[at] += comparison.error(score).min(axis=(0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         if score in EVIDENCE:
             looks = score == "evidence" and any(c.pattern is not None for c in comparisons)
             name = "log_evidence_with_pattern" if looks else "log_evidence"
+            if without_best:
+                several = guesses > 1
+                # no less than rounding leaves of a sum without its largest part
+                total = np.where(several, np.maximum(total - best, 1e-12 * best), total)
+                guesses = guesses - several
             scores = np.log(total / guesses) - offset
             if log_prior_of_candidates is not None:
                 scores = scores + log_prior_of_candidates

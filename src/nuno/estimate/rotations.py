@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,19 @@ TURNS = tuple(float(np.radians(angle)) for angle in (-30, -20, -10, 0, 10, 20, 3
 """[rad] At which a future is compared, counterclockwise seen from above."""
 DEVIATION = float(np.radians(20))
 """[rad] Standard deviation of the normal prior."""
+STILL = (0.0, 0.0, 0.0)
+
+
+class Pose(NamedTuple):
+    """How a future is moved before it is compared.
+
+    Attributes:
+        angle: Of the turn about the hand's vertical [rad].
+        shift: What is added then [m], for the hand may be elsewhere than it is told (`nuno.estimate.hand_error`).
+    """
+
+    angle: float = 0.0
+    shift: tuple[float, float, float] = STILL
 
 
 def checked_turns(turns: Sequence[float]) -> np.ndarray:
@@ -47,13 +61,15 @@ def turn(points: ArrayLike, centre: ArrayLike, angle: float) -> np.ndarray:
     return np.asarray(centre) + (np.asarray(points) - centre) @ _about_vertical(angle).T
 
 
-def view_of_turned(camera: Camera, centre: ArrayLike, angle: float) -> Camera:
-    """The camera that sees a body as ``camera`` sees it once it is turned, as `turn` does it."""
-    if angle == 0.0:
+def view_of_turned(
+    camera: Camera, centre: ArrayLike, angle: float, shift: tuple[float, float, float] = STILL
+) -> Camera:
+    """The camera that sees a body as ``camera`` sees it once it is turned, as `turn` does it, and shifted then [m]."""
+    if angle == 0.0 and shift == STILL:
         return camera
     pose = camera.camera_to_world.copy()
     pose[:3, :3] = _about_vertical(-angle) @ pose[:3, :3]
-    pose[:3, 3] = turn(pose[:3, 3], centre, -angle)
+    pose[:3, 3] = turn(pose[:3, 3] - shift, centre, -angle)
     return replace(camera, camera_to_world=pose)
 
 

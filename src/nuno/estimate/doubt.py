@@ -1,0 +1,106 @@
+"""How far evidence may be trusted: a chance fit, a best future that fits badly, and warnings make an answer less sure.
+
+Evidence (`nuno.estimate.ranking`) takes it that one of the guesses is right up to chance. Where it is not, three things
+tell so. The answer may hang on a single future: so it is asked for again without the best guess of every candidate, and
+the mean of both probabilities counts. Even the best future may fit badly: the hand, the camera, the table or the cloth
+are not what they are taken for. And a warning may say that what was seen is odd. The last two mix the probabilities with
+broad ones, whose logarithms are a fraction of the evidence's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nuno.estimate.hypotheses import Hypothesis
+from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
+
+WELL = 9.5
+"""-log likelihood of a silhouette, without its pattern, up to which a future fits well."""
+BADLY = 15.0
+"""The same, from which on it fits badly."""
+POORLY = 12.0
+"""The same, from which on a warning says so."""
+BAD_SHARE = 0.6
+"""Of the broad probabilities in the answer, where the best future fits badly; up to there in proportion."""
+WARNED_SHARE = 0.25
+"""Of the broad probabilities, for every warning again of what is left."""
+BREADTH = 6.0
+"""Evidence's logarithms are divided by this for the broad probabilities."""
+
+
+def misfit(comparisons: Sequence[Comparison], candidate: int) -> float:
+    """Return -log likelihood of the silhouette of the future of a candidate that fits best, its pose's prior left out."""
+    found = [np.inf]
+    for comparison in comparisons:
+        at = comparison.candidates == candidate
+        error = CONTOUR_WEIGHT * np.log1p(comparison.chamfer[..., at]) + OVERLAP_WEIGHT * (1.0 - comparison.iou[..., at])
+        error = np.where(comparison.finite[:, at], error, np.inf)
+        found.append(float(error.min(initial=np.inf)))
+    return min(found)
+
+
+def oddities(comparisons: Sequence[Comparison], candidate: int, score: str, guess: Hypothesis) -> tuple[str, ...]:
+    """Return warnings of how the best future fits; none where something else than evidence ranks.
+
+    Args:
+        comparisons: Of all meshes.
+        candidate: The best one.
+        score: What ranks.
+        guess: Of the future that fits best.
+    """
+    if score not in EVIDENCE:
+        return ()
+    if guess.mistake != 0.0:
+        return (
+            f"the image after looks as if the hand were {100.0 * abs(guess.mistake):.0f} cm "
+            f"{'higher' if guess.mistake > 0.0 else 'lower'} than it is told to be: are hand, camera and table_height right?",
+        )
+    if misfit(comparisons, candidate) < POORLY:
+        return ()
+    return (
+        "even the best imagined pick looks little like the image after: is the cloth larger, folded or of another kind "
+        "than any guess, or are hand, camera or table_height wrong?",
+    )
+
+
+def share_of_doubt(misfit: float, warnings: int) -> float:
+    """Return which share of the broad probabilities there is in an answer, 0 to 1.
+
+    Args:
+        misfit: Of the best future, see `misfit`.
+        warnings: How many there are.
+    """
+    bad = BAD_SHARE * float(np.clip((misfit - WELL) / (BADLY - WELL), 0.0, 1.0))
+    return float(1.0 - (1.0 - bad) * (1.0 - WARNED_SHARE) ** warnings)
+
+
+def doubted(
+    comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None,
+    warnings: int = 0,
+) -> Ranked:  # fmt: skip
+    """Rank the candidates, and tell how likely each is as far as the evidence may be trusted.
+
+    Args:
+        comparisons: As `nuno.estimate.ranking.rank` takes them, like the next three.
+        score: What ranks.
+        count: Number of candidates.
+        log_prior_of_candidates: (count,) float, or None.
+        warnings: How many tell that the images or the cloth are odd.
+    """
+    ranked = rank(comparisons, score, count, log_prior_of_candidates)
+    if score not in EVIDENCE or not np.isfinite(ranked.scores).any():
+        return ranked
+    without = rank(comparisons, score, count, log_prior_of_candidates, without_best=True)
+    logs = np.logaddexp(_log_shares(ranked.scores), _log_shares(without.scores)) - np.log(2.0)
+    share = share_of_doubt(misfit(comparisons, int(ranked.order[0])), warnings)
+    if share > 0.0:
+        logs = np.logaddexp(np.log1p(-share) + logs, np.log(share) + _log_shares(ranked.scores / BREADTH))
+    return replace(ranked, likely=np.exp(logs))
+
+
+def _log_shares(scores: np.ndarray) -> np.ndarray:
+    """Logarithms of probabilities (k,) that are as exp of the scores (k,)."""
+    return np.asarray(scores - np.logaddexp.reduce(scores))
