@@ -31,6 +31,7 @@ from nuno.errors import (
     CalibrationError,
     ClothNotFoundError,
     ConnectionLostError,
+    EngineCapabilityError,
     EstimationError,
     FileFormatError,
     FileWriteError,
@@ -86,6 +87,7 @@ if TYPE_CHECKING:
     from nuno.camera.usb_camera import UsbCamera
     from nuno.estimate.capture import Capture, capture_case
     from nuno.estimate.capture_live import take_capture
+    from nuno.engines.engine_registry import engine_capabilities
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -177,6 +179,7 @@ __all__ = [
     "Cylinder",
     "Drawing",
     "ElementState",
+    "EngineCapabilityError",
     "EstimationError",
     "FileFormatError",
     "FileWriteError",
@@ -302,6 +305,7 @@ __all__ = [
     "each",
     "elements",
     "estimate_hold",
+    "engine_capabilities",
     "estimate_pick",
     "export_body",
     "find_layers",
@@ -371,6 +375,7 @@ _LAZY = {
         "nuno.camera.usb_camera": "UsbCamera",
         "nuno.estimate.capture": "Capture capture_case",
         "nuno.estimate.capture_live": "take_capture",
+        "nuno.engines.engine_registry": "engine_capabilities",
         "nuno.estimate.case": "PickCase read_case",
         "nuno.estimate.fit_material": "MaterialFit fit_material",
         "nuno.estimate.fold": "replay_fold",
