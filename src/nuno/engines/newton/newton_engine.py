@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-SUBSTEPS = 60
+SUBSTEPS = 40
 """Of a frame where the world gives no number: with few, block descent leaves a stiff cloth far too limp."""
 ITERATIONS = 5
 """Of a substep."""

@@ -26,6 +26,8 @@ logger = logging.getLogger(__name__)
 PARTICLE_STIFFNESS, SHAPE_STIFFNESS = 5e3, 2e4
 """[N/m] of contacts: a particle's with a shape has the mean of both, two particles' the first, two shapes' the second.
 A napkin's vertex of 0.1 g sinks in by 0.1 um, a box of 1 kg on four corners by 0.1 mm."""
+SHAPE_DAMPING = 100.0
+"""[N s/m] of contacts of shapes, near the critical damping of a box of half a kilogram: what falls does not bounce."""
 MOST_POISSON = 0.3
 """The membrane's largest Poisson ratio: Newton's is isotropic, and a softer shear than this leaves is not met."""
 
@@ -202,7 +204,7 @@ def _add_shapes(
         place, turn = where[0] - made.origin, where[1]
     friction = np.broadcast_to(body.friction if dynamics is None else dynamics.friction, worlds)[index]
     parts = parts_of(body, moves=True) if dynamics is not None else parts_of(body, moves=False)
-    config = scene.ShapeConfig(density=0.0, ke=SHAPE_STIFFNESS, kd=0.0, mu=float(friction), gap=0.005)
+    config = scene.ShapeConfig(density=0.0, ke=SHAPE_STIFFNESS, kd=SHAPE_DAMPING, mu=float(friction), gap=0.005)
     shapes.append([add_part(scene, part.placed(place, turn), number, config, index) for part in parts])
 
 
