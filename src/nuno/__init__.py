@@ -128,6 +128,7 @@ if TYPE_CHECKING:
     from nuno.tasks.pick_towel import TowelPicker
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
+    from nuno.viewer.compare_engines import EngineComparison, compare_engines
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -154,6 +155,7 @@ __all__ = [
     "Cylinder",
     "Drawing",
     "ElementState",
+    "EngineComparison",
     "EstimationError",
     "FileFormatError",
     "FileWriteError",
@@ -258,6 +260,7 @@ __all__ = [
     "capsule",
     "carry_mat",
     "cloth_mesh",
+    "compare_engines",
     "compound",
     "continue_walk",
     "cylinder",
@@ -372,6 +375,7 @@ _LAZY = {
         "nuno.tasks.pick_towel": "TowelPicker",
         "nuno.tasks.play_fold": "PlayedFold play_fold",
         "nuno.tasks.taught_fold": "TaughtFold",
+        "nuno.viewer.compare_engines": "EngineComparison compare_engines",
         "nuno.viewer.film": "Film",
         "nuno.viewer.viewer": "Viewer",
         "nuno.world.contact_points": "ContactPoints",

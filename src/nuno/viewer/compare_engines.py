@@ -14,10 +14,16 @@ import numpy as np
 from tqdm import tqdm
 
 from nuno.engines.engine_registry import engine_class
-from nuno.errors import EngineCapabilityError, InvalidInputError, MissingPackageError, SimulationDiverged
+from nuno.errors import (
+    EngineCapabilityError,
+    FileWriteError,
+    InvalidInputError,
+    MissingPackageError,
+    SimulationDiverged,
+)
 from nuno.files.recording import Recording
-from nuno.files.whole_file import write_whole
-from nuno.validation import checked, number
+from nuno.files.whole_file import file_path, write_whole
+from nuno.validation import checked, count, number
 from nuno.viewer.film import Film
 from nuno.viewer.side_by_side import side_by_side
 from nuno.world.snapshot import Snapshot
@@ -66,15 +72,20 @@ class EngineComparison:
                     )  # fmt: skip
         return rows
 
+    @checked
     def table(self, rows: int = 11) -> str:
         """Return a table of differences over time, as text: mean (largest) distance of each body's vertices [mm].
 
         Args:
             rows: How many times it has, the first and the last among them.
+
+        Raises:
+            InvalidInputError: fewer than two rows.
         """
+        count("rows", rows, low=2)
         found = {(row["body"], row["engine"], row["time"]): row for row in self.differences()}
         times = self.recordings[self.engines[0]].times
-        chosen = times[np.unique(np.linspace(0, len(times) - 1, max(2, rows)).round().astype(int))]
+        chosen = times[np.unique(np.linspace(0, len(times) - 1, rows).round().astype(int))]
         columns = [(body, engine) for body in self.moving for engine in self.engines[1:]]
         titles = ["t / s", *(f"{body}: {engine} from {self.engines[0]} / mm" for body, engine in columns)]
         lines = [titles]
@@ -100,8 +111,11 @@ class EngineComparison:
         Raises:
             FileWriteError: no such folder can be made, or written to.
         """
-        goal = Path(folder)
-        goal.mkdir(parents=True, exist_ok=True)
+        goal = Path(file_path(folder))
+        try:
+            goal.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileWriteError(f"cannot make the folder {os.fspath(folder)!r}: {error}") from error
         self.film().save(goal / "film.html", title=" | ".join(self.engines))
         content = {
             "engines": list(self.engines), "cpu_seconds": self.cpu_seconds, "failures": self.failures,

@@ -41,7 +41,7 @@ class NewtonModel:
         origin: (3,) [m], where its own coordinates begin.
         particles: By body's key, the first particle of each world (worlds,) int.
         bodies: By body's key, the index of its rigid body in each world (worlds,) int.
-        held: By body's key, the vertices that grips lead, (k,) int.
+        led_bodies: The keys of rigid bodies that paths or grips move.
         touching: The distance [m] at which layers of cloth touch, or None where nothing touches itself.
     """
 
@@ -69,7 +69,6 @@ def membrane(material: dict[str, np.ndarray]) -> tuple[float, float]:
 def build_model(world: Simulation) -> NewtonModel:
     """Return the model of a world's bodies, in the shapes that they have at rest and where static ones are now."""
     import newton
-    import warp as wp
 
     bodies = list(world._bodies.values())
     moving = [body for body in bodies if body._dynamics is not None]
@@ -102,7 +101,6 @@ def build_model(world: Simulation) -> NewtonModel:
     if itself or len(deforming) > 1:
         made.touching = max((_thickness(body) for body in deforming), default=0.0) or 1e-3
     made.model = model
-    del wp
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.engines.newton.newton_model import NewtonModel
     from nuno.world.simulation import Simulation
-
-logger = logging.getLogger(__name__)
 
 SLIP = 1e-4
 """[m/s] below which friction is less than Coulomb's: what sticks creeps by less."""
