@@ -132,7 +132,8 @@ def compare_engines(
 ) -> EngineComparison:  # fmt: skip
     """Run a saved world on several engines, and return where each of them took it.
 
-    An engine that lacks something that the world needs, or is not installed, or diverges, is left out, and its reason kept.
+    An engine that lacks something that the world needs, or is not installed, or diverges, is left out; its reason is
+    kept.
 
     Args:
         scene: What ``World.save`` returned, or its file (.npz): a single world.

@@ -81,11 +81,11 @@ class NewtonEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
-        if self._made is None or any(dynamics.grips_changed for dynamics in self.world._attached()):
+        if self._made is None or any(own.grips_changed for own in self.world._attached()):
             from nuno.engines.newton.newton_model import build_model
 
-            for dynamics in self.world._attached():
-                dynamics.grips_changed = False
+            for each in self.world._attached():
+                each.grips_changed = False
             self._made, self._substeps = build_model(self.world), None
         if self._substeps is None:
             from nuno.engines.newton.newton_substeps import NewtonSubsteps

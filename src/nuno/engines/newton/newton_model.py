@@ -75,7 +75,8 @@ def build_model(world: Simulation) -> NewtonModel:
     deforming = [body for body in moving if isinstance(body._dynamics, ArrayParticles)]
     centres = [body._dynamics.pose(body)[0].reshape(-1, 3).mean(axis=0) for body in moving]  # type: ignore[union-attr]
     origin = np.round(np.mean(centres, axis=0) * 16) / 16 if centres else np.zeros(3)
-    scene = newton.ModelBuilder(gravity=tuple(float(g) for g in world.gravity))
+    down: Any = tuple(float(g) for g in world.gravity)
+    scene = newton.ModelBuilder(gravity=down)
     scene.rigid_gap = 0.005
     made = NewtonModel(None, origin)
     _warn_of_exceptions(world, deforming, bodies)
