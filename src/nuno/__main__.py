@@ -1,6 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compare``,
-``compile``.
-"""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compare``, ``compile``."""
 
 from __future__ import annotations
 

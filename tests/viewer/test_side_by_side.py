@@ -24,11 +24,8 @@ def test_the_second_film_stands_beside_the_first():
     assert len(whole) == len(films[0]) and whole.duration == pytest.approx(0.1)
     tracks = {track.obj.path: track for track in whole._tracks.values()}
     assert set(tracks) == {("left", "floor"), ("left", "box"), ("left", "ball"), ("right", "box"), ("right", "ball")}
-    step = (
-        tracks["right", "box"].poses[0][:3] - tracks["left", "box"].poses[0][:3]
-        if tracks["left", "box"].poses
-        else (tracks["right", "box"].points[0][0] - tracks["left", "box"].points[0][0])
-    )
+    right, left = (tracks[side, "box"].poses[0][:3] for side in ("right", "left"))
+    step = right - left
     width = 0.5 + 0.1  # from the box's far side to the ball's, 0.1 m about the origin
     assert step == pytest.approx([1.25 * width, 0, 0], abs=0.1 * width)  # a ball's bounds are taken by its radius
 

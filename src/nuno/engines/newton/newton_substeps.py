@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -53,9 +53,8 @@ class NewtonSubsteps:
         self.speeds = np.zeros((model.body_count, 6), np.float32)
         self.wrenches = np.zeros_like(self.speeds)
         self.forces_on: Any = wp.zeros(int(model.particle_count), dtype=wp.vec3, device=self.device)
-        self.wrenches_on: Any = wp.zeros(
-            int(model.body_count), dtype=cast("Any", wp.spatial_vector), device=self.device
-        )
+        twist: Any = wp.spatial_vector
+        self.wrenches_on: Any = wp.zeros(int(model.body_count), dtype=twist, device=self.device)
         self.points: dict[str, np.ndarray] = {}
         self.leads: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.body_leads: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
