@@ -94,6 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     compared.add_argument("--device", default="cpu", help="cpu (default), cuda, cuda:1 ...; mujoco has the CPU only")
     for command in (pick, fold, serve):
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
+    pick.add_argument("--engine", default="nuno", help="what moves the imagined cloths: nuno (default), mujoco ...")
     for command in (pick, fold, compared):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
@@ -133,7 +134,9 @@ def _pick(options: argparse.Namespace) -> int:
     case = read_case(options.case)
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
-    result = case.estimate(candidates=grid, sideways=sideways, device=options.device, progress=options.progress)
+    result = case.estimate(
+        candidates=grid, sideways=sideways, device=options.device, engine=options.engine, progress=options.progress
+    )
     result.save(options.out)
     i, j = result.best
     sys.stdout.write(

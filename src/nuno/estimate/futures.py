@@ -57,11 +57,14 @@ class Futures:
     @property
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool: which futures' states are numbers."""
-        return solver_of(self.body).finite().reshape(len(self.discretisation.hypotheses), self.candidates)
+        assert self.body._dynamics is not None
+        return self.body._dynamics.finite().reshape(len(self.discretisation.hypotheses), self.candidates)
 
     @property
     def positions(self) -> wp.array:
         """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
+        if not self.world.engine.is_builtin:
+            return self.world.state(self.body)["positions"]
         return solver_of(self.body).positions_on_device()
 
     def whole(self, world: int) -> tuple[Futures, int]:
@@ -76,7 +79,7 @@ def solver_of(body: Body) -> Any:
 
 
 def table_world(
-    rectangle: ClothRectangle, table: Table, cells: tuple[int, int], *, device: str, substeps: int
+    rectangle: ClothRectangle, table: Table, cells: tuple[int, int], *, device: str, substeps: int | None
 ) -> tuple[World, Body]:
     """A world with the table, the floor and the cloth as it lay before; the cloth is static."""
     world = World(device=device, substeps=substeps)
@@ -113,17 +116,19 @@ def begin_picks(
     rest_height: float,
     device: str,
     lift_seconds: float = LIFT_SECONDS,
+    engine: str = "nuno",
 ) -> Futures:
     """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
-    world, cloth = table_world(rectangle, table, cells, device=device, substeps=discretisation.substeps)
+    substeps = discretisation.substeps if engine == "nuno" else None  # they are those of Nuno's solver
+    world, cloth = table_world(rectangle, table, cells, device=device, substeps=substeps)
     k, hypotheses = len(candidates), discretisation.hypotheses
     count = k * len(hypotheses)
 
     def each(name: str) -> np.ndarray:
         return np.repeat([getattr(h, name) for h in hypotheses], k)
 
-    futures = world.imagine(count)
+    futures = world.imagine(count, engine=engine)
     body = futures.find(cloth.name)
     for static in ("table", "floor"):
         if any(b.name == static for b in futures.bodies):
@@ -175,6 +180,7 @@ def imagine_picks(
     rest_height: float,
     device: str,
     lift_seconds: float = LIFT_SECONDS,
+    engine: str = "nuno",
 ) -> Futures:
     """Pick the cloth at every candidate under every hypothesis, move it to the hand and let it come to rest.
 
@@ -188,10 +194,11 @@ def imagine_picks(
         rest_height: Height of the cloth's middle surface above the table [m].
         device: Where to simulate.
         lift_seconds: Duration of the hand's motion [s], on a straight line with minimum jerk.
+        engine: What moves the cloths.
     """
     futures = begin_picks(
         rectangle, candidates, grid, discretisation, table=table, hand=hand, rest_height=rest_height, device=device,
-        lift_seconds=lift_seconds,
+        lift_seconds=lift_seconds, engine=engine,
     )  # fmt: skip
     futures.world.run(lift_seconds, progress=False)
     settled = 0.0
@@ -205,7 +212,10 @@ def imagine_picks(
 
 def rest_speed(body: Body) -> float:
     """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
-    return slow_part(mean_speeds(*solver_of(body).velocities_apart()))
+    if isinstance(body._dynamics, ParticleDynamics):
+        return slow_part(mean_speeds(*solver_of(body).velocities_apart()))
+    assert body._dynamics is not None
+    return slow_part(mean_speeds(*np.moveaxis(body._dynamics.velocities(body), -1, 0)))
 
 
 def mean_speeds(vx: np.ndarray, vy: np.ndarray, vz: np.ndarray) -> np.ndarray:

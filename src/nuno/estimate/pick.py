@@ -59,6 +59,7 @@ def estimate_pick(
     sideways: float | None = SIDEWAYS,
     score: str = "evidence",
     device: str = "auto",
+    engine: str = "nuno",
     progress: bool | None = None,
 ) -> PickResult:
     """Estimate where a flat cloth was picked up, from an image before and one after.
@@ -104,6 +105,8 @@ def estimate_pick(
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
+        engine: What moves the imagined cloths, as of ``World``: another than "nuno" is a check of the answer by physics
+            that nobody here wrote, and many times slower.
         progress: Progress bar; None shows one on a terminal.
 
     Raises:
@@ -112,13 +115,16 @@ def estimate_pick(
         ImageError: an image that cannot be read or is not of the camera's size.
         ClothNotFoundError: no cloth in an image.
         EstimationError: no candidate gave a finite future.
+        UnknownNameError: there is no such engine.
+        MissingPackageError: its package is not installed.
+        EngineCapabilityError: it cannot do that, or not on the device.
     """
     stages = Stages("read", "see", "compile", "imagine", "compare")
     settings = check_settings(
         table=check_table(table_height, table_half_extents, table_centre, table_thickness), camera=camera, hand=hand,
         candidates=candidates, rest_height=rest_height, hand_radius=hand_radius, lift_seconds=lift_seconds,
         discretisations=discretisations, sure=sure, turns=turns, learned=learned, sideways=sideways, score=score,
-        device=device, progress=progress,
+        device=device, engine=engine, progress=progress,
     )  # fmt: skip
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)

@@ -17,6 +17,7 @@ from nuno.estimate.ranking import EVIDENCE, RANKINGS
 from nuno.estimate.rotations import checked_turns
 from nuno.validation import LONGEST_WAIT, finite_array, number
 from nuno.world.device import checked_device, found_device
+from nuno.world.world import World
 
 MAX_CANDIDATES = 1024
 """Each is imagined several times, on a mesh with a vertex there: more would take hours, and memory that few have."""
@@ -34,6 +35,7 @@ class PickSettings:
         grid: Candidates along both sides; (2, 2) where points were given.
         turns: (t,) float [rad]; 0 alone where something else than evidence ranks.
         device: "cpu" or "cuda:0" ...
+        engine: What moves the imagined cloths.
     """
 
     camera: Camera
@@ -53,6 +55,7 @@ class PickSettings:
     score: str
     device: str
     progress: bool | None
+    engine: str = "nuno"
 
     @property
     def with_evidence(self) -> bool:
@@ -63,13 +66,21 @@ class PickSettings:
 def check_settings(
     *, camera: Camera | Mapping[str, Any], table: Table, hand: ArrayLike, candidates: tuple[int, int] | ArrayLike,
     discretisations: Sequence[Discretisation], turns: Sequence[float], score: str, device: str, rest_height: float,
-    lift_seconds: float, sure: float, sideways: float | None, **others: Any,
+    lift_seconds: float, sure: float, sideways: float | None, engine: str = "nuno",
+    **others: Any,
 ) -> PickSettings:  # fmt: skip
     """Check the arguments of `nuno.estimate_pick` that are no images.
 
     Raises:
         InvalidInputError: as `nuno.estimate_pick`.
+        UnknownNameError, MissingPackageError, EngineCapabilityError: of the engine, likewise.
     """
+    if engine != "nuno":
+        # what is imagined there is a batch of cloths that are gripped
+        World(device="cpu" if device == "auto" else device, engine=engine).engine.require(
+            "cloth", "batch", "worlds' materials", "grips of vertices"
+        )
+        device = "cpu"
     camera = camera if isinstance(camera, Camera) else Camera.from_dict(camera)
     hand = finite_array("hand", hand, (3,))
     _check_hand(camera, hand, table)
@@ -90,7 +101,7 @@ def check_settings(
         camera=camera, table=table, hand=hand, labels=labels, uv=uv, grid=grid, rest_height=rest_height,
         lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
         turns=angles if score in EVIDENCE else np.zeros(1), sideways=sideways, score=score,
-        device=found_device(checked_device(device)), **others,
+        device=found_device(checked_device(device)), engine=engine, **others,
     )  # fmt: skip
 
 

@@ -79,7 +79,7 @@ def try_picks(
     uv, table, hand = settings.uv, settings.table, settings.hand
     arguments: dict[str, Any] = dict(
         rectangle=rectangle, grid=settings.grid, table=table, hand=hand, rest_height=settings.rest_height,
-        device=settings.device, lift_seconds=settings.lift_seconds,
+        device=settings.device, lift_seconds=settings.lift_seconds, engine=settings.engine,
     )  # fmt: skip
     prior = None if settings.sideways is None else log_prior_of_lift(rectangle, uv, hand, settings.sideways)
     comparisons: list[Comparison] = []
