@@ -223,6 +223,7 @@ CALLS = {
     "draw": {"body": lambda s: s.towel},
     "each": {"trial": lambda s: trial},
     "elements": {"body": lambda s: s.cube},
+    "engine_capabilities": {"engine": "nuno"},
     "estimate_pick": {
         "before": IMAGE, "after": IMAGE, "camera": lambda s: s.camera, "table_height": 0.0, "hand": POINT,
         "progress": False,

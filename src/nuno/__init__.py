@@ -28,6 +28,7 @@ from nuno.errors import (
     BodyStateError,
     ClothNotFoundError,
     ConnectionLostError,
+    EngineCapabilityError,
     EstimationError,
     FileFormatError,
     FileWriteError,
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from nuno.camera.picture import Chequer, Lamp, Picture, take_picture
     from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
+    from nuno.engines.engine_registry import engine_capabilities
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -156,6 +158,7 @@ __all__ = [
     "Drawing",
     "ElementState",
     "EngineComparison",
+    "EngineCapabilityError",
     "EstimationError",
     "FileFormatError",
     "FileWriteError",
@@ -268,6 +271,7 @@ __all__ = [
     "draw",
     "each",
     "elements",
+    "engine_capabilities",
     "estimate_pick",
     "export_body",
     "find_layers",
@@ -321,6 +325,7 @@ _LAZY = {
         "nuno.camera.picture": "Chequer Picture take_picture",
         "nuno.camera.segmentation": "segment_after segment_before",
         "nuno.camera.table": "Table",
+        "nuno.engines.engine_registry": "engine_capabilities",
         "nuno.estimate.case": "PickCase read_case",
         "nuno.estimate.fit_material": "MaterialFit fit_material",
         "nuno.estimate.fold": "replay_fold",

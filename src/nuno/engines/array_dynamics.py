@@ -15,6 +15,7 @@ from nuno.bodies.dynamics import Dynamics, State, check_material
 from nuno.bodies.given_velocity import GivenVelocity
 from nuno.bodies.shape_topology import element_count, topology_of
 from nuno.constraints.compliances import vertex_masses
+from nuno.engines.world_view import dynamics_of
 from nuno.materials import Material, Soft
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
@@ -46,7 +47,7 @@ class ArrayDynamics(Dynamics):
         super().__init__(material, friction, world)
         self.shape = body.shape
         self.substeps = 1
-        self._engine = world._engine
+        self._engine = world.engine
         self.values: State = {}
         self.load_state(values)
 
@@ -121,7 +122,7 @@ class ArrayParticles(ArrayDynamics):
         self.set_vertices(apply(motion, self.values["positions"]), turned, worlds)
 
     def set_vertices(self, vertices: np.ndarray, velocities: np.ndarray, worlds: np.ndarray) -> None:
-        """Set positions [m] and velocities [m/s] (worlds, n, 3), in some worlds (k,); what else there is begins anew."""
+        """Set positions [m] and velocities [m/s] (worlds, n, 3), in some worlds (k,); other values begin anew."""
         own = self.values
         own["positions"][worlds], own["velocities"][worlds] = vertices[worlds], velocities[worlds]
         for name in own.keys() - set(self.NEUTRAL):
@@ -230,7 +231,7 @@ class ArrayRigid(ArrayDynamics):
 
 def motions_of(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return places, turns, velocities and spins of rigid bodies' frames, (worlds, n, 3 or 4) each."""
-    own: list[Any] = [body._dynamics for body in bodies]
+    own: list[Any] = [dynamics_of(body) for body in bodies]
     values = {name: np.stack([made.values[name] for made in own], axis=1) for name in ArrayRigid.NEUTRAL}
     arms = np.stack([made.values["place"] - made.middle() for made in own], axis=1)
     velocities = values["velocity"] + np.cross(values["spin"], arms)

@@ -10,6 +10,7 @@ from nuno.bodies.dynamics import Dynamics, ParticleDynamics, State
 from nuno.bodies.given_velocity import GivenVelocity
 from nuno.bodies.make_dynamics import make_dynamics, start_dynamics
 from nuno.engines.engine import CAPABILITIES, Engine
+from nuno.engines.world_view import dynamics_of
 from nuno.materials import Material, Rigid
 
 if TYPE_CHECKING:
@@ -41,8 +42,7 @@ class BuiltinEngine(Engine):
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
-        dynamics = body._dynamics
-        assert dynamics is not None
+        dynamics = dynamics_of(body)
         if not neutral:
             dynamics.load_state(state)
         elif isinstance(dynamics, ParticleDynamics):
@@ -57,12 +57,16 @@ class BuiltinEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies."""
-        self.world._stepping.run(start, end)
+        self._stepping.run(start, end)
+
+    @property
+    def _stepping(self) -> Any:
+        return self.world._stepping
 
     def wrench(self, grip: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return what a grip bears."""
-        return self.world._stepping.wrench(grip)
+        return self._stepping.wrench(grip)
 
     def effort(self, joint: Any) -> np.ndarray:
         """Return what a joint's drives do."""
-        return self.world._stepping.effort(joint)
+        return self._stepping.effort(joint)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from nuno.engines.engine_needs import needs_of_dynamics, needs_of_grip
+from nuno.engines.led import led_velocity
+from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import EngineCapabilityError
 
 if TYPE_CHECKING:
@@ -60,9 +62,9 @@ CAPABILITIES: dict[str, str] = {
 class Engine(ABC):
     """The engine of one world: it makes the dynamics of bodies and steps them.
 
-    A world asks `allow_dynamics` and `allow_grip` before it changes anything; what the engine lacks is refused there, by
-    name. Bodies, grips and rules are the world's own, to be read whenever the engine steps; `changed` says that any
-    of them is another now.
+    A world asks `allow_dynamics` and `allow_grip` before it changes anything; what the engine lacks is refused there,
+    by name. Bodies, grips and rules are the world's own, to be read whenever the engine steps; `changed` says that
+    any of them is another now.
 
     Attributes:
         name: What ``World(engine=...)`` calls it.
@@ -141,8 +143,7 @@ class Engine(ABC):
         "turn" (w, x, y, z), of the body's frame, "velocity" [m/s] of its centre of mass and "spin" [rad/s] (worlds, 3
         or 4).
         """
-        dynamics = body._dynamics
-        assert dynamics is not None
+        dynamics = dynamics_of(body)
         if not dynamics.is_rigid:
             return {"positions": dynamics.vertices(body).copy(), "velocities": dynamics.velocities(body).copy()}
         worlds = self.world.world_count
@@ -168,9 +169,13 @@ class Engine(ABC):
         pushed by ``Dynamics.pushing(start)`` throughout.
         """
 
+    def finite(self, body: Body) -> np.ndarray:
+        """Return (worlds,) bool, whether all numbers of a dynamic body's state are finite."""
+        return np.atleast_1d(dynamics_of(body).finite())
+
     def keep(self) -> Any:
         """Return what `put_back` takes, all that a step changes."""
-        return [(dynamics, dynamics.state()) for dynamics in self.world._attached()]
+        return [(dynamics, dynamics.state()) for dynamics in attached(self.world)]
 
     def put_back(self, kept: Any) -> None:
         """Set all that a step changes to what it was at `keep`."""
@@ -178,6 +183,21 @@ class Engine(ABC):
             dynamics.load_state(state)
 
     # What it tells
+
+    def velocity_at(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocity [m/s] of a point of a body that does not deform, and its spin [rad/s], (worlds, 3) each.
+
+        Args:
+            body: The body; None is the world.
+            point: (worlds, 3) [m].
+        """
+        if body is None:
+            return np.zeros_like(point), np.zeros_like(point)
+        if (dynamics := dynamics_of(body)) is not None:
+            motion = dynamics.motion(body)
+            spin = motion.angular_velocity
+            return motion.velocity + np.cross(spin, point - motion.centre), spin
+        return led_velocity(self.world, body, point)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
         """Return the force [N] and torque [N m], (worlds, 3) each, that a grip or joint bears; see ``Grip.wrench``."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.world_view import rules_of
 from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.joint_drives import DRIVES
@@ -35,7 +36,7 @@ def needs_of_dynamics(body: Body, material: Material, world: Simulation) -> list
         needs.append("cloth")
         needs += ["directed stretch"] if _differ(material.stretch_stiffness) else []
         needs += ["directed bending"] if _differ(material.bending_rigidity) else []
-        needs += ["self-contact of cloth"] if world._rules.touches_itself(body) else []
+        needs += ["self-contact of cloth"] if rules_of(world).touches_itself(body) else []
     elif isinstance(material, Soft):
         needs.append("soft bodies")
         needs += ["self-contact of soft bodies"] if material.self_contact else []
@@ -69,7 +70,10 @@ def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
 
 
 def _differ(value: Any) -> bool:
-    return isinstance(value, tuple) and not np.array_equal(*np.broadcast_arrays(*value))
+    if not isinstance(value, tuple):
+        return False
+    warp, weft = np.broadcast_arrays(*value)
+    return not np.array_equal(warp, weft)
 
 
 def _between(weights: np.ndarray) -> bool:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nuno.engines.world_view import schedule_of
 from nuno.joints.grip import Grip, GripSpec
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
@@ -18,11 +19,26 @@ if TYPE_CHECKING:
 def led_poses(world: Simulation, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
     """Return where a static body is at ``times`` (k,) [s] of a step: (worlds, k, 3) [m] and (worlds, k, 4)."""
     shape = (world.world_count, len(times))
-    schedule = world._schedule
+    schedule = schedule_of(world)
     if schedule is None or body.key not in schedule.poses:
         place, turn = (part[..., None, :] for part in body.pose())
         return np.broadcast_to(place, (*shape, 3)), np.broadcast_to(turn, (*shape, 4))
     return _between(*schedule.in_frame(body.key, 0), (times - start) / (end - start), shape)
+
+
+def led_velocity(world: Simulation, body: Body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the velocity [m/s] of a static body's point in the last step, and its spin [rad/s], (worlds, 3) each."""
+    schedule, still = schedule_of(world), np.zeros_like(point)
+    if schedule is None or body.key not in schedule.poses or schedule.times[-1] < world.time - 1e-9:
+        return still, still
+    start, end = schedule.in_frame(body.key, 0)
+    duration = float(schedule.times[-1] - schedule.times[0])
+    turn = np.broadcast_to(quat.multiply(end[1], quat.inverse(start[1])), (len(point), 4))
+    turn = np.where(turn[:, :1] < 0.0, -turn, turn)
+    sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
+    axis = np.divide(turn[:, 1:], sine, out=np.zeros_like(still), where=sine > 0.0)
+    spin = axis * 2.0 * np.arctan2(sine, turn[:, :1]) / duration
+    return (end[0] - start[0]) / duration + np.cross(spin, point - end[0]), spin
 
 
 def led_points(grip: Grip, start: float, frame: float, times: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from nuno.bodies.dynamics import ParticleDynamics
 from nuno.bodies.make_bodies import box, plane, sheet
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
+from nuno.engines.world_view import dynamics_of
 from nuno.estimate.hypotheses import Discretisation, cell_counts
 from nuno.materials import Cloth
 from nuno.shapes.path import Path
@@ -57,8 +58,7 @@ class Futures:
     @property
     def finite(self) -> np.ndarray:
         """(hypotheses, candidates) bool: which futures' states are numbers."""
-        assert self.body._dynamics is not None
-        return self.body._dynamics.finite().reshape(len(self.discretisation.hypotheses), self.candidates)
+        return dynamics_of(self.body).finite().reshape(len(self.discretisation.hypotheses), self.candidates)
 
     @property
     def positions(self) -> wp.array:
@@ -212,10 +212,10 @@ def imagine_picks(
 
 def rest_speed(body: Body) -> float:
     """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
-    if isinstance(body._dynamics, ParticleDynamics):
+    dynamics = dynamics_of(body)
+    if isinstance(dynamics, ParticleDynamics):
         return slow_part(mean_speeds(*solver_of(body).velocities_apart()))
-    assert body._dynamics is not None
-    return slow_part(mean_speeds(*np.moveaxis(body._dynamics.velocities(body), -1, 0)))
+    return slow_part(mean_speeds(*np.moveaxis(dynamics.velocities(body), -1, 0)))
 
 
 def mean_speeds(vx: np.ndarray, vy: np.ndarray, vz: np.ndarray) -> np.ndarray:

@@ -137,7 +137,7 @@ class Joint(Grip):
         """
         world = self._live()
         with world.lock:
-            return self._given(world._engine.effort(self))
+            return self._given(world.engine.effort(self))
 
     @property
     def limits(self) -> tuple[Any, Any]:
@@ -205,7 +205,10 @@ class Joint(Grip):
         world = self._live()
         with world._change("set on a joint"):
             drives = drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)
-            self.spec = replace(self.spec, drives=drives)
+            changed = replace(self.spec, drives=drives)
+            world.engine.allow_grip(changed, self.target is not None and self.target._dynamics is not None)
+            self.spec = changed
+            world.engine.changed()
 
     def _poses(self) -> tuple[Any, Any]:
         """The joint's frame in the body and in the other, (worlds, 3) and (worlds, 4) each, in the world's frame."""
@@ -221,6 +224,8 @@ class Joint(Grip):
     def _motion(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] of a body's point and its angular velocity [rad/s], (worlds, 3) each."""
         world = self._live()
+        if not world.engine.is_builtin:
+            return world.engine.velocity_at(body, point)
         scene = world._rigid
         slot = None if body is None or scene is None else scene.slot_of(world, body)
         if slot is None or scene is None:

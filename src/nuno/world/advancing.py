@@ -9,8 +9,7 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON, Dynamics, ParticleDynamics
 from nuno.errors import SimulationDiverged
-from nuno.tables.kinematic_motion import arrive
-from nuno.world.engine_frames import step_frames
+from nuno.tables.kinematic_motion import arrive, make_schedule
 from nuno.world.impacts import are_fast
 from nuno.world.run_start import RunStart
 from nuno.world.simulation import Simulation
@@ -43,7 +42,7 @@ class Advancing(Simulation):
         try:
             self._reported = start
             if not self._engine.is_builtin:
-                step_frames(self, finish, look, instants)
+                self._step_frames(finish, look, instants)
             while self._engine.is_builtin and not self._go_through(moving, finish, look, instants, again is None):
                 before.go_back()
                 if again is not None:
@@ -96,6 +95,31 @@ class Advancing(Simulation):
                 raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
         return True
 
+    def _step_frames(self, finish: float, look: Callable[[float], None] | None, instants: np.ndarray | None) -> None:
+        """Advance by another engine than Nuno's own, in spans between frame ends, looks and the ends of pushes."""
+        start, frame = self._time, 1.0 / self.frame_rate
+        ends = start + frame * np.arange(1, int((finish - start) / frame + 1e-6) + 1)
+        asked = ends if instants is None else np.asarray(instants)
+        pushes = [p.end for dynamics in self._attached() for p in dynamics.pushes if p.end is not None]
+        now = start
+        for stop in _apart([*ends.tolist(), *pushes, *asked.tolist()], start, finish):
+            kinematic, self._rests = self._kinematic_bodies(), False
+            self._schedule = make_schedule(kinematic, now, stop - now, frame) if kinematic else None
+            self._engine.step(now, stop)
+            broken = [body for body in self._bodies.values() if body.is_dynamic and not self._engine.finite(body).all()]
+            if broken:
+                worlds = tuple(np.flatnonzero(~self._engine.finite(broken[0])).tolist())
+                raise SimulationDiverged(broken[0].name, start, worlds)
+            now = stop
+            due = np.abs(asked - stop).min(initial=np.inf) < SOON or (instants is None and stop == finish)
+            if look is not None and due and stop > self._reported + SOON:
+                self._telling = True
+                try:
+                    look(stop)
+                finally:
+                    self._telling = False
+                self._reported = stop
+
     def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
         """Return True if the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""
         longer = self._make_room()
@@ -141,3 +165,12 @@ class Advancing(Simulation):
         if stop - now > SOON:
             self._stepping.run(now, stop)
         return True
+
+
+def _apart(stops: list[float], start: float, finish: float) -> list[float]:
+    """Return the instants after ``start`` up to ``finish`` [s], in order, of those that rounding alone parts one."""
+    found: list[float] = []
+    for stop in sorted(stops):
+        if stop > (found[-1] if found else start) + SOON and stop < finish - SOON:
+            found.append(stop)
+    return [*found, finish]

@@ -28,13 +28,13 @@ def capture(world: Simulation, engine: str | None = None) -> Snapshot:
         world: The world.
         engine: For a world of which engine; for another's than its own, states are neutral.
     """
-    neutral = engine is not None and engine != world._engine.name
+    neutral = engine is not None and engine != world.engine.name
     rules = world._rules
     ignored = sorted((min(pair), max(pair)) for pair in rules.ignored)
     pairs = [(min(pair), max(pair), mu) for pair, mu in rules.friction.items()]
     return Snapshot(
         time=world.time, gravity=world.gravity, frame_rate=world.frame_rate, substeps=world.substeps,
-        world_count=world.world_count, family=world._family, engine=NEUTRAL if neutral else world._engine.name,
+        world_count=world.world_count, family=world._family, engine=NEUTRAL if neutral else world.engine.name,
         bodies=tuple(_body_record(body, world, neutral) for body in world._bodies.values()),
         grips=tuple(_grip_record(grip) for dynamics in world._attached() for grip in dynamics.grips),
         pair_friction=tuple(sorted(pairs, key=lambda pair: pair[:2])),
@@ -51,7 +51,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     Raises:
         EngineCapabilityError: the world's engine lacks something that is in the snapshot.
     """
-    if snapshot.engine not in (NEUTRAL, world._engine.name):
+    if snapshot.engine not in (NEUTRAL, world.engine.name):
         snapshot = _neutral(snapshot, world)
     neutral = snapshot.engine == NEUTRAL
     _check_engine(snapshot, world)
@@ -88,7 +88,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     bring_static(snapshot.rigid, bodies, world)
     for record in snapshot.bodies:
         if record.dynamics is not None:
-            world._engine.load(bodies[record.key], record.dynamics.state, neutral)
+            world.engine.load(bodies[record.key], record.dynamics.state, neutral)
     for grip in snapshot.grips:
         _restore_grip(grip, bodies, world)
     world._rules.friction = {frozenset((a, b)): mu for a, b, mu in snapshot.pair_friction}
@@ -105,7 +105,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
 
 def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
     """Refuse a snapshot of what the world's engine lacks; dynamics are looked at as they are made."""
-    engine = world._engine
+    engine = world.engine
     if engine.is_builtin:
         return
     moving = {record.key for record in snapshot.bodies if record.dynamics is not None}
@@ -126,7 +126,7 @@ def _neutral(snapshot: Snapshot, world: Simulation) -> Snapshot:
     other = type(world)(device=world._device, engine=snapshot.engine)
     apply(snapshot, other)
     return replace(
-        capture(other, world._engine.name), family=snapshot.family, from_file=snapshot.from_file,
+        capture(other, world.engine.name), family=snapshot.family, from_file=snapshot.from_file,
         drivers=snapshot.drivers,
     )  # fmt: skip
 
@@ -135,7 +135,7 @@ def _body_record(body: Body, world: Simulation, neutral: bool = False) -> BodyRe
     dynamics = None
     if body._dynamics is not None:
         own = body._dynamics
-        state = world._engine.neutral_state(body) if neutral else own.state()
+        state = world.engine.neutral_state(body) if neutral else own.state()
         dynamics = DynamicsRecord(own.material, own.friction, state, tuple(own.pushes))
     parent = body._parent if isinstance(body._parent, Body) and body._parent._world is world else None
     pose = (body._position, body._quaternion) if parent or body._dynamics else body.pose()
@@ -190,13 +190,13 @@ def _dynamics_for(
 ) -> Dynamics:
     current: Any = body._dynamics
     if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
-        if not current.is_rigid or not world._engine.is_builtin or current.scene is world._rigid:
+        if not current.is_rigid or not world.engine.is_builtin or current.scene is world._rigid:
             return current
     as_recorded = Body(record.shape)
     as_recorded.key = body.key
     _set_up(as_recorded, record)
-    world._engine.allow_dynamics(as_recorded, own.material)
-    return world._engine.make(as_recorded, own.material, own.state, own.friction, neutral)
+    world.engine.allow_dynamics(as_recorded, own.material)
+    return world.engine.make(as_recorded, own.material, own.state, own.friction, neutral)
 
 
 def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:

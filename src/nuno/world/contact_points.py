@@ -55,8 +55,8 @@ class ContactPoints:
 
 def contact_points(world: Simulation, body: Body, itself: bool = False) -> ContactPoints:
     """Return a dynamic body's contacts; see ``World.contacts``."""
-    if not world._engine.is_builtin:
-        return ContactPoints.joined(list(world._engine.contacts(body, itself)), {})
+    if not world.engine.is_builtin:
+        return ContactPoints.joined(list(world.engine.contacts(body, itself)), {})
     dynamics: Any = body._dynamics
     found: list[tuple[Any, ...]] = []
     impulses: dict[str, np.ndarray] = {}
@@ -92,7 +92,7 @@ def frame_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str, 
     for k, body in enumerate(bodies):
         if (dynamics := body._dynamics) is not None and dynamics.is_rigid:
             rigid[k] = dynamics
-    if rigid and world._engine.is_builtin:
+    if rigid and world.engine.is_builtin:
         names, by_slot = _names(world), next(iter(rigid.values())).solver.impulses()
         for k, own in rigid.items():
             given = by_slot.get(own.slot, {})

@@ -71,8 +71,8 @@ def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> N
     shift = np.zeros(snapshot.world_count) if snapshot.clock_shift is None else snapshot.clock_shift
     clocks = np.zeros(count) if world._clock_shift is None else world._clock_shift.copy()
     clocks[worlds] = world.time - snapshot.time + shift[taken]
-    if snapshot.engine != world._engine.name:
-        raise BodyStateError(f"reset takes a snapshot of the engine {world._engine.name!r}, not {snapshot.engine!r}")
+    if snapshot.engine != world.engine.name:
+        raise BodyStateError(f"reset takes a snapshot of the engine {world.engine.name!r}, not {snapshot.engine!r}")
     snapshot = snapshot.at(world.time)
     at = WorldRows(worlds, taken, (count, snapshot.world_count), world.time)
     records = _matched(world, snapshot, at)

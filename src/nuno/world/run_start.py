@@ -23,7 +23,7 @@ class RunStart:
         self._world, self._moving = world, moving
         self._particles = [(d, d.keep()) for d in moving.values() if isinstance(d, ParticleDynamics)]
         self._rigid = None if world._rigid is None else world._rigid.save()
-        self._other = None if world._engine.is_builtin else world._engine.keep()
+        self._other = None if world.engine.is_builtin else world.engine.keep()
         # a rigid body's forces are among what is saved
         rigid: list[Any] = [d for d in moving.values() if d.is_rigid and self._other is None]
         self._pushed = [(d, d._pushing) for d in rigid]
@@ -40,7 +40,7 @@ class RunStart:
         if self._rigid is not None and world._rigid is not None:
             world._rigid.load(self._rigid)
         if self._other is not None:
-            world._engine.put_back(self._other)
+            world.engine.put_back(self._other)
         for dynamics, pushing in self._pushed:
             dynamics._pushing = pushing
         world._resting = self._resting

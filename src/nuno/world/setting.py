@@ -77,7 +77,9 @@ class Setting(Reading):
                                   (3,), (n, 3), (count, n, 3))  # fmt: skip
             chosen = checked_worlds(np.arange(count) if worlds is None else worlds, count)
             shape = (count, n, 3)
-            cast(ParticleDynamics, dynamics).set_vertices(np.broadcast_to(places, shape), np.broadcast_to(speeds, shape), chosen)
+            cast(ParticleDynamics, dynamics).set_vertices(
+                np.broadcast_to(places, shape), np.broadcast_to(speeds, shape), chosen
+            )
 
     def set_pose(
         self, body: Body | str, position: ArrayLike | None = None, quaternion: ArrayLike | None = None,

@@ -12,6 +12,7 @@ from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.led import led_poses
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.world_view import attached, bodies_by_key, dynamics_of, present_vertices
 from nuno.materials import Material, Rigid
 from nuno.shapes import quaternion as quat
 
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 STEP = 0.0021
-"""[s] The longest substep where none are asked for: MuJoCo's own default is 2 ms, a frame of 1/60 s has 8 of 2.08 ms."""
+"""[s] The longest substep where none are asked for: MuJoCo's default is 2 ms, a frame of 1/60 s has 8 of 2.08 ms."""
+BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+"""Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
     "self-contact of soft bodies", "restitution", "sliding grips", "compliant grips", "limited grips", "sliders",
     "joint drives", "effort", "impulses", "cuda", "robots",
@@ -51,7 +54,7 @@ class MujocoEngine(Engine):
             still = np.zeros((worlds, 3))
             values = {"place": place, "turn": turn, "velocity": still, "spin": still}
             return ArrayRigid(body, material, material.friction, self.world, values)
-        vertices = body._vertices()
+        vertices = present_vertices(body)
         vertices = np.broadcast_to(vertices, (worlds, *vertices.shape[-2:]))
         values = {"positions": vertices, "velocities": np.zeros(vertices.shape)}
         return ArrayParticles(body, material, material.friction, self.world, values)
@@ -63,8 +66,7 @@ class MujocoEngine(Engine):
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
-        assert body._dynamics is not None
-        body._dynamics.load_state(state)
+        dynamics_of(body).load_state(state)
 
     def changed(self) -> None:
         """Let the spec be looked through before the next step."""
@@ -92,7 +94,7 @@ class MujocoEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
-        scene = self.scene
+        scene, bodies = self.scene, bodies_by_key(self.world)
         batch = scene.batch
         count = max(1, math.ceil((end - start) / self.substep - 1e-6))
         step = (end - start) / count
@@ -102,17 +104,23 @@ class MujocoEngine(Engine):
         self.write(start)
         times = start + step * np.arange(count + 1)
         moving = [
-            (own, led_poses(self.world, self.world._bodies[key], start, end, times))
+            (own, led_poses(self.world, bodies[key], start, end, times))
             for key, own in scene.placed.items()
             if own.role == "moving"
         ]
         targets = scene.holds.targets(start, end, times)
+        bad = [int(getattr(mujoco_package().mjtWarning, name)) for name in BAD]
+        before = batch.warning[:, bad].copy()
         with warnings_logged():
             if not moving and not targets:
                 batch.step(nstep=count)
             else:
                 self._step_led(count, step, moving, targets)
         self._read()
+        diverged = (batch.warning[:, bad] != before).reshape(len(before), -1).any(axis=1)
+        for dynamics in attached(self.world) if diverged.any() else ():
+            for values in dynamics.values.values():
+                values[diverged] = np.nan
 
     def _step_led(self, count: int, step: float, moving: Any, targets: Any) -> None:
         """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
@@ -127,15 +135,15 @@ class MujocoEngine(Engine):
 
     def write(self, time: float) -> None:
         """Write all states and pushes into the batch."""
-        scene = self.scene
+        scene, bodies = self.scene, bodies_by_key(self.world)
         batch = scene.batch
         qpos, qvel, warm = (batch.bind(name) for name in ("qpos", "qvel", "qacc_warmstart"))
         warm[:] = 0.0
         applied, wrenches = batch.bind("qfrc_applied"), batch.bind("xfrc_applied")
         applied[:], wrenches[:] = 0.0, 0.0
         for key, own in scene.placed.items():
-            body = self.world._bodies[key]
-            dynamics: Any = body._dynamics
+            body = bodies[key]
+            dynamics = dynamics_of(body)
             if own.role == "static":
                 k = int(scene.model.body_mocapid[own.id])
                 batch.bind("mocap_pos")[:, k], batch.bind("mocap_quat")[:, k] = body.pose()
@@ -163,10 +171,10 @@ class MujocoEngine(Engine):
 
     def _read(self) -> None:
         """Read all states out of the batch."""
-        scene = self._scene
+        scene, bodies = self._scene, bodies_by_key(self.world)
         qpos, qvel, warm = (scene.batch.bind(name) for name in ("qpos", "qvel", "qacc_warmstart"))
         for key, own in scene.placed.items():
-            dynamics: Any = self.world._bodies[key]._dynamics
+            dynamics = dynamics_of(bodies[key])
             if dynamics is None:
                 continue
             values = dynamics.values

@@ -3,8 +3,9 @@
 A cloth is a flex of triangles. Its membrane is that of Saint Venant and Kirchhoff on the Green strain e: Nuno's
 stiffness along warp and weft and against shear, C = diag(stretch_warp, stretch_weft, shear), is written into each
 triangle's stiffness matrix, without a Poisson's ratio. Its bending is MuJoCo's hinge at each inner edge with the plate
-energy B kappa^2 / 2; an edge that lies at an angle takes B = (sqrt(B_warp) n_u^2 + sqrt(B_weft) n_v^2)^2 of its normal
-n, and a sheet's are corrected by `nuno.engines.mujoco.mujoco_bending`. A soft body is a flex of tetrahedra with MuJoCo's stable neo-Hookean law and the material's two numbers.
+energy B kappa^2 / 2; an edge takes B = (sqrt(B_warp) n_u^2 + sqrt(B_weft) n_v^2)^2 of its normal n, and a sheet's are
+corrected by `nuno.engines.mujoco.mujoco_bending`. A soft body is a flex of tetrahedra with MuJoCo's stable neo-Hookean
+law and the material's two numbers.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from nuno.bodies.shape_topology import element_count
 from nuno.engines.mujoco.mujoco_bending import BEND, bending_factors
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.sheet_triangles import sheet_triangles
 from nuno.shapes.shape import ClothMesh, Sheet
 
 if TYPE_CHECKING:
@@ -26,8 +28,8 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROW = 21
 """Numbers of a triangle in ``flex_stiffness``."""
 SOLID_ROW = 24
-"""Numbers of a tetrahedron in ``flex_stiffness``: 22 in proportion to the shear modulus mu, one to lambda + 2 mu, and one
-of its shape."""
+"""Numbers of a tetrahedron in ``flex_stiffness``: 22 in proportion to the shear modulus mu, one to lambda + 2 mu, and
+one of its shape."""
 STRETCH, BENDING = 1000.0, 1e-4
 """[N/m], [N m] What a cloth is compiled with; the numbers of its material are written afterwards."""
 YOUNG, POISSON = 1e4, 0.3
@@ -81,6 +83,7 @@ def add_flex(spec: Any, name: str, mesh: FlexMesh, dynamics: ArrayParticles) -> 
     """Add a flex and its vertices' bodies to a spec; return both."""
     mujoco = mujoco_package()
     slide, axes = mujoco.mjtJoint.mjJNT_SLIDE, np.eye(3)
+    material: Any = dynamics.material
     bodies = []
     for k, (place, mass) in enumerate(zip(mesh.rest, dynamics.mass[0], strict=True)):
         body = spec.worldbody.add_body(
@@ -92,14 +95,14 @@ def add_flex(spec: Any, name: str, mesh: FlexMesh, dynamics: ArrayParticles) -> 
     flex = spec.add_flex(name=name, dim=mesh.elements.shape[1] - 1)
     flex.vertbody = [f"{name}.{k}" for k in range(len(bodies))]
     flex.elem = mesh.elements.ravel().tolist()
-    flex.damping = float(np.max(dynamics.material.damping))  # without one there is no room for any
+    flex.damping = float(np.max(material.damping))  # without one there is no room for any
     if mesh.axes is None:
         flex.young, flex.poisson = YOUNG, POISSON
         flex.elastic3d, flex.radius = 1, 0.0
         return flex, bodies
     thickness = float(np.sqrt(12.0 * BENDING / STRETCH))
     flex.young, flex.poisson, flex.thickness = STRETCH / thickness, 0.0, thickness
-    flex.elastic2d, flex.radius = 3, 0.5 * float(np.max(dynamics.material.thickness))
+    flex.elastic2d, flex.radius = 3, 0.5 * float(np.max(material.thickness))
     return flex, bodies
 
 
@@ -166,7 +169,9 @@ def cloth_numbers(model: Any, flex: int, mesh: FlexMesh, dynamics: ArrayParticle
     }
 
 
-def _bending(model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np.ndarray, by_element: Any) -> np.ndarray:
+def _bending(
+    model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np.ndarray, by_element: Any
+) -> np.ndarray:
     """Return the bending numbers (worlds, k) of a cloth's edges, scaled from those that were compiled."""
     first, count = int(model.flex_bendingadr[flex]), int(model.flex_edgenum[flex])
     compiled = model.flex_bending[first : first + BEND * count].reshape(count, BEND)
@@ -182,17 +187,6 @@ def _bending(model: Any, flex: int, mesh: FlexMesh, sides: np.ndarray, local: np
     for world, own in enumerate(wanted):
         total[world] = np.bincount(sides.ravel(), own.ravel(), minlength=count) / np.maximum(number, 1)
     return ((total / BENDING)[:, :, None] * compiled).reshape(len(total), -1)
-
-
-def sheet_triangles(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return triangles (m, 3) of a sheet's cells, whose diagonals alternate, and the cell of each (m,)."""
-    i, j = np.meshgrid(np.arange(nx), np.arange(ny))
-    a = (j * (nx + 1) + i).ravel()
-    b, c, d = a + 1, a + nx + 1, a + nx + 2
-    even = (((i + j) % 2) == 0).ravel()
-    first = np.where(even[:, None], np.stack([a, b, d], 1), np.stack([a, b, c], 1))
-    second = np.where(even[:, None], np.stack([a, d, c], 1), np.stack([b, d, c], 1))
-    return np.stack([first, second], axis=1).reshape(-1, 3), np.repeat(np.arange(nx * ny), 2)
 
 
 def _same_faces(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:

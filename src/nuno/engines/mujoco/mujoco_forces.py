@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.world_view import bodies_by_key, dynamics_of
 from nuno.joints.grip import Grip
 from nuno.joints.joint import JointSpec
 from nuno.shapes import quaternion as quat
@@ -38,7 +39,7 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
     force, torque = np.zeros((worlds, 3)), np.zeros((worlds, 3))
     rows = scene.holds.rows_of(grip)
     own = scene.placed[grip.body.key]
-    dynamics: Any = grip.body._dynamics
+    dynamics: Any = dynamics_of(grip.body)
     if rows is None or engine.world.time == 0.0:
         return force, torque
     for world, (model, data) in enumerate(forwarded(engine)):
@@ -62,7 +63,7 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
 
 
 def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[Any, ...]]:
-    """Return a dynamic body's contacts: rows of point, normal towards it, force on it, the other's name and the world."""
+    """Return a dynamic body's contacts: rows of point, normal towards it, force on it, other's name, world."""
     mujoco = mujoco_package()
     found: list[tuple[Any, ...]] = []
     for world, (model, data) in enumerate(forwarded(engine)):
@@ -84,7 +85,7 @@ def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[An
             second = keys[1] == body.key
             sign = 1.0 if second else -1.0
             other = keys[0] if second else keys[1]
-            name = engine.world._bodies[other].name if other is not None else ""
+            name = bodies_by_key(engine.world)[other].name if other is not None else ""
             found.append((contact.pos.copy(), sign * axes[0], sign * force, name, world))
             if keys[0] == keys[1]:
                 found.append((contact.pos.copy(), -axes[0], -force, name, world))

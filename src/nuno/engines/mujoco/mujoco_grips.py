@@ -1,8 +1,8 @@
 """Grips and joints in MuJoCo, as equality constraints whose targets are written before each substep.
 
 A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
-weighted sum, by fixed tendons. A rigid body is welded to what leads it: another body, or a heavy one without a shape that
-is sent along the path. Hinges are two connected points of the axis, ball joints one, fixed joints welds.
+weighted sum, by fixed tendons. A rigid body is welded to what leads it: another body, or a heavy one without a shape
+that is sent along the path. Hinges are two connected points of the axis, ball joints one, fixed joints welds.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from nuno.engines.led import led_hold, led_points
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.world_view import attached
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
@@ -29,7 +30,7 @@ CLOSING = 2.0
 """Time constant of all equalities, in substeps."""
 REACH = 0.1
 """[m] Half the distance of the two points of an axis by which a hinge is held."""
-GHOST = 1e6
+LEADER = 1e6
 """[kg] and [kg m2] Of the body that leads a rigid one along a path."""
 
 
@@ -43,7 +44,7 @@ class Held:
         rows: Their numbers in the model.
         point: (worlds, k) int, of each held point its number among the grip's distinct points, -1 for none.
         rest: (points, 3) [m], of each distinct point its place at rest, which coordinates are counted from.
-        ghost: The body that leads, or None.
+        leader: The body that leads, or None.
         address: Its first coordinate and its first velocity in the model.
     """
 
@@ -52,7 +53,7 @@ class Held:
     rows: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     point: np.ndarray | None = None
     rest: np.ndarray | None = None
-    ghost: Any = None
+    leader: Any = None
     address: tuple[int, int] = (-1, -1)
 
 
@@ -73,17 +74,20 @@ class Holds:
     @property
     def is_led(self) -> bool:
         """Return True if any target must be written as time goes on."""
-        return any(isinstance(own.grip.spec, GripSpec) or own.ghost is not None for own in self._held)
+        return any(isinstance(own.grip.spec, GripSpec) or own.leader is not None for own in self._held)
 
     # The spec
 
+    def clear(self) -> None:
+        """Take all grips out of the spec; bodies go after them, as MuJoCo deletes what refers to them too."""
+        for element in reversed(self._elements):
+            self._spec.delete(element)
+        self._held, self._elements = [], []
+
     def add(self, spec: Any, placed: dict[str, Any]) -> None:
-        """Put all present grips into the spec, in place of those that were there."""
-        if self._spec is spec:
-            for element in self._elements:
-                spec.delete(element)
-        self._spec, self._held, self._elements = spec, [], []
-        for dynamics in self._world._attached():
+        """Put all present grips into the spec."""
+        self._spec = spec
+        for dynamics in attached(self._world):
             for grip in dynamics.grips:
                 own = Held(grip)
                 self._held.append(own)
@@ -113,7 +117,7 @@ class Holds:
         corners, weights = corners_of(spec)
         other_corners, other_weights = getattr(spec, "other_corners", None), getattr(spec, "other_weights", None)
         rigid = isinstance(spec, TieSpec) and spec.places is not None
-        target = placed[own.grip.target.key] if own.grip.target is not None else None
+        target: Any = placed[own.grip.target.key] if own.grip.target is not None else None
         known: dict[Any, int] = {}
         rest: list[np.ndarray] = []
         own.point = np.full(corners.shape[:2], -1)
@@ -157,16 +161,16 @@ class Holds:
     def _add_hold(self, own: Held, placed: dict[str, Any]) -> None:
         grip = own.grip
         if grip.target is not None:
-            leader = placed[grip.target.key].bodies[0].name
+            name = placed[grip.target.key].bodies[0].name
         else:
             self._made += 1
-            own.ghost = self._spec.worldbody.add_body(
-                name=f"g{self._made}", mass=GHOST, inertia=[GHOST] * 3, explicitinertial=True, gravcomp=1.0
+            own.leader = self._spec.worldbody.add_body(
+                name=f"g{self._made}", mass=LEADER, inertia=[LEADER] * 3, explicitinertial=True, gravcomp=1.0
             )
-            own.ghost.add_freejoint(name=own.ghost.name)
-            self._elements.append(own.ghost)
-            leader = own.ghost.name
-        self._equality(own, "WELD", leader, placed[grip.body.key].bodies[0].name, "BODY")
+            own.leader.add_freejoint(name=own.leader.name)
+            self._elements.append(own.leader)
+            name = own.leader.name
+        self._equality(own, "WELD", name, placed[grip.body.key].bodies[0].name, "BODY")
 
     def _add_joint(self, own: Held, placed: dict[str, Any]) -> None:
         grip, mine = own.grip, placed[own.grip.body.key].bodies[0].name
@@ -189,14 +193,14 @@ class Holds:
         for own in self._held:
             own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
             spec = own.grip.spec
-            if own.ghost is not None:
-                body = model.body(own.ghost.name).id
+            if own.leader is not None:
+                body = model.body(own.leader.name).id
                 own.address = int(model.jnt_qposadr[model.body_jntadr[body]]), int(model.body_dofadr[body])
             if isinstance(spec, GripSpec | TieSpec):
                 self._find_points(own, data, active)
             elif isinstance(spec, HoldSpec):
                 place, turn = np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1))
-                if own.ghost is None:
+                if own.leader is None:
                     place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
                 _weld(data, int(own.rows[0]), place, turn)
             else:
@@ -222,11 +226,12 @@ class Holds:
 
     def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
         """Return of each led grip where it leads at ``times`` (k + 1,) [s], from ``start`` to ``end``; see `write`."""
-        frame, found = 1.0 / self._world.frame_rate, []
+        frame = 1.0 / self._world.frame_rate
+        found: list[tuple[Held, Any]] = []
         for own in self._held:
             if isinstance(own.grip.spec, GripSpec):
                 found.append((own, led_points(own.grip, start, frame, times)))
-            elif own.ghost is not None:
+            elif own.leader is not None:
                 found.append((own, led_hold(own.grip, start, end, times, self._world.world_count)))
         return found
 
@@ -242,7 +247,7 @@ class Holds:
                 else:
                     now = np.broadcast_to(apply(target.pose(), own.grip.offsets), own.grip.offsets.shape)
                     found.append((own, np.stack([now, now], axis=2)))
-            elif own.ghost is not None:
+            elif own.leader is not None:
                 places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
                 found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
         return found
@@ -250,7 +255,7 @@ class Holds:
     def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float) -> None:
         """Write where led grips lead in substep ``k``, which takes ``step`` [s]."""
         for own, led in targets:
-            if own.ghost is not None:
+            if own.leader is not None:
                 place, turn = (part[:, k : k + 2] for part in led)
                 send(batch, own.address, place, turn, step)
                 continue

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.world_view import dynamics_of, rules_of
 from nuno.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
     touches = np.zeros((n, n), dtype=bool)
     for i, (a, _) in enumerate(bodies):
         for j, (b, _) in enumerate(bodies[:i]):
-            moves = a._dynamics is not None or b._dynamics is not None
-            touches[i, j] = touches[j, i] = moves and world._rules.touch(a, b)
+            moves = dynamics_of(a) is not None or dynamics_of(b) is not None
+            touches[i, j] = touches[j, i] = moves and rules_of(world).touch(a, b)
     classes: list[list[int]] = []
     for i in range(n):
         for members in classes:
@@ -55,9 +56,9 @@ def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
     for k, members in enumerate(classes):
         mask = 0
         for other, theirs in enumerate(classes):
-            a = members[0]
-            b = next((m for m in theirs if m != a), None)
-            if b is not None and touches[a, b]:
+            one = members[0]
+            two = next((m for m in theirs if m != one), None)
+            if two is not None and touches[one, two]:
                 mask |= 1 << other
         for member in members:
             placed = bodies[member][1]
@@ -79,7 +80,7 @@ def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -
         own.friction, own.flexes[0].priority = _by_world(world, body.friction), 0
         own.flexes[0].friction = _triple(own.friction)
     for body, own in others:
-        wanted = [(pair_friction(world, body, flex), flex) for flex, _ in flexes if world._rules.touch(body, flex)]
+        wanted = [(pair_friction(world, body, flex), flex) for flex, _ in flexes if rules_of(world).touch(body, flex)]
         own.friction = wanted[0][0] if wanted else _by_world(world, body.friction)
         for mu, flex in wanted[1:]:
             _tell(body, flex, mu, own.friction)
@@ -87,11 +88,11 @@ def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -
             shape.friction, shape.priority = _triple(own.friction), 1
     for i, (body, own) in enumerate(flexes):
         for other, theirs in flexes[:i]:
-            if world._rules.touch(body, other):
+            if rules_of(world).touch(body, other):
                 _tell(body, other, pair_friction(world, body, other), np.maximum(own.friction, theirs.friction))
     for i, (body, own) in enumerate(others):
         for other, theirs in others[:i]:
-            if (body._dynamics is None and other._dynamics is None) or not world._rules.touch(body, other):
+            if (dynamics_of(body) is None and dynamics_of(other) is None) or not rules_of(world).touch(body, other):
                 continue
             mu, taken = pair_friction(world, body, other), np.maximum(own.friction, theirs.friction)
             if np.abs(mu - taken).max() < 1e-9:
@@ -120,7 +121,7 @@ def write_friction(model: Any, batch: Any, bodies: list[tuple[Body, Any]]) -> No
 
 def pair_friction(world: Simulation, a: Body, b: Body) -> np.ndarray:
     """Return the coefficient of a pair, (worlds,)."""
-    own = world._rules.friction.get(frozenset((a.key, b.key)))
+    own = rules_of(world).friction.get(frozenset((a.key, b.key)))
     if own is not None:
         return _by_world(world, own)
     return np.sqrt(_by_world(world, a.friction) * _by_world(world, b.friction))
