@@ -106,15 +106,19 @@ def main() -> None:
         found.setdefault((name, engine), []).append(row)
         if image is not None:
             parts.setdefault(name, []).append(image)
+        if given.json:  # as far as it is, for a run that is ended early
+            write(given.json, given.rounds, [merged(these) for these in found.values()])
+        if name in parts:
+            given.pictures.mkdir(parents=True, exist_ok=True)
+            save(np.hstack(parts[name]), given.pictures / f"{name.replace(' ', '-')}.webp")
     rows = [merged(these) for these in found.values()]
     show(rows, given.engines)
-    if given.pictures:
-        given.pictures.mkdir(parents=True, exist_ok=True)
-        for name, images in parts.items():
-            save(np.hstack(images), given.pictures / f"{name.replace(' ', '-')}.webp")
-    if given.json:
-        machine = {"cpu": platform.machine(), "python": platform.python_version(), "nuno": nuno.__version__}
-        given.json.write_text(json.dumps({"machine": machine, "rounds": given.rounds, "rows": rows}, indent=1))
+
+
+def write(path: Path, rounds: int, rows: list[dict[str, Any]]) -> None:
+    """Write the figures as JSON."""
+    machine = {"cpu": platform.machine(), "python": platform.python_version(), "nuno": nuno.__version__}
+    path.write_text(json.dumps({"machine": machine, "rounds": rounds, "rows": rows}, indent=1))
 
 
 def merged(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -90,6 +90,13 @@ class Scene:
         return nuno.find_layers(self.towel.vertices, self.towel.faces, fractions)
 
 
+def falling():
+    """A saved world in which a ball falls."""
+    world = nuno.World(device="cpu")
+    world.attach(world.add(nuno.sphere(0.1)))
+    return world.save()
+
+
 class Robots:
     """A robot, its driver, and what is planned for it."""
 
@@ -237,6 +244,7 @@ CALLS = {
     },
     "mesh": {"source": TRIANGLES},
     "minimise": {"trial": lambda s: trial, "bounds": BOUNDS, "progress": False},
+    "compare_engines": {"scene": lambda s: falling(), "engines": ("nuno", "mujoco"), "seconds": 0.02},
     "plan": {
         "world": lambda s: s.world, "act": lambda s: (lambda futures, knots: None),
         "cost": lambda s: (lambda futures: np.zeros(2)), "start": [[0.0]], "spread": 1.0, "horizon": 0.01, "samples": 2,
@@ -316,6 +324,8 @@ CALLS = {
     "Coordinates.locate": {"position": POINT}, "Coordinates.rotate": {"angle": 0.1, "axis": "x"},
     "Coordinates.to_local": {"points": [POINT]}, "Coordinates.to_world": {"points": [POINT]},
     "Coordinates.transform": {"other": lambda s: nuno.Coordinates()}, "Coordinates.translate": {"offset": POINT},
+    "EngineComparison.differences": {}, "EngineComparison.film": {}, "EngineComparison.table": {"rows": 2},
+    "EngineComparison.save": {"folder": "out"},
     "Film.save": {"path": "out.html"}, "Grip.release": {},
     "HandPath.at": {"time": 0.5}, "HandPath.holds_at": {"time": 0.5},
     "JointTrajectory.of": {"names": ("head_1_joint",)},
@@ -390,6 +400,9 @@ CALLS = {
 # The object whose method is called
 OWNERS = {
     "Body": lambda s: s.towel, "Camera": lambda s: s.camera, "Cloth": lambda s: nuno.Cloth(),
+    "EngineComparison": lambda s: nuno.EngineComparison(
+        ("nuno", "mujoco"), {"nuno": s.recording, "mujoco": s.recording}, ("towel",), {"nuno": 0.0, "mujoco": 0.0}
+    ),
     "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
     "HandPath": lambda s: s.hand, "JointTrajectory": lambda r: r.trajectory, "Layers": lambda s: s.layers,
     "Knots": lambda s: nuno.Knots([0.0, 0.0, 0.0], [POINT], 1.0),
@@ -421,6 +434,7 @@ UNCALLED = {
         "ContactPoints*",
         "Drawing",
         "ElementState",
+        "EngineComparison",
         "Film",
         "FoldCase",
         "FoldResult",

@@ -148,6 +148,7 @@ if TYPE_CHECKING:
     from nuno.tasks.pick_towel import TowelPicker
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
+    from nuno.viewer.compare_engines import EngineComparison, compare_engines
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -179,6 +180,7 @@ __all__ = [
     "Cylinder",
     "Drawing",
     "ElementState",
+    "EngineComparison",
     "EngineCapabilityError",
     "EstimationError",
     "FileFormatError",
@@ -297,6 +299,7 @@ __all__ = [
     "capture_case",
     "carry_mat",
     "cloth_mesh",
+    "compare_engines",
     "compound",
     "continue_walk",
     "cylinder",
@@ -436,6 +439,7 @@ _LAZY = {
         "nuno.tasks.pick_towel": "TowelPicker",
         "nuno.tasks.play_fold": "PlayedFold play_fold",
         "nuno.tasks.taught_fold": "TaughtFold",
+        "nuno.viewer.compare_engines": "EngineComparison compare_engines",
         "nuno.viewer.film": "Film",
         "nuno.viewer.viewer": "Viewer",
         "nuno.world.contact_points": "ContactPoints",

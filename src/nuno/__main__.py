@@ -1,4 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compile``."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compare``, ``compile``."""
 
 from __future__ import annotations
 
@@ -75,6 +75,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     describe.add_argument("--packages", nargs="+", metavar="DIR", help="folders that package:// is looked up in")
     describe.add_argument("--name", help="what the robot is to be called (default: the file's name)")
     describe.add_argument("--out", metavar="FILE", help="where the table goes (default: to the terminal)")
+    compared = commands.add_parser(
+        "compare", help="run a saved world on several engines: a film of them side by side, and how far they come apart"
+    )
+    compared.add_argument("scene", metavar="SCENE", help="the file that World.save wrote (.npz)")
+    compared.add_argument(
+        "--engines", nargs="+", metavar="ENGINE", default=["nuno", "mujoco", "newton"],
+        help="two or more; the first is what the others are compared with (default: nuno mujoco newton)",
+    )  # fmt: skip
+    compared.add_argument("--seconds", type=float, default=2.0, help="how long it runs (default 2)")
+    compared.add_argument("--out", required=True, metavar="DIR", help="where film.html and differences.json go")
     ahead = commands.add_parser(
         "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
         description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
@@ -86,10 +96,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     ahead.add_argument("--only", nargs="+", metavar="MODULE", help="these modules of kernels (default: all)")
     ahead.add_argument("--jobs", type=int, metavar="N", help="compile so many at once (default: one for each core)")
+    compared.add_argument("--device", default="cpu", help="cpu (default), cuda, cuda:1 ...; mujoco has the CPU only")
     for command in (pick, fold, serve):
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
     pick.add_argument("--engine", default="nuno", help="what moves the imagined cloths: nuno (default), mujoco ...")
-    for command in (pick, fold):
+    for command in (pick, fold, compared):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="progress bar (default: on a terminal)",
@@ -97,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
-        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
+        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile, "compare": _compare,
                        "describe-robot": _describe_robot}  # fmt: skip
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
@@ -139,6 +150,19 @@ def _pick(options: argparse.Namespace) -> int:
         f"picked at {place}, confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'} and result.png\n"
     )
+    return ANSWERED
+
+
+def _compare(options: argparse.Namespace) -> int:
+    _check_out(options.out)
+    from nuno.viewer.compare_engines import compare_engines
+
+    _start_warp()
+    found = compare_engines(
+        options.scene, options.engines, options.seconds, device=options.device, progress=options.progress
+    )
+    found.save(options.out)
+    sys.stdout.write(f"{found.table()}\nsee {Path(options.out) / 'film.html'} and differences.json\n")
     return ANSWERED
 
 

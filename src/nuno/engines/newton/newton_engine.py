@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from nuno.engines.engine import Engine
 from nuno.engines.led import led_hold, led_points, led_poses
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
+from nuno.kernels.quiet import quiet_warp
 from nuno.materials import Material, Rigid
 
 if TYPE_CHECKING:
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from nuno.engines.newton.newton_substeps import NewtonSubsteps
     from nuno.world.simulation import Simulation
 
-logger = logging.getLogger(__name__)
-
-SUBSTEPS = 60
+SUBSTEPS = 40
 """Of a frame where the world gives no number: with few, block descent leaves a stiff cloth far too limp."""
 ITERATIONS = 5
 """Of a substep."""
@@ -45,6 +43,7 @@ class NewtonEngine(Engine):
         super().__init__(world)
         if find_spec("newton") is None:
             raise MissingPackageError("newton", "newton", 'World(engine="newton")')
+        quiet_warp()
         self._made: NewtonModel | None = None
         self._substeps: NewtonSubsteps | None = None
 
@@ -82,11 +81,11 @@ class NewtonEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
-        if self._made is None or any(dynamics.grips_changed for dynamics in self.world._attached()):
+        if self._made is None or any(own.grips_changed for own in self.world._attached()):
             from nuno.engines.newton.newton_model import build_model
 
-            for dynamics in self.world._attached():
-                dynamics.grips_changed = False
+            for each in self.world._attached():
+                each.grips_changed = False
             self._made, self._substeps = build_model(self.world), None
         if self._substeps is None:
             from nuno.engines.newton.newton_substeps import NewtonSubsteps

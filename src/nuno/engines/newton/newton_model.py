@@ -26,6 +26,8 @@ logger = logging.getLogger(__name__)
 PARTICLE_STIFFNESS, SHAPE_STIFFNESS = 5e3, 2e4
 """[N/m] of contacts: a particle's with a shape has the mean of both, two particles' the first, two shapes' the second.
 A napkin's vertex of 0.1 g sinks in by 0.1 um, a box of 1 kg on four corners by 0.1 mm."""
+SHAPE_DAMPING = 100.0
+"""[N s/m] of contacts of shapes, near the critical damping of a box of half a kilogram: what falls does not bounce."""
 MOST_POISSON = 0.3
 """The membrane's largest Poisson ratio: Newton's is isotropic, and a softer shear than this leaves is not met."""
 
@@ -39,7 +41,7 @@ class NewtonModel:
         origin: (3,) [m], where its own coordinates begin.
         particles: By body's key, the first particle of each world (worlds,) int.
         bodies: By body's key, the index of its rigid body in each world (worlds,) int.
-        held: By body's key, the vertices that grips lead, (k,) int.
+        led_bodies: The keys of rigid bodies that paths or grips move.
         touching: The distance [m] at which layers of cloth touch, or None where nothing touches itself.
     """
 
@@ -67,14 +69,14 @@ def membrane(material: dict[str, np.ndarray]) -> tuple[float, float]:
 def build_model(world: Simulation) -> NewtonModel:
     """Return the model of a world's bodies, in the shapes that they have at rest and where static ones are now."""
     import newton
-    import warp as wp
 
     bodies = list(world._bodies.values())
     moving = [body for body in bodies if body._dynamics is not None]
     deforming = [body for body in moving if isinstance(body._dynamics, ArrayParticles)]
     centres = [body._dynamics.pose(body)[0].reshape(-1, 3).mean(axis=0) for body in moving]  # type: ignore[union-attr]
     origin = np.round(np.mean(centres, axis=0) * 16) / 16 if centres else np.zeros(3)
-    scene = newton.ModelBuilder(gravity=tuple(float(g) for g in world.gravity))
+    down: Any = tuple(float(g) for g in world.gravity)
+    scene = newton.ModelBuilder(gravity=down)
     scene.rigid_gap = 0.005
     made = NewtonModel(None, origin)
     _warn_of_exceptions(world, deforming, bodies)
@@ -100,7 +102,6 @@ def build_model(world: Simulation) -> NewtonModel:
     if itself or len(deforming) > 1:
         made.touching = max((_thickness(body) for body in deforming), default=0.0) or 1e-3
     made.model = model
-    del wp
     return made
 
 
@@ -202,7 +203,7 @@ def _add_shapes(
         place, turn = where[0] - made.origin, where[1]
     friction = np.broadcast_to(body.friction if dynamics is None else dynamics.friction, worlds)[index]
     parts = parts_of(body, moves=True) if dynamics is not None else parts_of(body, moves=False)
-    config = scene.ShapeConfig(density=0.0, ke=SHAPE_STIFFNESS, kd=0.0, mu=float(friction), gap=0.005)
+    config = scene.ShapeConfig(density=0.0, ke=SHAPE_STIFFNESS, kd=SHAPE_DAMPING, mu=float(friction), gap=0.005)
     shapes.append([add_part(scene, part.placed(place, turn), number, config, index) for part in parts])
 
 

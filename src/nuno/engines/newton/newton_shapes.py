@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,8 @@ def add_part(scene: Any, part: RigidPart, body: int, config: Any, world: int) ->
         return int(scene.add_shape_plane(None, xform=at, width=0.0, length=0.0, body=body, cfg=config))
     if part.kind == convex.HULL:
         assert part.corners is not None
-        faces = np.concatenate([[(loop[0], b, c) for b, c in zip(loop[1:-1], loop[2:], strict=True)]
-                                for loop in part.loops])  # fmt: skip
+        fans = [[(loop[0], *pair) for pair in pairwise(loop[1:])] for loop in part.loops]
+        faces = np.concatenate(fans)
         hull = newton.Mesh(part.corners.astype(np.float32), faces.astype(np.int32).ravel(), compute_inertia=False)
         return int(scene.add_shape_convex_hull(body, xform=at, mesh=hull, cfg=config))
     assert part.vertices is not None and part.faces is not None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.engines.newton.newton_model import NewtonModel
     from nuno.world.simulation import Simulation
-
-logger = logging.getLogger(__name__)
 
 SLIP = 1e-4
 """[m/s] below which friction is less than Coulomb's: what sticks creeps by less."""
@@ -38,7 +35,8 @@ class NewtonSubsteps:
         self.made, self.worlds = made, world.world_count
         model = self.model = made.model
         self.device = model.device
-        self.pipeline = self.contacts = None
+        self.pipeline: Any = None
+        self.contacts: Any = None
         if model.shape_count:
             self.pipeline = newton.CollisionPipeline(model, soft_contact_gap=0.005)
             self.contacts = self.pipeline.contacts()
@@ -54,8 +52,9 @@ class NewtonSubsteps:
         self.poses = np.zeros((model.body_count, 7), np.float32)
         self.speeds = np.zeros((model.body_count, 6), np.float32)
         self.wrenches = np.zeros_like(self.speeds)
-        self.forces_on = wp.zeros(model.particle_count, dtype=wp.vec3, device=self.device)
-        self.wrenches_on = wp.zeros(model.body_count, dtype=wp.spatial_vector, device=self.device)
+        self.forces_on: Any = wp.zeros(int(model.particle_count), dtype=wp.vec3, device=self.device)
+        twist: Any = wp.spatial_vector
+        self.wrenches_on: Any = wp.zeros(int(model.body_count), dtype=twist, device=self.device)
         self.points: dict[str, np.ndarray] = {}
         self.leads: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.body_leads: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
@@ -164,7 +163,7 @@ class NewtonSubsteps:
 
     def _go(self, count: int, dt: float) -> None:
         state, after, tables = self.now, self.after, self._tables
-        drags = [np.float32(1.0 / (1.0 + rates * dt)) for rates in self._drags]
+        drags = [(1.0 / (1.0 + rates * dt)).astype(np.float32) for rates in self._drags]
         slow = self._kept("drag", drags[0], float), self._kept("body drag", drags[1], float)
         for substep in range(count):
             if "indices" in tables:
