@@ -38,7 +38,7 @@ HAND_MARGIN = 2
 
 @dataclass(frozen=True, eq=False)
 class HoldView:
-    """What one camera sees of a garment.
+    """The image of a garment that one camera sees.
 
     Attributes:
         camera: The camera, its image reduced.
