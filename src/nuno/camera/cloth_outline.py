@@ -130,8 +130,8 @@ def cloth_colours(image: np.ndarray, mask: np.ndarray | None, cloth: ClothRectan
     """
     if not isinstance(cloth, ClothOutline) or mask is None:
         return image
-    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    inside = inside > min(RIM, 0.5 * float(inside.max()))
+    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    inside = np.asarray(depth > min(RIM, 0.5 * float(depth.max())))
     _, nearest = cv2.distanceTransformWithLabels(
         (~inside).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
