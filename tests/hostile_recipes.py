@@ -97,7 +97,7 @@ class Scene:
     @cached_property
     def hold(self):
         """By which of them it is held."""
-        return nuno.estimate_hold(self.sock, np.ones((48, 64), bool), self.camera, (0.0, 0.0, 0.0), holds=self.holds)
+        return nuno.estimate_hold(self.sock, np.ones((48, 64), bool), self.camera, POINT, holds=self.holds)
 
     @cached_property
     def layers(self):

@@ -128,7 +128,7 @@ class Garment:
         """
         x = finite_array("place", place, (2,))
         which = LAYER_NAMES.index(layer) if isinstance(layer, str) and layer in LAYER_NAMES else layer
-        if isinstance(which, str | bool) or which not in (FRONT, BACK, BOTH):
+        if not isinstance(which, int | np.integer) or isinstance(which, bool) or which not in (FRONT, BACK, BOTH):
             raise InvalidInputError(f"layer must be one of {', '.join(LAYER_NAMES)} or 0, 1 or 2, got {layer!r}")
         own = self.layer == BOTH if which == BOTH else (self.layer == which) | (self.layer == BOTH)
         if which != FRONT and self.layers == 1:
