@@ -40,6 +40,7 @@ LONG = {
     "Ros1Driver", "Ros2Server", "describe_robot",
     "take_picture", "track_hands", "track_hands_in_stereo", "locate_marker", "World.save", "Body.export",
     "export_body", "Film.save", "Recording.save", "Recording.export", "SweepResult.save_csv", "SimulatedRobot",
+    "HoldResult.save", "HoldResult.figure", "estimate_hold", "garment", "imagine_holds",
     "Links", "Humanoid", "Humanoid.enter", "Humanoid.reach", "TowelPicker", "Snapshot.spread", "Picture.save",
     "TaughtFold.from_hands", "Viewer",
 }  # fmt: skip

@@ -83,6 +83,23 @@ class Scene:
         return nuno.take_picture(self.world, self.camera)
 
     @cached_property
+    def sock(self):
+        """A coarse garment."""
+        return nuno.garment("sock", cell=0.04)
+
+    @cached_property
+    def holds(self):
+        """It, held by two points."""
+        shape = (1, 2, len(self.sock.vertices), 3)
+        hanging = np.broadcast_to(self.sock.vertices, shape).astype(np.float32)
+        return nuno.Holds(self.sock, np.array([0, 1]), (nuno.HoldGuess(1e-4),), hanging, np.ones((1, 2), bool), "cpu")
+
+    @cached_property
+    def hold(self):
+        """By which of them it is held."""
+        return nuno.estimate_hold(self.sock, np.ones((48, 64), bool), self.camera, POINT, holds=self.holds)
+
+    @cached_property
     def layers(self):
         """The towel's layers."""
         u, v = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 3))
@@ -173,6 +190,7 @@ CALLS = {
     "Footstep": {"foot": 0, "x": 0.0, "y": 0.0, "yaw": 0.0},
     "Hull": {"vertices": CUBE[0], "faces": CUBE[1]},
     "Hull.of": {"points": CUBE[0]},
+    "HoldGuess": {"bending_rigidity": 1e-4},
     "HandPath": {"times": [0.0, 1.0], "positions": [POINT, POINT], "held": [True, False]},
     "JointTrajectory": {"names": ("a",), "times": [0.0, 1.0], "positions": [[0.0], [1.0]]},
     "Knots": {"now": [0.0, 0.0, 0.0], "values": [POINT], "seconds": 1.0},
@@ -228,6 +246,10 @@ CALLS = {
         "before": IMAGE, "after": IMAGE, "camera": lambda s: s.camera, "table_height": 0.0, "hand": POINT,
         "progress": False,
     },
+    "estimate_hold": {
+        "garment": lambda s: s.sock, "images": np.ones((48, 64), bool), "cameras": lambda s: s.camera, "hand": POINT,
+        "holds": lambda s: s.holds, "progress": False,
+    },
     "export_body": {"path": "out.obj", "body": lambda s: s.towel},
     "find_layers": {
         "vertices": TRIANGLES[0], "faces": TRIANGLES[1], "fractions": [[0, 0], [1, 0], [0, 1], [1, 1]],
@@ -235,6 +257,8 @@ CALLS = {
     "fit_material": {"seen": None},
     "fitted_tetrahedra": {"vertices": CUBE[0], "faces": CUBE[1], "cell": 0.5},
     "fixed_joint": RIGID_JOINT,
+    "garment": {"name": "sock", "cell": 0.04},
+    "imagine_holds": {"garment": lambda s: s.sock, "candidates": [0, 1], "device": "cpu", "progress": False},
     "hinge": {**RIGID_JOINT, "point": POINT, "axis": (1, 0, 0)},
     "improve_fold": {"motion": None, "cloth": lambda s: s.still},
     "lattice_tetrahedra": {"vertices": CUBE[0], "faces": CUBE[1], "cell": 0.5},
@@ -327,6 +351,9 @@ CALLS = {
     "EngineComparison.differences": {}, "EngineComparison.film": {}, "EngineComparison.table": {"rows": 2},
     "EngineComparison.save": {"folder": "out"},
     "Film.save": {"path": "out.html"}, "Grip.release": {},
+    "Garment.body": {}, "Garment.distances": {"vertex": 0}, "Garment.nearest": {"place": (0.0, 0.0)},
+    "HoldResult.distance": {"vertex": 0}, "HoldResult.figure": {}, "HoldResult.positions": {"rank": 0},
+    "HoldResult.save": {"folder": "out"}, "HoldResult.to_dict": {},
     "HandPath.at": {"time": 0.5}, "HandPath.holds_at": {"time": 0.5},
     "JointTrajectory.of": {"names": ("head_1_joint",)},
     "Layers.over": {"u": 0.5, "v": 0.5},
@@ -404,6 +431,7 @@ OWNERS = {
         ("nuno", "mujoco"), {"nuno": s.recording, "mujoco": s.recording}, ("towel",), {"nuno": 0.0, "mujoco": 0.0}
     ),
     "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
+    "Garment": lambda s: s.sock, "HoldResult": lambda s: s.hold,
     "HandPath": lambda s: s.hand, "JointTrajectory": lambda r: r.trajectory, "Layers": lambda s: s.layers,
     "Knots": lambda s: nuno.Knots([0.0, 0.0, 0.0], [POINT], 1.0),
     "Path": lambda s: s.path, "Recording": lambda s: s.recording, "Snapshot": lambda s: s.snapshot,
@@ -438,8 +466,11 @@ UNCALLED = {
         "Film",
         "FoldCase",
         "FoldResult",
+        "Garment",
         "Grip",
         "HandTrack",
+        "HoldResult",
+        "Holds",
         "ImprovedFold",
         "Joint",
         "Layers",
@@ -479,6 +510,7 @@ UNCALLED = {
     ),
     "between the parts of the package, with checked numbers": (
         "Grip.lead",
+        "HoldResult.of",
         "Grip.spec_for",
         "Joint.lead",
         "Links.poses_at",

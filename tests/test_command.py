@@ -268,10 +268,10 @@ def test_only_warps_line_about_the_driver_is_kept_back(capfd):
     assert capfd.readouterr().err == "one\ntwo\nthree\n"
 
 
-def test_a_round_cloth_is_status_1(case, tmp_path, capsys):
+def test_a_round_cloth_is_status_1_where_a_rectangle_is_asked_for(case, tmp_path, capsys):
     """Valid input without an answer: what lies on the table is no rectangle."""
     cv2.imwrite(str(case / "before.png"), scene(radius=90))
-    assert pick(case, tmp_path / "out") == 1
+    assert pick(case, tmp_path / "out", "--shape", "rectangle") == 1
     check_failure(capsys.readouterr(), "EstimationError", "not a rectangle")
 
 

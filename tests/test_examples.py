@@ -13,7 +13,14 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-LONG = {"all_kinds", "carry_mat", "closed_loop", "talos_fold"}  # more than 15 s of a core each
+LONG = {
+    "all_kinds",
+    "carry_mat",
+    "closed_loop",
+    "hold_garment",
+    "pick_outline",
+    "talos_fold",
+}  # more than 15 s of a core each
 
 
 def _pictures_of():

@@ -17,7 +17,7 @@ GUESS = nuno.HoldGuess(1e-4)
 
 def camera_at(yaw, size=0.3):
     """Level with what hangs from the hand, at an angle about the vertical."""
-    eye = HAND + (6.0 * size * np.cos(yaw), 6.0 * size * np.sin(yaw), -0.5 * size)
+    eye = HAND + size * np.array((6.0 * np.cos(yaw), 6.0 * np.sin(yaw), -0.5))
     return nuno.Camera.look_at(eye, HAND - (0.0, 0.0, 0.5 * size), fov=0.35, width=320, height=240)
 
 

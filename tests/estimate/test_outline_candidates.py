@@ -85,7 +85,7 @@ def test_settings_of_a_rectangle_stay_as_they_are(camera, cloth):
         with_outline_candidates(given, box, 0.1)
     changed = with_outline_candidates(given, cloth, 0.06)
     assert not changed.learned and np.issubdtype(changed.labels.dtype, np.floating)
-    np.testing.assert_allclose(changed.labels / changed.uv, np.tile((cloth.long_m, cloth.short_m), (len(changed.uv), 1)))
+    np.testing.assert_allclose(changed.labels, changed.uv * (cloth.long_m, cloth.short_m))
     with pytest.raises(InvalidInputError, match="more than 1024"):
         with_outline_candidates(given, cloth, 0.004)
 
@@ -104,7 +104,7 @@ def test_given_points_go_to_the_nearest_one_on_the_cloth(camera, cloth):
 
 
 def test_what_is_a_rectangle_is_taken_as_one(camera):
-    """By "auto" the L is taken by its outline with a warning, a rectangle bit for bit as it was; "rectangle" refuses."""
+    """By "auto" the L is taken by its outline with a warning, a rectangle as ever, bit for bit; "rectangle" refuses."""
     box, other = mask_of(BOX, camera), mask_of(L, camera)
     before, now = fit_rectangle(box, None, camera, HEIGHT), fit_cloth(box, None, camera, HEIGHT, "auto")
     assert not isinstance(now, ClothOutline) and np.array_equal(before.corners, now.corners)

@@ -40,7 +40,7 @@ def test_straight_outlines_are_kept():
 
 def test_sides_of_the_outline_are_sides_of_triangles():
     """Each side is in one triangle, each inner edge in two, also in a star's sharp tips."""
-    points, faces, rim = triangulate(STAR, 0.02)
+    _, faces, rim = triangulate(STAR, 0.02)
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     pairs, count = np.unique(edges, axis=0, return_counts=True)
     outer = {tuple(pair) for pair in pairs[count == 1].tolist()}
@@ -61,7 +61,7 @@ def test_cells_are_even(polygon):
 
 
 def test_quality_has_the_textbook_values():
-    """The mean ratio (Liu and Joe 1994): 1 of an equilateral triangle, sqrt(3) / 2 of half a square, 0 of a flat one."""
+    """The mean ratio (Liu and Joe 1994): equilateral 1, half a square sqrt(3) / 2, a flat one 0."""
     points = np.array([(0.0, 0.0), (1.0, 0.0), (0.5, np.sqrt(0.75)), (0.0, 1.0), (2.0, 0.0)])
     faces = np.array([(0, 1, 2), (0, 1, 3), (0, 1, 4)])
     np.testing.assert_allclose(quality(points, faces), (1.0, np.sqrt(0.75), 0.0), atol=1e-12)

@@ -17,7 +17,7 @@ from nuno.mesh.triangulated import quality
 from nuno.shapes.shape import ClothMesh, length
 from nuno.validation import checked, finite_array, number
 
-LAYERS = ("front", "back", "both")
+LAYER_NAMES = ("front", "back", "both")
 """Names of layers: the front, the back, and seams, which are on both."""
 CELL = 0.02
 """[m] About how long a triangle's side is."""
@@ -127,9 +127,9 @@ class Garment:
             InvalidInputError: the garment has no such layer.
         """
         x = finite_array("place", place, (2,))
-        which = LAYERS.index(layer) if isinstance(layer, str) and layer in LAYERS else layer
-        if isinstance(which, str | bool) or which not in (FRONT, BACK, BOTH):
-            raise InvalidInputError(f"layer must be one of {', '.join(LAYERS)} or 0, 1 or 2, got {layer!r}")
+        which = LAYER_NAMES.index(layer) if isinstance(layer, str) and layer in LAYER_NAMES else layer
+        if not isinstance(which, int | np.integer) or isinstance(which, bool) or which not in (FRONT, BACK, BOTH):
+            raise InvalidInputError(f"layer must be one of {', '.join(LAYER_NAMES)} or 0, 1 or 2, got {layer!r}")
         own = self.layer == BOTH if which == BOTH else (self.layer == which) | (self.layer == BOTH)
         if which != FRONT and self.layers == 1:
             raise InvalidInputError(f"a {self.name} has one layer, 0, the front, got {layer!r}")
@@ -180,8 +180,8 @@ def garment(name: str, *, cell: float = CELL, gap: float = GAP, **measures: floa
     try:
         sewn = sew(draw(sizes), edge)
     except (MeshError, ValueError, FloatingPointError) as error:
-        told = ", ".join(f"{key}={value:g}" for key, value in sizes.items())
-        raise InvalidInputError(f"{told} make no {name} with cells of {edge:g} m: {error}") from error
+        described = ", ".join(f"{key}={value:g}" for key, value in sizes.items())
+        raise InvalidInputError(f"{described} make no {name} with cells of {edge:g} m: {error}") from error
     middle = 0.5 * (sewn.points.min(axis=0) + sewn.points.max(axis=0))
     middle[0] = 0.0 if sewn.mirror is not None else middle[0]
     rest = np.pad(sewn.points - middle, ((0, 0), (0, 1)))

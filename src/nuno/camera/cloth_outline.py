@@ -105,8 +105,8 @@ def _edge(mask: np.ndarray) -> np.ndarray:
     top, left = max(int(rows[0]) - 8, 0), max(int(columns[0]) - 8, 0)
     part = mask[top : rows[-1] + 9, left : columns[-1] + 9].astype(np.float32)
     soft = cv2.GaussianBlur(part, (0, 0), SOFT)
-    fine = cv2.resize(soft, None, fx=FINER, fy=FINER, interpolation=cv2.INTER_LINEAR) >= 0.5
-    contours, _ = cv2.findContours(fine.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    upsampled = cv2.resize(soft, None, fx=FINER, fy=FINER, interpolation=cv2.INTER_LINEAR) >= 0.5
+    contours, _ = cv2.findContours(upsampled.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return np.zeros((0, 2))
     edge = max(contours, key=len)[:, 0].astype(float)
@@ -130,8 +130,8 @@ def cloth_colours(image: np.ndarray, mask: np.ndarray | None, cloth: ClothRectan
     """
     if not isinstance(cloth, ClothOutline) or mask is None:
         return image
-    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    inside = inside > min(RIM, 0.5 * float(inside.max()))
+    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    inside = np.asarray(depth > min(RIM, 0.5 * float(depth.max())))
     _, nearest = cv2.distanceTransformWithLabels(
         (~inside).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )

@@ -32,11 +32,11 @@ def hold_figure(result: HoldResult) -> Figure:
     angles = [float(result.turns[result.matches[k, 1]]) for k in best]
     for row, seen in enumerate(result.views):
         masks = hold_masks(result.holds, pairs, angles, seen.camera, result.hand)
-        x, y = _box(masks.any(axis=0) | seen.real.mask)
+        columns_shown, rows_shown = _box(masks.any(axis=0) | seen.real.mask)
         columns = grid[row].subgridspec(1, count)
         for rank, k in enumerate(best):
             axes = figure.add_subplot(columns[rank])
-            axes.imshow(_compared(seen.real.mask, masks[rank])[y, x], interpolation="nearest")
+            axes.imshow(_compared(seen.real.mask, masks[rank])[rows_shown, columns_shown], interpolation="nearest")
             axes.set(xticks=[], yticks=[])
             axes.set_title(f"{rank + 1}: {100.0 * result.probabilities[k]:.0f} %", fontsize=8)
     layers = (FRONT, BACK) if garment.layers == 2 else (FRONT,)

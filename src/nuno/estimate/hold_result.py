@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.garment import LAYERS
+from nuno.bodies.garment import LAYER_NAMES
 from nuno.errors import EstimationError
 from nuno.estimate.hold_views import HoldView, hold_masks
 from nuno.estimate.imagined_holds import Holds
 from nuno.estimate.rotations import turn
 from nuno.files.whole_file import made_folder, write_figure, write_whole
+from nuno.validation import checked, count, flag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,7 +94,7 @@ class HoldResult:
 
     @property
     def best(self) -> tuple[float, float, str]:
-        """Where that is: x to the wearer's left and y up from the flat garment's middle [m], and the layer."""
+        """Its place in the flat garment, x to the wearer's left and y up from the middle [m], and the layer's name."""
         return self._place(self.vertex)
 
     @property
@@ -135,7 +136,12 @@ class HoldResult:
         Args:
             vertex: By which the garment really is held.
             up_to_symmetry: Whether the nearest of the points counts that its symmetries make of that vertex.
+
+        Raises:
+            InvalidInputError: the garment has no such vertex.
         """
+        count("vertex", vertex, low=0, high=len(self.holds.garment.vertices) - 1)
+        flag("up_to_symmetry", up_to_symmetry)
         away = self.holds.garment.distances(self.vertex)
         maps = self.holds.garment.symmetries if up_to_symmetry else self.holds.garment.symmetries[:1]
         return float(min(away[one[vertex]] for one in maps))
@@ -162,13 +168,17 @@ class HoldResult:
             )
         return found
 
+    @checked
     def positions(self, rank: int = 0) -> np.ndarray:
         """Return (n, 3) where the garment's vertices are in the world [m], as the candidate of a rank hangs at best.
 
         Args:
             rank: 0 is the best candidate.
+
+        Raises:
+            InvalidInputError: there is no candidate of that rank.
         """
-        k = int(self.order[rank])
+        k = int(self.order[count("rank", rank, low=0, high=len(self.order) - 1)])
         guess, at = (int(v) for v in self.matches[k])
         return turn(self.holds.positions[guess, k].astype(float) + self.hand, self.hand, float(self.turns[at]))
 
@@ -205,4 +215,4 @@ class HoldResult:
     def _place(self, vertex: int) -> tuple[float, float, str]:
         garment = self.holds.garment
         x, y = garment.rest[vertex, :2]
-        return float(x), float(y), LAYERS[int(garment.layer[vertex])]
+        return float(x), float(y), LAYER_NAMES[int(garment.layer[vertex])]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -16,7 +17,7 @@ import warp as wp
 from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.extent import regions_of
-from nuno.camera.image_region import view
+from nuno.camera.image_region import Region, view
 from nuno.errors import ImageError
 from nuno.estimate.futures import DRAWN_THICKNESS
 from nuno.estimate.imagined_holds import Holds
@@ -38,7 +39,7 @@ HAND_MARGIN = 2
 
 @dataclass(frozen=True, eq=False)
 class HoldView:
-    """What one camera sees of a garment.
+    """The image of a garment that one camera sees.
 
     Attributes:
         camera: The camera, its image reduced.
@@ -94,11 +95,11 @@ def compare_holds(holds: Holds, views: Sequence[HoldView], hand: np.ndarray, tur
     """
     guesses, count, n, _ = holds.positions.shape
     placed = (holds.positions.reshape(-1, n, 3) + hand.astype(np.float32)).astype(np.float32)
-    faces = wp.array(np.ascontiguousarray(holds.garment.faces, np.int32), dtype=wp.vec3i, device=holds.device)
+    faces: Any = wp.array(np.ascontiguousarray(holds.garment.faces, np.int32), dtype=wp.vec3i, device=holds.device)
     error = np.zeros((len(turns), guesses * count))
     for first in range(0, len(placed), BATCH):
         part = slice(first, min(first + BATCH, len(placed)))
-        positions = wp.array(np.nan_to_num(placed[part]), dtype=wp.vec3, device=holds.device)
+        positions: Any = wp.array(np.nan_to_num(placed[part]), dtype=wp.vec3, device=holds.device)
         for seen in views:
             for k, angle in enumerate(turns):
                 scores = _scores(positions, faces, seen, hand, float(angle))
@@ -114,10 +115,13 @@ def _scores(
     return begin_scores(keys, seen.real, region=region)()
 
 
-def _drawn(positions: wp.array, faces: wp.array, camera: Camera, hand: np.ndarray, angle: float) -> tuple:
+def _drawn(
+    positions: wp.array, faces: wp.array, camera: Camera, hand: np.ndarray, angle: float
+) -> tuple[wp.array, Region]:
+    device: Any = positions.device
     looking = view_of_turned(camera, hand, angle)
     (region,) = regions_of(positions, [looking], margin=MARGIN)
-    keys = raster.key_images(positions.shape[0], region, positions.device)
+    keys = raster.key_images(positions.shape[0], region, device)
     raster.clear(keys)
     raster.draw(keys, positions, faces, view(looking, region), 0, thickness=DRAWN_THICKNESS)
     return keys, region

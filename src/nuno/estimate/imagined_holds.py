@@ -19,7 +19,7 @@ from nuno.errors import EstimationError, InvalidInputError
 from nuno.estimate.futures import LOOK_SECONDS, REST_SPEED, rest_speed
 from nuno.materials import Cloth
 from nuno.mesh.sewn import BACK
-from nuno.validation import checked, count, instance, number
+from nuno.validation import check_fields, checked, count, instance, number
 from nuno.world.device import checked_device, found_device
 from nuno.world.progress import with_bar
 from nuno.world.world import World
@@ -52,6 +52,12 @@ class HoldGuess:
     air_drag: float = 2.5
     area_density: float = 0.2
     thickness: float = 0.003
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        for name in ("bending_rigidity", "friction", "air_drag", "area_density", "thickness"):
+            least = {"above": 0.0} if name in ("area_density", "thickness") else {"low": 0.0}
+            number(name, getattr(self, name), high=1e6, **least)
 
 
 HOLD_GUESSES = (HoldGuess(2e-5, 0.3), HoldGuess(2e-4, 0.5), HoldGuess(8e-5, 0.4, upright=True))

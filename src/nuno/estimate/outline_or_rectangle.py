@@ -43,5 +43,5 @@ def fit_cloth(
             outline = fit_outline(mask, camera, plane_height)
         except EstimationError as other:
             raise EstimationError(f"{error}; nor can it be taken as it is: {other}") from error
-        told = f"the cloth is taken by its outline, for it is no rectangle ({str(error).split(';')[0]})"
-        return replace(outline, warnings=(told, *outline.warnings))
+        warning = f"the cloth is taken by its outline, for it is no rectangle ({str(error).split(';')[0]})"
+        return replace(outline, warnings=(warning, *outline.warnings))

@@ -83,23 +83,23 @@ def _skirt(m: Mapping[str, float]) -> Pattern:
 
 def _sock(m: Mapping[str, float]) -> Pattern:
     """A leg and a foot along x, as wide as each other, with a round heel and toe."""
-    wide, leg, foot = m["width"], m["leg"], m["foot"]
-    half = 0.5 * wide
+    breadth, leg, foot = m["width"], m["leg"], m["foot"]
+    half = 0.5 * breadth
     sides = (
-        (_line((wide, leg), (0.0, leg)), OPEN), (_line((0.0, leg), (0.0, half)), SEAM),
+        (_line((breadth, leg), (0.0, leg)), OPEN), (_line((0.0, leg), (0.0, half)), SEAM),
         (_arc((half, half), (half, half), np.pi, 1.5 * np.pi), SEAM), (_line((half, 0.0), (foot - half, 0.0)), SEAM),
         (_arc((foot - half, half), (half, half), -0.5 * np.pi, 0.5 * np.pi), SEAM),
-        (_line((foot - half, wide), (wide, wide)), SEAM), (_line((wide, wide), (wide, leg)), SEAM),
+        (_line((foot - half, breadth), (breadth, breadth)), SEAM), (_line((breadth, breadth), (breadth, leg)), SEAM),
     )  # fmt: skip
     return Pattern((sides, sides), False)
 
 
 def _apron(m: Mapping[str, float]) -> Pattern:
-    wide, bib, waist, top = 0.5 * m["width"], 0.5 * m["bib"], m["waist"], m["length"]
+    half, bib, waist, top = 0.5 * m["width"], 0.5 * m["bib"], m["waist"], m["length"]
     # the arm's bay is a quarter of an ellipse about the corner that is cut away
-    bay = _arc((wide, top), (wide - bib, top - waist), 1.5 * np.pi, np.pi)
+    bay = _arc((half, top), (half - bib, top - waist), 1.5 * np.pi, np.pi)
     sides = (
-        (_line((0.0, 0.0), (wide, 0.0)), OPEN), (_line((wide, 0.0), (wide, waist)), OPEN), (bay, OPEN),
+        (_line((0.0, 0.0), (half, 0.0)), OPEN), (_line((half, 0.0), (half, waist)), OPEN), (bay, OPEN),
         (_line((bib, top), (0.0, top)), OPEN),
     )  # fmt: skip
     return Pattern((sides,), True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-SHARP = 0.6
+CORNER_ANGLE = 0.6
 """[rad] A corner that turns by more than this is one of the shape, not of how finely its outline was drawn."""
 
 
@@ -47,9 +47,9 @@ def turns(polygon: np.ndarray) -> np.ndarray:
     return np.asarray(np.arctan2(across, (behind * ahead).sum(axis=1)))
 
 
-def corners_of(polygon: np.ndarray, sharp: float = SHARP) -> np.ndarray:
+def corners_of(polygon: np.ndarray, corner_angle: float = CORNER_ANGLE) -> np.ndarray:
     """Return (c,) int, the corners at which a polygon (n, 2) turns sharply."""
-    return np.flatnonzero(np.abs(turns(polygon)) > sharp)
+    return np.flatnonzero(np.abs(turns(polygon)) > corner_angle)
 
 
 def crosses_itself(polygon: np.ndarray) -> bool:
@@ -78,12 +78,12 @@ def along_line(line: np.ndarray, spacing: float) -> np.ndarray:
     return points
 
 
-def along_outline(polygon: np.ndarray, spacing: float, sharp: float = SHARP) -> np.ndarray:
+def along_outline(polygon: np.ndarray, spacing: float, corner_angle: float = CORNER_ANGLE) -> np.ndarray:
     """Return points (k, 2) along a polygon's outline, evenly at about a spacing [m] between its sharp corners.
 
     The sharp corners are among them. An outline without one begins at its first point.
     """
-    ends = corners_of(polygon, sharp)
+    ends = corners_of(polygon, corner_angle)
     ends = np.array([0]) if len(ends) == 0 else ends
     points = []
     for k, first in enumerate(ends):

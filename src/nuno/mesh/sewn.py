@@ -50,7 +50,8 @@ def sew(pattern: Pattern, edge: float) -> Sewn:
     behind, back_faces, back_mirror = meshes[1]
     sewn_at = set(_keys(_seam_points(pattern, edge)))
     front = {key: k for k, key in enumerate(_keys(points))}
-    number, extra = np.empty(len(behind), dtype=int), []
+    number = np.empty(len(behind), dtype=int)
+    extra: list[int] = []
     for k, key in enumerate(_keys(behind)):
         if key in sewn_at:
             number[k] = front[key]
