@@ -94,6 +94,28 @@ def test_commands_are_those_of_the_driver():
             futures.robot.angle_vector_sequence(wrong, times)
 
 
+def test_commands_begin_where_the_joints_are(scene):
+    """A way, and a posture by name, sent while arms sag behind what is wanted: as by the driver, to the bit."""
+    world, robot, _, saved = scene
+    world.restore(saved)
+    futures = world.imagine(1)
+    if robot.is_dynamic:  # the driver plans from its encoders, which are not where the joints are wanted
+        assert np.abs(robot.joints.desired[0] - robot.actual.angle_vector()).max() > 1e-5
+    arm = robot.actual.joint_index("arm_left_2_joint")
+    way = np.repeat(robot.actual.angle_vector()[None], 2, axis=0)
+    way[:, arm] += (0.1, 0.2)
+    robot.angle_vector_sequence(list(way), 0.2)
+    futures.robot.angle_vector_sequence(way, 0.2)
+    for command in (None, {"head_1_joint": 0.1}):
+        if command:
+            robot.angle_vector(command, 0.2)
+            futures.robot.angle_vector(command, 0.2)
+        world.run(0.1)
+        futures.run(0.1)
+        (state,) = futures.robot.state()
+        assert np.array_equal(state.q, robot.state().q) and np.array_equal(state.v, robot.state().v)
+
+
 def test_a_batch_goes_back_with_its_robots(scene):
     """Saved and restored, all worlds' robots go on with the same bits; copies of a copy too."""
     world, _, _, saved = scene

@@ -88,7 +88,7 @@ class ImaginedRobot:
 
         Args:
             angles: (n,) for all worlds or (worlds, n) [rad; m for slides], or by name a number or (worlds,), others
-                staying where they are sent.
+                staying where they are.
             seconds: [s].
 
         Raises:
@@ -100,7 +100,7 @@ class ImaginedRobot:
             worlds = self.world.world_count
             if angles is not None:
                 span = number("seconds", seconds, above=0.0)
-                wanted = np.array([own.joints.desired[0] for own in self._motions])
+                wanted = self._present()
                 if isinstance(angles, Mapping):
                     for name, value in angles.items():
                         k = self.original.actual.joint_index(name)
@@ -139,8 +139,7 @@ class ImaginedRobot:
         if self._servo is not None or any(own.gait.is_walking for own in self._motions):
             raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
         shortest = self.original.angle_vector_duration
-        for own, goals in zip(self._motions, wanted, strict=True):
-            begin = own.joints.desired[0]
+        for own, begin, goals in zip(self._motions, self._present(), wanted, strict=True):
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
             needed = [shortest(a, b) for a, b in pairwise((begin, *goals))]
             longer = np.maximum(spans, needed)  # as the driver stretches what is too fast
@@ -148,6 +147,11 @@ class ImaginedRobot:
             for name, rows in own.joints.rows.items():
                 names = own.joints.controllers[name].names
                 own.joints.send(name, JointTrajectory(names, times, goals[:, rows], speeds[:, rows]))
+
+    def _present(self) -> np.ndarray:
+        """Return where the joints are (worlds, n), as encoders tell the driver, which plans from there."""
+        robot = self.original.actual
+        return np.clip([robot.angles_of(state.q) for state in self._states], *robot.joint_limits)
 
     def saved_of(self, world: int) -> tuple[RobotState, Any, Any, Any]:
         """Return of one world what ``SimulatedRobot.saved`` does of the robot."""
