@@ -60,7 +60,7 @@ def every_kind(device="cpu"):
     sheet = world.add(nuno.sheet((0.3, 0.2), (5, 4), name="sheet", position=(0, 5, 1)))
     world.attach(sheet, nuno.Cloth(stretch_stiffness=(900.0, 700.0), area_density=0.3, thickness=0.002, friction=0.3))
     points, faces = sheet.vertices, sheet.faces
-    cut = world.add(nuno.cloth_mesh(points + (1, 0, 0), faces, rest=points * (1.02, 1.0, 1.0), name="cut"))
+    cut = world.add(nuno.cloth_mesh(points + np.array((1.0, 0, 0)), faces, rest=points * (1.02, 1.0, 1.0), name="cut"))
     world.attach(cut, nuno.Cloth(area_density=0.15))
     cube = world.add(nuno.soft_box((0.1, 0.1, 0.1), (2, 2, 2), name="soft", position=(2, 5, 1)))
     world.attach(cube, nuno.Soft.preset("gel"))

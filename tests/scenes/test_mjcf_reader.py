@@ -14,7 +14,8 @@ ARM = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/>
     <geom name="post" type="box" size="0.02 0.02 0.02"/>
     <body name="rod" pos="0 0 0" euler="0 0.4 0">
       <joint name="swing" type="hinge" axis="0 1 0" damping="0.01" armature="0.001"/>
-      <geom name="pole" type="capsule" fromto="0 0 -0.1 0 0 -0.5" size="0.02" density="700" contype="0" conaffinity="0"/>
+      <geom name="pole" type="capsule" fromto="0 0 -0.1 0 0 -0.5" size="0.02" density="700" contype="0"
+        conaffinity="0"/>
       <body name="tip" pos="0 0 -0.5"><geom name="bob" type="sphere" size="0.05" mass="0.4"/></body>
     </body>
   </body>
@@ -101,10 +102,12 @@ def test_actuators_are_motors(tmp_path):
 def test_flexes_are_cloth_and_soft_bodies(tmp_path):
     """A plate's stiffness by its thickness, masses, held corners; a rope is left out by name."""
     text = """<mujoco><worldbody>
-    <flexcomp name="flag" type="grid" count="5 4 1" spacing="0.1 0.1 0.1" pos="0 0 1" dim="2" mass="0.06" radius="0.002">
+    <flexcomp name="flag" type="grid" count="5 4 1" spacing="0.1 0.1 0.1" pos="0 0 1" dim="2" mass="0.06"
+      radius="0.002">
       <elasticity young="2e5" poisson="0.25" thickness="0.004" damping="0.01" elastic2d="both"/><pin id="0 1 2 3"/>
       <contact selfcollide="none"/></flexcomp>
-    <flexcomp name="jelly" type="grid" count="3 3 3" spacing="0.05 0.05 0.05" pos="1 0 1" dim="3" mass="0.2" radius="0.001">
+    <flexcomp name="jelly" type="grid" count="3 3 3" spacing="0.05 0.05 0.05" pos="1 0 1" dim="3" mass="0.2"
+      radius="0.001">
       <elasticity young="3e4" poisson="0.3" damping="0.02"/></flexcomp>
     <flexcomp name="rope" type="grid" count="5 1 1" spacing="0.1 0.1 0.1" pos="2 0 1" dim="1" mass="0.1" radius="0.01">
       <edge stiffness="100"/></flexcomp>

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scene_rooms import door_room, every_kind
 
 import nuno
+from scene_rooms import door_room, every_kind
 
 FORMATS = [
     pytest.param(".xml", id="mjcf"),

@@ -23,7 +23,8 @@ ARM = """<robot name="arm">
 <link name="slide"><inertial><mass value="0.2"/>
   <inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/><origin xyz="0.2 0 0.5"/>
-  <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="10" velocity="1"/><dynamics damping="0.1" friction="0.05"/></joint>
+  <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="10" velocity="1"/>
+  <dynamics damping="0.1" friction="0.05"/></joint>
 <joint name="flange" type="fixed"><parent link="upper"/><child link="tool"/><origin xyz="0 0 -0.4"/></joint>
 <joint name="rail" type="prismatic"><parent link="upper"/><child link="slide"/><origin xyz="0 0 -0.1"/>
   <axis xyz="0 0 1"/><limit lower="0.05" upper="0.2" effort="1" velocity="1"/></joint>

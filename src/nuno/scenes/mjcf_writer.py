@@ -12,7 +12,7 @@ from nuno.materials import Cloth, Rigid
 from nuno.mesh.tetrahedra import volumes
 from nuno.scenes.build_world import is_rigid
 from nuno.scenes.cloth_elasticity import mean_of, plate_of
-from nuno.scenes.joint_trees import joint_tree
+from nuno.scenes.scene_tree import joint_tree
 from nuno.scenes.mjcf_joints import MjcfJoints
 from nuno.scenes.mjcf_text import numbers
 from nuno.scenes.nuno_part import write_part

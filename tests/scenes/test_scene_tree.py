@@ -4,7 +4,7 @@ import numpy as np
 
 import nuno
 from nuno.scenes.describe_world import describe_world
-from nuno.scenes.joint_trees import joint_tree
+from nuno.scenes.scene_tree import joint_tree
 
 
 def row_of_boxes(count):
