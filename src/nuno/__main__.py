@@ -1,4 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``scene``, ``describe-robot``, ``compile``."""
+"""The command line: ``nuno pick CASE_DIR``, ``fold``, ``serve``, ``scene``, ``describe-robot``, ``compile``."""
 
 from __future__ import annotations
 
@@ -212,9 +212,9 @@ def _describe_robot(options: argparse.Namespace) -> int:
 
 
 def _scene(options: argparse.Namespace) -> int:
-    from nuno.scenes.show_scene import film_scene, picture_of
     from nuno.scenes.load_scene import load_scene
     from nuno.scenes.save_scene import save_scene
+    from nuno.scenes.show_scene import film_scene, picture_of
     from nuno.validation import number
     from nuno.world.world import World
 
