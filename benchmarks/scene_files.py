@@ -77,6 +77,7 @@ def main():
     logging.disable(logging.WARNING)
     found = {package: files_of(package) for package in options.packages}
     table = {}
+    print("| package | file | loaded | bodies | joints | left out or approximated |\n|---|---|---|---|---|---|")
     with tqdm(total=sum(len(files or ()) for files in found.values()), disable=not sys.stderr.isatty()) as bar:
         for package, files in found.items():
             if files is None:
@@ -84,12 +85,10 @@ def main():
                 continue
             table[package] = []
             for path in files:
-                table[package].append(load(path, options.seconds))
+                row = load(path, options.seconds)
+                table[package].append(row)
+                print(line(package, row), flush=True)
                 bar.update()
-    print("| package | file | loaded | bodies | joints | left out or approximated |\n|---|---|---|---|---|---|")
-    for package, rows in table.items():
-        for row in rows:
-            print(line(package, row))
     for package, rows in table.items():
         ran = sum(row.get("runs", False) for row in rows)
         print(f"{package}: {sum(row['loaded'] for row in rows)} of {len(rows)} loaded, {ran} ran")

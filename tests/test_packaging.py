@@ -16,7 +16,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 # Import names of what extras bring, none of which `pip install .` has.
 OPTIONAL = (
     "pinocchio", "coal", "example_robot_data", "pink", "daqp", "meshcat", "tornado", "websockets", "cma", "distributed",
-    "pytetwild", "IPython", "gymnasium",
+    "pytetwild", "IPython", "gymnasium", "mujoco", "pxr",
 )  # fmt: skip
 BLOCKER = """
 import importlib.metadata, sys

@@ -1,4 +1,8 @@
+<<<<<<< HEAD
 """The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compare``, ``compile``."""
+=======
+"""The command line: ``nuno pick CASE_DIR``, ``fold``, ``serve``, ``scene``, ``describe-robot``, ``compile``."""
+>>>>>>> wt-scenes
 
 from __future__ import annotations
 
@@ -75,6 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     describe.add_argument("--packages", nargs="+", metavar="DIR", help="folders that package:// is looked up in")
     describe.add_argument("--name", help="what the robot is to be called (default: the file's name)")
     describe.add_argument("--out", metavar="FILE", help="where the table goes (default: to the terminal)")
+<<<<<<< HEAD
     compared = commands.add_parser(
         "compare", help="run a saved world on several engines: a film of them side by side, and how far they come apart"
     )
@@ -85,6 +90,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     compared.add_argument("--seconds", type=float, default=2.0, help="how long it runs (default 2)")
     compared.add_argument("--out", required=True, metavar="DIR", help="where film.html and differences.json go")
+=======
+    scene = commands.add_parser(
+        "scene", help="what is in a scene file (MJCF, URDF, USD), and what of it a world of Nuno cannot have?"
+    )
+    scene.add_argument("file", metavar="FILE", help="ends with .xml, .urdf, .usd, .usda or .usdc")
+    scene.add_argument("--keyframe", metavar="NAME", help="the key frame of an MJCF file to begin in")
+    scene.add_argument("--free-base", action="store_true", help="let the root link of a URDF file move")
+    scene.add_argument("--packages", nargs="+", default=(), metavar="DIR", help="folders for package:// in a URDF file")
+    scene.add_argument("--seconds", type=float, default=0.0, metavar="S", help="let it run so long (default 0)")
+    scene.add_argument("--out", metavar="DIR", help="where scene.png goes, and with --seconds film.html")
+    scene.add_argument("--save", metavar="FILE", help="write it, as it is then, as MJCF (.xml) or USD (.usda, .usdc)")
+>>>>>>> wt-scenes
     ahead = commands.add_parser(
         "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
         description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
@@ -96,8 +113,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     ahead.add_argument("--only", nargs="+", metavar="MODULE", help="these modules of kernels (default: all)")
     ahead.add_argument("--jobs", type=int, metavar="N", help="compile so many at once (default: one for each core)")
+<<<<<<< HEAD
     compared.add_argument("--device", default="cpu", help="cpu (default), cuda, cuda:1 ...; mujoco has the CPU only")
     for command in (pick, fold, serve):
+=======
+    for command in (pick, fold, serve, scene):
+>>>>>>> wt-scenes
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
     pick.add_argument("--engine", default="nuno", help="what moves the imagined cloths: nuno (default), mujoco ...")
     for command in (pick, fold, compared):
@@ -108,8 +129,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
+<<<<<<< HEAD
         commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile, "compare": _compare,
                        "describe-robot": _describe_robot}  # fmt: skip
+=======
+        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
+                       "describe-robot": _describe_robot, "scene": _scene}  # fmt: skip
+>>>>>>> wt-scenes
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
@@ -232,6 +258,36 @@ def _describe_robot(options: argparse.Namespace) -> int:
         options.urdf, options.out, srdf=options.srdf, package_dirs=options.packages, name=options.name
     )  # fmt: skip
     sys.stdout.write(text if options.out is None else f"see {options.out}, and correct what says CHECK\n")
+    return ANSWERED
+
+
+def _scene(options: argparse.Namespace) -> int:
+    from nuno.scenes.load_scene import load_scene
+    from nuno.scenes.save_scene import save_scene
+    from nuno.scenes.show_scene import film_scene, picture_of
+    from nuno.validation import number
+    from nuno.world.world import World
+
+    number("--seconds", options.seconds, low=0.0)
+    if options.out is not None:
+        _check_out(options.out)
+    _start_warp()
+    logging.getLogger("nuno.scenes").setLevel(logging.ERROR)  # the report says all
+    scene = load_scene(
+        options.file, World(device=options.device), keyframe=options.keyframe, fixed_base=not options.free_base,
+        package_dirs=options.packages,
+    )  # fmt: skip
+    sys.stdout.write(f"{scene.report}\n")
+    if options.out is not None:
+        folder = Path(options.out)
+        folder.mkdir(parents=True, exist_ok=True)
+        picture_of(scene.world).save(folder / "scene.png")
+        if options.seconds:
+            film_scene(scene.world, options.seconds).save(folder / "film.html")
+    elif options.seconds:
+        scene.world.run(options.seconds)
+    if options.save is not None:
+        sys.stdout.write(f"{save_scene(scene.world, options.save)}\n")
     return ANSWERED
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,15 @@ from nuno.world.world import World
 ORIGIN: Pose = (np.zeros(3), quat.IDENTITY)
 
 
-def describe_world(world: World, index: int | None = None) -> SceneDescription:
+def describe_world(
+    world: World, index: int | None = None, joint_names: Mapping[str, str] | None = None
+) -> SceneDescription:  # fmt: skip
     """Return a world as a description.
 
     Args:
         world: The world.
         index: Which world of a batch; None for a single one.
+        joint_names: What joints are called, by their keys.
 
     Raises:
         InvalidInputError: a batch without ``index``, or out of range.
@@ -51,6 +55,8 @@ def describe_world(world: World, index: int | None = None) -> SceneDescription:
         poses = {record.key: _one(live[record.key].pose(), k) for record in snapshot.bodies}
         for grip in snapshot.grips:
             _add_grip(scene, grip, names, poses, snapshot)
+            if isinstance(grip.spec, JointSpec) and grip.key in (joint_names or {}):
+                scene.joints[-1].name = (joint_names or {})[grip.key]
         scene.ignored = [(names[a], names[b]) for a, b in snapshot.ignored if a in names and b in names]
         scene.pair_friction = [
             (names[a], names[b], float(np.ravel(mu)[0]))

@@ -26,7 +26,7 @@ READABLE = (".xml", ".mjcf", ".urdf", *USD)
 
 @dataclass(frozen=True, eq=False)
 class LoadedScene:
-    """What a scene file brought into a world.
+    """A scene file's bodies, joints and grips in a world.
 
     Attributes:
         world: The world.

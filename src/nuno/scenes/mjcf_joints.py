@@ -13,7 +13,7 @@ from nuno.scenes.scene_description import SceneBody, SceneDescription, SceneJoin
 from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
-    from nuno.scenes.joint_trees import JointTree
+    from nuno.scenes.scene_tree import JointTree
 
 TYPES = {"hinge": "hinge", "slider": "slide", "ball": "ball"}
 STIFF = 1e4

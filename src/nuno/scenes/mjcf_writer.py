@@ -12,12 +12,12 @@ from nuno.materials import Cloth, Rigid
 from nuno.mesh.tetrahedra import volumes
 from nuno.scenes.build_world import is_rigid
 from nuno.scenes.cloth_elasticity import mean_of, plate_of
-from nuno.scenes.joint_trees import joint_tree
 from nuno.scenes.mjcf_joints import MjcfJoints
 from nuno.scenes.mjcf_text import numbers
 from nuno.scenes.nuno_part import write_part
 from nuno.scenes.rest_place import placed_rest
 from nuno.scenes.scene_description import SceneBody, SceneDescription
+from nuno.scenes.scene_tree import joint_tree
 from nuno.scenes.shape_parts import parts_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.color import rgb

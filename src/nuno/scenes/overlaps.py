@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from nuno.robot.coal_shapes import convex, primitive
+from nuno.robot.link_geometry import few_corners
 from nuno.robot.pinocchio import coal
 from nuno.scenes.scene_description import SceneBody
 from nuno.scenes.shape_parts import parts_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose
 from nuno.shapes.shape import Plane
+
+COARSE = 0.005
+"""Of a mesh's size, by how much its hull may be smaller."""
 
 
 def overlapping_pairs(bodies: Sequence[SceneBody]) -> Iterator[tuple[str, str]]:
@@ -36,7 +40,11 @@ def _solids(body: SceneBody) -> list[tuple[Any, Any]]:
         position, rotation = compose((body.position, body.quaternion), (place, turn))
         own = primitive(shape)
         if own is None:
-            own = convex(np.asarray(shape.mesh()[0], dtype=float))
+            points = np.asarray(shape.mesh()[0], dtype=float)
+            try:
+                own = convex(few_corners(points, COARSE * float(np.ptp(points, axis=0).max())))
+            except RuntimeError:  # all in a plane
+                continue
         own.computeLocalAABB()
         found.append((own, coal.Transform3s(quat.to_matrix(rotation), position)))
     return found

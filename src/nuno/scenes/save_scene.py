@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 
 from nuno.errors import InvalidInputError
 from nuno.files.export import check_extension
 from nuno.files.whole_file import file_path, write_whole
+from nuno.joints.joint import Joint
 from nuno.scenes.describe_world import describe_world
 from nuno.scenes.scene_report import SceneReport, report_of
 from nuno.validation import checked, count
@@ -16,7 +18,9 @@ WRITABLE = (".xml", ".mjcf", ".usd", ".usda", ".usdc")
 
 
 @checked
-def save_scene(world: World, path: str | os.PathLike[str], index: int | None = None) -> SceneReport:
+def save_scene(
+    world: World, path: str | os.PathLike[str], index: int | None = None, *, joints: Mapping[str, Joint] | None = None
+) -> SceneReport:  # fmt: skip
     """Write a world as it is now as MJCF or USD; a file that is there is replaced.
 
     The file holds the world in the format's own words, for other programs, and what the format has no word for in a
@@ -28,6 +32,8 @@ def save_scene(world: World, path: str | os.PathLike[str], index: int | None = N
         world: The world.
         path: Ends with .xml or .mjcf for MJCF, which needs no package, or .usd, .usda or .usdc (the extra ``usd``).
         index: Which world of a batch; None for a single one.
+        joints: Joints by what they are to be called, such as ``LoadedScene.joints``; others are called by their kind
+            and bodies.
 
     Raises:
         InvalidInputError: another extension, a batch without ``index``, or out of range.
@@ -40,15 +46,16 @@ def save_scene(world: World, path: str | os.PathLike[str], index: int | None = N
         count("index", index, low=0)
     if not world.bodies:
         raise InvalidInputError("the world has no bodies to save")
+    names = {joint.key: name for name, joint in (joints or {}).items()}
     is_mjcf = goal.suffix.lower() in (".xml", ".mjcf")
     if is_mjcf:
         from nuno.scenes.mjcf_writer import write_mjcf
 
-        scene = describe_world(world, index)
+        scene = describe_world(world, index, names)
         write_whole(goal, write_mjcf(scene))
         return report_of(scene, goal, "saved")
     from nuno.scenes.usd_writer import write_usd
 
-    scene = describe_world(world, index)
+    scene = describe_world(world, index, names)
     write_whole(goal, write_usd(scene, goal.suffix.lower()))
     return report_of(scene, goal, "saved")

@@ -22,7 +22,7 @@ SHOWN = 4
 
 @dataclass(frozen=True, eq=False)
 class SceneReport:
-    """What a scene file brought or took.
+    """A report of what a scene file brought or took.
 
     Attributes:
         path: The file.

@@ -16,8 +16,10 @@ from nuno.scenes.bare_body import BARE, whole_body
 from nuno.scenes.scene_description import SceneBody, SceneDescription, SceneJoint
 from nuno.shapes import quaternion as quat
 from nuno.shapes.mass_properties import MassProperties
-from nuno.shapes.shape import Shape, Sphere
+from nuno.shapes.shape import Hull, Shape, Sphere, TriangleMesh
 
+SIMPLE, COARSE = 1e-3, 0.005
+"""[m] By how much a hull may be smaller than that of the mesh, and no more than that share of its size."""
 LIGHTEST = 1e-3
 """[kg] Of a link that moves and is said to have no mass."""
 GRAY = (0.6, 0.6, 0.6)
@@ -144,15 +146,24 @@ class UrdfReader:
             joint = int(part.parentJoint)
             try:
                 shape, offset = shape_of(part, joint > 0)
-            except (NunoError, ValueError) as error:
+                if joint > 0 and isinstance(shape, TriangleMesh):
+                    shape, offset = self._simple(shape, joint)
+            except (NunoError, ValueError, RuntimeError) as error:
                 self.scene.note(f"geometry that cannot be used is left out ({error})", str(part.name))
                 continue
-            if joint > 0 and "tri_indices" in dir(part.geometry):
-                self.scene.note("a mesh that moves is touched as its convex hull", self.links[joint])
             own = part.placement
             turn = np.roll(self.pin.Quaternion(own.rotation).normalized().coeffs(), 1)
             found.setdefault(joint, []).append((shape, own.translation + own.rotation @ offset, turn))
         return found
+
+    def _simple(self, mesh: TriangleMesh, joint: int) -> tuple[Shape, np.ndarray]:
+        """Return a hull of few corners, and where its centre is."""
+        from nuno.robot.link_geometry import few_corners
+
+        points = np.asarray(mesh.vertices)
+        hull = Hull.of(few_corners(points, min(SIMPLE, COARSE * float(np.ptp(points, axis=0).max()))))
+        self.scene.note("a mesh that moves is touched as its convex hull, to a millimetre", self.links[joint])
+        return hull, hull.centre
 
     def _mass(self, joint: int) -> MassProperties:
         own = self.model.inertias[joint]

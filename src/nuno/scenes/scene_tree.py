@@ -10,7 +10,7 @@ from nuno.scenes.scene_description import SceneDescription, SceneJoint
 
 @dataclass(eq=False)
 class JointTree:
-    """Which body is a child of which, and what is left for constraints.
+    """A tree of bodies: each one's parent, and what is left for constraints.
 
     Attributes:
         parent: By the name of each rigid body its parent's, None: the world.
