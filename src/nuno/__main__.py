@@ -1,4 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compile``."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``capture``, ``serve``, ``describe-robot``, ``compile``."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
+from nuno.estimate.capture_options import add_capture
 from nuno.estimate.lift_prior import SIDEWAYS
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
+    add_capture(commands)
     serve = commands.add_parser(
         "serve", help="put a simulated robot on the wire, for programs that speak to it as to a real one"
     )
@@ -92,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
         commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
-                       "describe-robot": _describe_robot}  # fmt: skip
+                       "describe-robot": _describe_robot, "capture": _capture}  # fmt: skip
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
@@ -146,6 +148,15 @@ def _fold(options: argparse.Namespace) -> int:
         f"replayed {len(result.times)} frames as {result.material_name}, {agreed}in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'}, strip.png, layers.png, hands.png and replay.glb\n"
     )
+    return ANSWERED
+
+
+def _capture(options: argparse.Namespace) -> int:
+    from nuno.estimate.capture_command import run_capture
+
+    if options.out is not None:
+        _check_out(options.out)
+    sys.stdout.write(run_capture(options))
     return ANSWERED
 
 

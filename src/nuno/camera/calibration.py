@@ -24,7 +24,7 @@ LEAST_COVERED = 0.3
 """Share of the image in which corners were seen, all views together."""
 MOST_DOUBT = 0.01
 """Standard deviation of the focal length, as a share of it."""
-_BOARD_CLIPPED = 0.35  # share of the board in its image that may be clipped: white paper is half of it
+_BOARD_CLIPPED = 0.15  # share of the board in its image that may be clipped: a third of it is white paper
 _OUTLIER = 3.0  # a view whose error is so many times the median is left out
 _CELLS = (8, 6)
 
@@ -147,15 +147,14 @@ def camera_over_table(
     height = number("table_height", table_height) + number("board_thickness", board_thickness, low=0.0, high=0.1)
     rgb = check_image(image, camera, "the image of the board on the table")
     numbers, pixels = _good_corners(rgb, board, "the image of the board on the table")
-    world = board.corners[numbers] + (*board_at, height)
+    flat = board.corners[numbers]
     distortion = np.zeros(5) if camera.distortion is None else camera.distortion
-    _, turn, shift = cv2.solvePnP(world, pixels, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
-    turn, shift = cv2.solvePnPRefineLM(world, pixels, camera.matrix, distortion, turn, shift)
-    rotation = cv2.Rodrigues(turn)[0]
+    turn, shift = _pose(flat, pixels, camera.matrix, distortion)
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation.T, -rotation.T @ shift.ravel()
+    pose[:3, :3] = turn.T
+    pose[:3, 3] = (board_at[0], board_at[1], height) - turn.T @ shift
     found = replace(camera, camera_to_world=pose)
-    error = float(np.sqrt(((found.project(world) - pixels) ** 2).sum(axis=1).mean()))
+    error = float(np.sqrt(((found.project(flat + (*board_at, height)) - pixels) ** 2).sum(axis=1).mean()))
     limit = MOST_ERROR * max(1.0, camera.width / 1000.0)
     if not error <= limit:
         raise CalibrationError(
@@ -165,6 +164,23 @@ def camera_over_table(
     if pose[2, 3] <= height:
         raise CalibrationError("the camera would be under the table: the board must lie with its print up")
     return found, error
+
+
+def _pose(
+    flat: np.ndarray, pixels: np.ndarray, matrix: np.ndarray, distortion: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rotation and place of a plane's points (n, 3) in the camera: of the two that a plane may have, the better one."""
+    _, turns, shifts, _ = cv2.solvePnPGeneric(flat, pixels, matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
+    best, found = np.inf, None
+    for first, second in zip(turns, shifts, strict=True):
+        turn, shift = cv2.solvePnPRefineLM(flat, pixels, matrix, distortion, first, second)
+        drawn = cv2.projectPoints(flat, turn, shift, matrix, distortion)[0].reshape(-1, 2)
+        error = float(((drawn - pixels) ** 2).sum())
+        if error < best:
+            best, found = error, (cv2.Rodrigues(turn)[0], shift.ravel())
+    if found is None:
+        raise CalibrationError("the board's corners fit no pose: is the board flat, and its number of squares right?")
+    return found
 
 
 def _good_corners(image: np.ndarray, board: CalibrationBoard, name: str) -> tuple[np.ndarray, np.ndarray]:

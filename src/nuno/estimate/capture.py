@@ -29,6 +29,8 @@ TABLE_HEIGHT = 0.72
 _MOVED = 1.5
 """[px] (of 1000) A camera that moved more between two images is told of."""
 
+_FEWEST = 10  # corners in the room that tell whether it moved
+
 Images = Sequence[str | os.PathLike[str] | np.ndarray]
 
 
@@ -119,10 +121,11 @@ def capture_case(
     seen, board_error = camera_over_table(
         on_table, lens, own, table_height=height, board_thickness=board_thickness, board_at=board_at
     )
+    away = _without_board(on_table, own)
     warnings = list(calibration.warnings) if calibration is not None else []
     for name, image in shown.items():
         check_quality(check_image(image, seen, f"the image {name}"), f"the image {name}")
-        moved = _moved(on_table, image)
+        moved = _moved(on_table, image, away)
         if moved > _MOVED * max(1.0, seen.width / 1000.0):
             warnings.append(
                 f"the camera seems to have moved by {moved:.1f} px before the image {name}: fix it, and take the image of the "
@@ -172,19 +175,29 @@ def _check_hand(hand: np.ndarray, camera: Camera, height: float) -> None:
         raise InvalidInputError(f"the hand at {np.round(hand, 3).tolist()} m is not above the table, z = {height:g} m")
 
 
-def _moved(first: np.ndarray, second: np.ndarray) -> float:
-    """By how much the camera seems to have moved between two images [px]: what most of their corners have done."""
+def _without_board(image: np.ndarray, board: CalibrationBoard) -> np.ndarray:
+    """(h, w) uint8, 0 where the board lies, and near it."""
+    pixels = board.find(image)[1]
+    middle = pixels.mean(axis=0)
+    rim = middle + 1.8 * (cv2.convexHull(pixels.astype(np.float32))[:, 0] - middle)  # its outer squares and paper too
+    free = np.ones(image.shape[:2], dtype=np.uint8)
+    cv2.fillConvexPoly(free, np.round(rim).astype(np.int32), 0)
+    return free
+
+
+def _moved(first: np.ndarray, second: np.ndarray, where: np.ndarray) -> float:
+    """By how much the camera seems to have moved between two images [px]: what most corners of the first have done."""
     greys = [cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second)]
-    corners = cv2.goodFeaturesToTrack(greys[0], 400, 0.01, 8)
-    if corners is None or len(corners) < 20:
+    corners = cv2.goodFeaturesToTrack(greys[0], 400, 0.01, 8, mask=where)
+    if corners is None or len(corners) < _FEWEST:
         return 0.0
     there, good, _ = cv2.calcOpticalFlowPyrLK(greys[0], greys[1], corners, None)  # type: ignore[call-overload]
     back, again, _ = cv2.calcOpticalFlowPyrLK(greys[1], greys[0], there, None)  # type: ignore[call-overload]
     sure = (good.ravel() == 1) & (again.ravel() == 1) & (np.linalg.norm((back - corners).reshape(-1, 2), axis=1) < 0.5)
-    if sure.sum() < 20:
+    if sure.sum() < _FEWEST:
         return 0.0
     way = np.linalg.norm((there - corners).reshape(-1, 2)[sure], axis=1)
-    return float(np.quantile(way, 0.25))  # the board and the cloth have moved, what is around them has not
+    return float(np.quantile(way, 0.25))  # the cloth has moved, what is around it has not
 
 
 def _entry(camera: Camera) -> dict[str, object]:

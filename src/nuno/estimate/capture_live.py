@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.image_quality import check_quality
-from nuno.errors import ImageError, InvalidInputError
+from nuno.errors import ImageError
 from nuno.estimate.capture import Capture, capture_case
 from nuno.files.whole_file import made_folder, write_whole
 from nuno.validation import checked, count
@@ -21,6 +21,7 @@ VIEWS = 12
 _TRIES = 5  # for each image
 
 
+@runtime_checkable
 class ImageSource(Protocol):
     """What gives images: `nuno.UsbCamera`, or any camera with such a method."""
 
@@ -52,8 +53,6 @@ def take_capture(
         ImageError: five images after one another cannot be used.
         CalibrationError: as ``capture_case``, as all its errors.
     """
-    if not callable(getattr(source, "take", None)):
-        raise InvalidInputError(f"source must have a method take(), as nuno.UsbCamera has, got {type(source).__name__}")
     wanted = count("views", views, low=6, high=200)
     own = CalibrationBoard() if board is None else board
     raw = made_folder(made_folder(folder) / "raw")
