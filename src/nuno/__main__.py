@@ -1,4 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``capture``, ``serve``, ``describe-robot``, ``compile``."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``capture``, ``fold``, ``serve``, ``describe-robot`` ..."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ _SAMPLES = 2
 
 
 def quads(camera, image, corners, picture, rim=60):
-    """Draw a picture (h, w) on the parallelogram whose upper left, upper right and lower left corners (3, 3) [m] are given, in a white rim [px]."""
+    """Draw a picture (h, w) in a white rim [px] on a parallelogram: its upper left, upper right, lower left corner [m]."""
     framed = cv2.copyMakeBorder(picture, rim, rim, rim, rim, cv2.BORDER_CONSTANT, value=235).astype(np.float32)
     origin, right, down = corners[0], corners[1] - corners[0], corners[2] - corners[0]
     normal = np.cross(right, down)
@@ -63,7 +63,16 @@ def board_view(camera, centre, turn, board=BOARD, seed=0):
     return exposed(quads(camera, room(camera), corners, 0.82 * board.picture(100) + 20), seed)
 
 
-PLACES = ((-0.12, -0.08), (0.12, -0.08), (-0.12, 0.08), (0.12, 0.08), (0.0, 0.0), (-0.07, 0.0), (0.07, 0.02), (0.0, -0.05))
+PLACES = (
+    (-0.12, -0.08),
+    (0.12, -0.08),
+    (-0.12, 0.08),
+    (0.12, 0.08),
+    (0.0, 0.0),
+    (-0.07, 0.0),
+    (0.07, 0.02),
+    (0.0, -0.05),
+)
 
 
 def board_views(camera=LENS, board=BOARD, count=8):
@@ -74,5 +83,7 @@ def board_views(camera=LENS, board=BOARD, count=8):
         tilt = np.radians(20 + 5 * (k % 5))
         angle = 2.0 * np.pi * k / count
         centre = np.array([x, y, 0.42 + 0.03 * (k % 3)])
-        views.append(board_view(camera, centre, (tilt * np.cos(angle), tilt * np.sin(angle), 0.1 * (k % 4 - 1.5)), board, k))
+        views.append(
+            board_view(camera, centre, (tilt * np.cos(angle), tilt * np.sin(angle), 0.1 * (k % 4 - 1.5)), board, k)
+        )
     return views

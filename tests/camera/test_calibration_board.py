@@ -43,7 +43,7 @@ def test_boards_that_cannot_be(tmp_path):
         nuno.CalibrationBoard(square=0.05).save(tmp_path / "board.pdf")
     with pytest.raises(nuno.InvalidInputError, match="more markers than"):
         nuno.CalibrationBoard(12, 12, dictionary="4X4_50")
-    with pytest.raises(nuno.InvalidInputError, match="0.4 to 0.9"):
+    with pytest.raises(nuno.InvalidInputError, match=r"0\.4 to 0\.9"):
         nuno.CalibrationBoard(marker=0.035)
     with pytest.raises(nuno.InvalidInputError, match=r"\.pdf, \.png"):
         BOARD.save(tmp_path / "board.doc")

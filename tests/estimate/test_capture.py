@@ -13,7 +13,7 @@ import nuno
 from nuno.__main__ import main
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "camera"))
-from board_views import BOARD, LENS, board_views, exposed, quads, room  # noqa: E402
+from board_views import BOARD, LENS, board_views, exposed, quads, room
 
 HEIGHT, AT = 0.72, (0.1, -0.05)
 HAND, MARKER, SIDE = np.array([0.0, 0.1, 0.95]), 7, 0.06
@@ -21,7 +21,9 @@ CAMERA = nuno.Camera(
     640, 480, LENS.fx, LENS.fy, LENS.cx, LENS.cy,
     nuno.Camera.look_at((-0.55, 0.0, 1.32), (0.05, 0.0, 0.75), 1.0).camera_to_world, LENS.distortion,
 )  # fmt: skip
-TOLERANCE = 0.006  # [m] the lens is known to 0.2 %, of some 0.8 m 2 mm, and the principal point to 1 px, which is 1.4 mm
+TOLERANCE = (
+    0.006  # [m] the lens is known to 0.2 %, of some 0.8 m 2 mm, and the principal point to 1 px, which is 1.4 mm
+)
 
 
 def rectangle(centre, right, down):
@@ -95,7 +97,9 @@ def test_the_cloth_is_measured(tmp_path):
     """The towel of 0.2 x 0.3 m that is drawn in the image before is measured to 2 % by the case's camera."""
     made = capture(tmp_path, table_size=(0.8, 1.2))
     case = nuno.read_case(tmp_path)
-    mask = nuno.segment_before(case.before, case.camera, nuno.Table(HEIGHT, (0.4, 0.6)), hint=tuple(CAMERA.project([0.1, 0.0, HEIGHT])))
+    mask = nuno.segment_before(
+        case.before, case.camera, nuno.Table(HEIGHT, (0.4, 0.6)), hint=tuple(CAMERA.project([0.1, 0.0, HEIGHT]))
+    )
     from nuno.camera.rectangle import fit_rectangle
 
     found = fit_rectangle(mask, case.before, case.camera, HEIGHT)
@@ -113,7 +117,7 @@ def test_a_camera_that_moved_is_told(tmp_path):
 
 
 def test_bad_images(tmp_path):
-    """Files that are none, images without the board, blurred or overexposed: named errors with the cure, and no case."""
+    """Files that are none, images without the board, blurred or overexposed: named errors, and no case."""
     _, table, before, _ = images()
     goal = tmp_path / "case"
     (tmp_path / "text.png").write_text("no image")
@@ -121,7 +125,11 @@ def test_bad_images(tmp_path):
         ({"before": tmp_path / "none.png"}, nuno.ImageError, "no image file"),
         ({"before": tmp_path / "text.png"}, nuno.ImageError, "holds no image"),
         ({"board_on_table": before}, nuno.BoardNotFoundError, "show all of the board"),
-        ({"before": cv2.GaussianBlur(before, (0, 0), 5.0)}, nuno.ImageQualityError, "the image before is blurred .* focus"),
+        (
+            {"before": cv2.GaussianBlur(before, (0, 0), 5.0)},
+            nuno.ImageQualityError,
+            "the image before is blurred .* focus",
+        ),
         ({"board_on_table": cv2.GaussianBlur(table, (0, 0), 3.0)}, nuno.ImageQualityError, "blurred"),
         ({"before": np.full_like(before, 255)}, nuno.ImageQualityError, "overexposed"),
         ({"before": before[:240]}, nuno.ImageError, "fit its camera"),
@@ -156,7 +164,9 @@ def test_taking_images_one_after_another(tmp_path):
     blurred = cv2.GaussianBlur(before, (0, 0), 6.0)
     source = Replay([*views, table, blurred, before, after])
     made = nuno.take_capture(tmp_path, source, said.append, views=8, hand=HAND, table_height=HEIGHT, board_at=AT)
-    assert len(said) == 8 + 4 and said[10].startswith("the image is blurred") and "Again: take the board away" in said[10]
+    assert (
+        len(said) == 8 + 4 and said[10].startswith("the image is blurred") and "Again: take the board away" in said[10]
+    )
     assert sorted(path.name for path in (tmp_path / "raw").iterdir()) == sorted(
         [*(f"board_{k:02d}.png" for k in range(8)), "board_on_table.png", "before.png", "after.png"]
     )

@@ -52,9 +52,16 @@ def image_quality(image: ArrayLike, region: ArrayLike | None = None) -> ImageQua
         ImageError: no such image, or a region of another size.
     """
     array = as_array("image", image, ImageError)
-    if array.dtype != np.uint8 or array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] != 3) or not array.size:
+    if (
+        array.dtype != np.uint8
+        or array.ndim not in (2, 3)
+        or (array.ndim == 3 and array.shape[2] != 3)
+        or not array.size
+    ):
         raise ImageError(f"an image must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
-    where = np.ones(array.shape[:2], dtype=bool) if region is None else as_array("region", region, ImageError).astype(bool)
+    where = (
+        np.ones(array.shape[:2], dtype=bool) if region is None else as_array("region", region, ImageError).astype(bool)
+    )
     if where.shape != array.shape[:2] or not where.any():
         raise ImageError(f"region must be bool of shape {array.shape[:2]}, with something in it, got {where.shape}")
     brightest = array.max(axis=-1) if array.ndim == 3 else array
@@ -71,7 +78,9 @@ def image_quality(image: ArrayLike, region: ArrayLike | None = None) -> ImageQua
     return ImageQuality(blur, float((brightest[where] >= _CLIPPED).mean()), float(np.quantile(brightest[where], 0.9)))
 
 
-def check_quality(image: np.ndarray, name: str, region: np.ndarray | None = None, clipped: float = MOST_CLIPPED) -> ImageQuality:
+def check_quality(
+    image: np.ndarray, name: str, region: np.ndarray | None = None, clipped: float = MOST_CLIPPED
+) -> ImageQuality:
     """Return an image's quality where it is good enough.
 
     Args:
@@ -87,13 +96,13 @@ def check_quality(image: np.ndarray, name: str, region: np.ndarray | None = None
     limit = MOST_BLUR * max(1.0, image.shape[1] / 1000.0)
     if found.bright < LEAST_BRIGHT:
         raise ImageQualityError(
-            f"{name} is too dark: its brightest tenth begins at level {found.bright:.0f} of 255, {LEAST_BRIGHT} are needed; "
-            "more light, or a longer exposure"
+            f"{name} is too dark: its brightest tenth begins at level {found.bright:.0f} of 255, {LEAST_BRIGHT} are "
+            "needed; more light, or a longer exposure"
         )
     if found.clipped > clipped:
         raise ImageQualityError(
-            f"{name} is overexposed: {found.clipped:.0%} is as bright as can be told, {clipped:.0%} are the limit; less "
-            "light, a shorter exposure, or no glare"
+            f"{name} is overexposed: {found.clipped:.0%} is as bright as can be told, {clipped:.0%} are the limit; "
+            "less light, a shorter exposure, or no glare"
         )
     if found.blur > limit:
         how = "shows no edges" if not np.isfinite(found.blur) else f"is blurred by {found.blur:.1f} px"

@@ -29,6 +29,7 @@ TABLE_HEIGHT = 0.72
 _MOVED = 1.5
 """[px] (of 1000) A camera that moved more between two images is told of."""
 
+_PAPER = 0.04  # [m] about the board that is its paper
 _FEWEST = 10  # corners in the room that tell whether it moved
 
 Images = Sequence[str | os.PathLike[str] | np.ndarray]
@@ -90,8 +91,8 @@ def capture_case(
         board_at: x and y of the board's middle from the table's middle [m].
 
     Raises:
-        InvalidInputError: no or two ways to the hand, to the lens; a value out of range; a hand out of the image or under
-            the table.
+        InvalidInputError: no or two ways to the hand, to the lens; a value out of range; a hand out of the image or
+            under the table.
         ImageError: an image that cannot be read, or of another size; BoardNotFoundError and ImageQualityError are such.
         CalibrationError: no camera follows from the images of the board.
         FileWriteError: the folder cannot be written.
@@ -121,21 +122,23 @@ def capture_case(
     seen, board_error = camera_over_table(
         on_table, lens, own, table_height=height, board_thickness=board_thickness, board_at=board_at
     )
-    away = _without_board(on_table, own)
+    away = _without_board(seen, own, board_at, height)
     warnings = list(calibration.warnings) if calibration is not None else []
     for name, image in shown.items():
         check_quality(check_image(image, seen, f"the image {name}"), f"the image {name}")
         moved = _moved(on_table, image, away)
         if moved > _MOVED * max(1.0, seen.width / 1000.0):
             warnings.append(
-                f"the camera seems to have moved by {moved:.1f} px before the image {name}: fix it, and take the image of the "
-                "board on the table anew"
+                f"the camera seems to have moved by {moved:.1f} px before the image {name}: fix it, and take the image "
+                "of the board on the table anew"
             )
     if given is None:
         assert marker is not None and marker_size is not None
         given, _, marker_error = find_marker(shown["after"], seen, marker, marker_size, offset=offset)
         if marker_error > 1.0:
-            warnings.append(f"the marker's corners are {marker_error:.1f} px from those of a square: is it bent or half hidden?")
+            warnings.append(
+                f"the marker's corners are {marker_error:.1f} px from those of a square: is it bent or half hidden?"
+            )
     place = np.asarray(given, dtype=float)
     _check_hand(place, seen, height)
     goal = made_folder(folder)
@@ -166,22 +169,25 @@ def _read(image: str | os.PathLike[str] | np.ndarray, name: str) -> np.ndarray:
 def _check_hand(hand: np.ndarray, camera: Camera, height: float) -> None:
     """Raise an error where `nuno.estimate_pick` would refuse the hand."""
     pixel = camera.project(hand)
-    if not (np.isfinite(pixel).all() and (pixel > -0.5).all() and (pixel < (camera.width - 0.5, camera.height - 0.5)).all()):
+    if not (
+        np.isfinite(pixel).all() and (pixel > -0.5).all() and (pixel < (camera.width - 0.5, camera.height - 0.5)).all()
+    ):
         raise InvalidInputError(
-            f"the hand at {np.round(hand, 3).tolist()} m would not be in the image after: x and y are measured from the table's "
-            "middle, as board_at is, and z from the floor"
+            f"the hand at {np.round(hand, 3).tolist()} m would not be in the image after: x and y are measured from "
+            "the table's middle, as board_at is, and z from the floor"
         )
     if hand[2] <= height:
         raise InvalidInputError(f"the hand at {np.round(hand, 3).tolist()} m is not above the table, z = {height:g} m")
 
 
-def _without_board(image: np.ndarray, board: CalibrationBoard) -> np.ndarray:
-    """(h, w) uint8, 0 where the board lies, and near it."""
-    pixels = board.find(image)[1]
-    middle = pixels.mean(axis=0)
-    rim = middle + 1.8 * (cv2.convexHull(pixels.astype(np.float32))[:, 0] - middle)  # its outer squares and paper too
-    free = np.ones(image.shape[:2], dtype=np.uint8)
-    cv2.fillConvexPoly(free, np.round(rim).astype(np.int32), 0)
+def _without_board(camera: Camera, board: CalibrationBoard, at: tuple[float, float], height: float) -> np.ndarray:
+    """(h, w) uint8, 0 where the board lies, with its paper's rim."""
+    half = 0.5 * np.array(board.size) + _PAPER
+    rim = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half + at
+    pixels = camera.project(np.column_stack([rim, np.full(4, height)]))
+    free = np.ones((camera.height, camera.width), dtype=np.uint8)
+    if np.isfinite(pixels).all():
+        cv2.fillConvexPoly(free, np.round(np.clip(pixels, -1e4, 1e4)).astype(np.int32), 0)
     return free
 
 

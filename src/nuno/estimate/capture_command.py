@@ -28,8 +28,8 @@ def run_capture(options: argparse.Namespace) -> str:
     if options.board is not None:
         board.save(options.board, options.paper)
         return (
-            f"see {options.board}: print it at 100 %, glue it onto something flat, and measure a square, which should be "
-            f"{1e3 * board.square:g} mm; if it is not, give what it is as --square\n"
+            f"see {options.board}: print it at 100 %, glue it onto something flat, and measure a square, which should "
+            f"be {1e3 * board.square:g} mm; if it is not, give what it is as --square\n"
         )
     if options.out is None:
         raise InvalidInputError("--out is needed, the folder of the case; or --board, to print the board")
@@ -37,7 +37,8 @@ def run_capture(options: argparse.Namespace) -> str:
         "board": board, "camera": None if options.camera is None else _camera(options.camera), "hand": options.hand,
         "marker": options.marker, "marker_size": options.marker_size, "hand_offset": tuple(options.hand_offset),
         "table_height": options.table_height, "board_thickness": options.board_thickness,
-        "table_size": None if options.table_size is None else tuple(options.table_size), "board_at": tuple(options.board_at),
+        "table_size": None if options.table_size is None else tuple(options.table_size), "board_at":
+        tuple(options.board_at),
     }  # fmt: skip
     if (options.hand is None) == (options.marker is None):
         raise InvalidInputError("the hand's place is needed: --hand X Y Z, or --marker ID with --marker-size")
@@ -59,10 +60,12 @@ def run_capture(options: argparse.Namespace) -> str:
     for warning in made.warnings:
         sys.stderr.write(f"nuno: {warning}\n")
     lens = made.calibration
-    told = "" if lens is None else f"lens {lens.error:.2f} px over {lens.views} views ({lens.covered:.0%} of the image), "
+    told = (
+        "" if lens is None else f"lens {lens.error:.2f} px over {lens.views} views ({lens.covered:.0%} of the image), "
+    )
     return (
-        f"{told}board on the table {made.board_error:.2f} px; look at {made.folder / 'preview.png'}: the grid must lie on the "
-        f"table and the cross on the hand. Then: nuno pick {made.folder} --out out\n"
+        f"{told}board on the table {made.board_error:.2f} px; look at {made.folder / 'preview.png'}: the grid must lie "
+        f"on the table and the cross on the hand. Then: nuno pick {made.folder} --out out\n"
     )
 
 

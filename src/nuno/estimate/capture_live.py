@@ -32,7 +32,8 @@ class ImageSource(Protocol):
 
 @checked
 def take_capture(
-    folder: str | os.PathLike[str], source: ImageSource, ask: Callable[[str], Any], *, board: CalibrationBoard | None = None,
+    folder: str | os.PathLike[str], source: ImageSource, ask: Callable[[str], Any], *, board: CalibrationBoard | None =
+        None,
     views: int = VIEWS, **options: Any,
 ) -> Capture:  # fmt: skip
     """Take the images of a case with a camera, and make the case of them by `nuno.capture_case`.
@@ -76,9 +77,13 @@ def take_capture(
     boards = []
     if options.get("camera") is None:
         for k in range(wanted):
-            how = "near a corner of the image" if k % 3 == 0 else "tilted by 20 to 45 degrees" if k % 3 == 1 else "close"
+            how = (
+                "near a corner of the image" if k % 3 == 0 else "tilted by 20 to 45 degrees" if k % 3 == 1 else "close"
+            )
             boards.append(take(f"board_{k:02d}", f"view {k + 1} of {wanted}: hold the board {how}", with_board=True))
-    table = take("board_on_table", "lay the board flat on the table, print up; from now on the camera stays", with_board=True)
+    table = take(
+        "board_on_table", "lay the board flat on the table, print up; from now on the camera stays", with_board=True
+    )
     before = take("before", "take the board away and lay the cloth flat on the table", with_board=False)
     after = take("after", "lift the cloth, hold it still, and keep your arm from before it", with_board=False)
     return capture_case(

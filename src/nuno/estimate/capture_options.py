@@ -9,9 +9,9 @@ from typing import Any
 def add_capture(commands: Any) -> None:
     """Add the command to those of argparse."""
     parser: argparse.ArgumentParser = commands.add_parser(
-        "capture", help="make a case of one's own camera for pick: a lens and a table by a printed board, and two images",
-        description="Make a case folder for nuno pick of one's own camera: print the board (--board), then give a USB camera "
-        "(--usb) or image files. docs/capture.md goes through it.",
+        "capture", help="make a case of one's own camera for pick, by a printed board and two images",
+        description="Make a case folder for nuno pick of one's own camera: print the board (--board), then give a USB "
+        "camera (--usb) or image files. docs/capture.md goes through it.",
     )  # fmt: skip
     parser.add_argument("--board", metavar="FILE", help="write the board to print, .pdf or .png, and end")
     parser.add_argument("--paper", choices=("A4", "letter", "A3"), default="A4", help="to print on (default A4)")
@@ -23,7 +23,9 @@ def add_capture(commands: Any) -> None:
     parser.add_argument("--board-on-table", metavar="FILE", help="image of the board that lies on the table")
     parser.add_argument("--before", metavar="FILE", help="image of the cloth flat on the table")
     parser.add_argument("--after", metavar="FILE", help="image of the cloth in the hand")
-    parser.add_argument("--hand", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the held point [m], z from the floor")
+    parser.add_argument(
+        "--hand", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the held point [m], z from the floor"
+    )
     parser.add_argument("--marker", type=int, metavar="ID", help="instead: an ArUco marker (4X4_50) on the hand")
     parser.add_argument("--marker-size", type=float, metavar="M", help="side of its black square [m]")
     parser.add_argument(
@@ -31,7 +33,9 @@ def add_capture(commands: Any) -> None:
         help="of the held point from the marker's middle [m]",
     )  # fmt: skip
     parser.add_argument("--table-height", type=float, default=0.72, metavar="M", help="of the top above the floor")
-    parser.add_argument("--table-size", nargs=2, type=float, metavar=("X", "Y"), help="of the top, along the board first [m]")
+    parser.add_argument(
+        "--table-size", nargs=2, type=float, metavar=("X", "Y"), help="of the top, along the board first [m]"
+    )
     parser.add_argument(
         "--board-at", nargs=2, type=float, default=(0.0, 0.0), metavar=("X", "Y"),
         help="the board's middle from the table's middle [m]",

@@ -67,7 +67,11 @@ def read_images(
 
 
 def find_cloth_before(
-    images: PickImages, rectangle: ClothRectangle | None, hint: ArrayLike | None, settings: PickSettings
+    images: PickImages,
+    rectangle: ClothRectangle | None,
+    hint: ArrayLike | None,
+    settings: PickSettings,
+    template: ArrayLike | None = None,
 ) -> tuple[PickImages, ClothRectangle]:
     """Find the cloth's mask and rectangle in the image before, as far as they are needed and not given.
 
@@ -79,7 +83,7 @@ def find_cloth_before(
     if images.mask_before is None and (rectangle is None or images.mask_after is None):
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
-        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
+        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint, template=template))
     if rectangle is None:
         assert images.mask_before is not None
         rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
