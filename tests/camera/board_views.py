@@ -12,7 +12,7 @@ _SAMPLES = 2
 
 
 def quads(camera, image, corners, picture, rim=60):
-    """Draw a picture (h, w) in a white rim [px] on a parallelogram: its upper left, upper right, lower left corner [m]."""
+    """Draw a picture (h, w) in a white rim [px] on a parallelogram, given by three of its corners (3, 3) [m]."""
     framed = cv2.copyMakeBorder(picture, rim, rim, rim, rim, cv2.BORDER_CONSTANT, value=235).astype(np.float32)
     origin, right, down = corners[0], corners[1] - corners[0], corners[2] - corners[0]
     normal = np.cross(right, down)

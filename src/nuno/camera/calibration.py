@@ -19,7 +19,7 @@ from nuno.validation import checked, number
 FEWEST_VIEWS = 6
 """Good images of the board that a calibration needs; 10 to 20 are better."""
 MOST_ERROR = 1.0
-"""Root mean square distance of corners from where the calibrated camera sees them [px], of an image of 1000 px or less."""
+"""Root mean square distance of corners from where the camera sees them [px], in an image of 1000 px or less."""
 LEAST_COVERED = 0.3
 """Share of the image in which corners were seen, all views together."""
 MOST_DOUBT = 0.01
@@ -175,7 +175,7 @@ def camera_over_table(
 def _pose(
     flat: np.ndarray, pixels: np.ndarray, matrix: np.ndarray, distortion: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The rotation and place in the camera of a plane's points (n, 3): the better one of the two that a plane may have."""
+    """The rotation and place in the camera of a plane's points (n, 3): the better one of the two there may be."""
     _, turns, shifts, _ = cv2.solvePnPGeneric(flat, pixels, matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
     best, found = np.inf, None
     for first, second in zip(turns, shifts, strict=True):

@@ -24,9 +24,9 @@ from nuno.camera.triangulated_polygon import (
 from nuno.errors import ImageError, InvalidInputError
 from nuno.validation import as_array, checked, count, finite_array, flag, number
 
-FOUND = 0.45
-"""Score from which a shape is taken to be there; docs/reports/accuracy.md has what it finds and what it lets through."""
-FORM = 0.5
+FOUND = 0.52
+"""Score from which a shape is taken to be there; docs/reports/accuracy.md has how often that is wrong."""
+FORM = 1.0
 """What a mean deformation of one (singular values e : 1) counts, beside the share of the outline that lies on edges."""
 STRETCH = (0.6, 1.1)
 """Lengths between vertices, of the outline's: cloth is pushed together, but hardly stretched."""
@@ -76,10 +76,10 @@ def find_shape(
     """Find a known shape, such as a towel's or a shirt's, that lies turned and deformed among other things.
 
     The shape's polygon is triangulated, and the triangles' deformation is traded for edges of the image along the
-    polygon's sides: P. Felzenszwalb, "Representation and Detection of Deformable Shapes" (PAMI 2005). Dynamic programming finds
-    the best places on a coarse grid among all, at every angle; the best of them are refined. What lies inside and what
-    colours it has do not count, so neither clutter of the same colour nor a pattern hides it; an outline of which less
-    than half shows does.
+    polygon's sides: P. Felzenszwalb, "Representation and Detection of Deformable Shapes" (PAMI 2005). Dynamic
+    programming finds the best places on a coarse grid among all, at every angle; the best of them are refined. What lies
+    inside and what colours it has do not count, so neither clutter of the same colour nor a pattern hides it. A shape of
+    whose outline less than half shows is not found.
 
     Args:
         image: (h, w, 3) uint8 RGB; without a camera also (h, w) uint8.
