@@ -2,10 +2,10 @@
 
     python benchmarks/cluttered_cloths.py --count 100 --json out.json --pictures DIR
 
-The scenes are Nuno's own: a towel, a mat and a T-shirt, flat, pushed, wrinkled or with a corner folded over by simulation,
-turned, lit from anywhere, among boxes, cylinders and rags of the cloth's colour that lie beside, under and on it. Every
-scene is seen twice, with the cloth and without it. Beside `nuno.find_shape` stands `nuno.segment_before`, which goes by
-colours, and what `segment_before` finds if it is given the outline.
+The scenes are Nuno's own: a towel, a mat and a T-shirt, flat, pushed, wrinkled or with a corner folded over by
+simulation, turned, lit from anywhere, among boxes, cylinders and rags of the cloth's colour that lie beside, under and
+on it. Every second scene is also seen without the cloth. Beside `nuno.find_shape` stands `nuno.segment_before`,
+which goes by colours.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,7 +100,9 @@ def deformed(shape: str, rng: np.random.Generator, count: int, device: str) -> n
             moves = []
             for v in rim:
                 inward = centre - vertices[v, :2]
-                moves.append([*(rng.uniform(0.02, 0.06) * inward / np.linalg.norm(inward) + rng.normal(0, 0.015, 2)), 0.002])
+                moves.append(
+                    [*(rng.uniform(0.02, 0.06) * inward / np.linalg.norm(inward) + rng.normal(0, 0.015, 2)), 0.002]
+                )
         elif kind == "folded corner":
             rim = rim[:1]
             inward = centre - vertices[rim[0], :2]
@@ -131,7 +134,9 @@ def scene(shape: str, kind: str, lying: np.ndarray, rng: np.random.Generator) ->
     yaw, place = rng.uniform(0, 2 * np.pi), rng.uniform(-1, 1, 2) * (0.12, 0.22)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     flat = lying[:, :2] @ turn.T + place
-    cloth = nuno.cloth_mesh(np.column_stack([flat, lying[:, 2] + table.height]), faces, name="cloth", color=tuple(colour))
+    cloth = nuno.cloth_mesh(
+        np.column_stack([flat, lying[:, 2] + table.height]), faces, name="cloth", color=tuple(colour)
+    )
     world.add(cloth)
     for number in range(int(rng.integers(9, 14))):
         shade = tuple(np.clip(colour + rng.normal(0, 0.02, 3), 0.02, 0.98))
@@ -161,38 +166,39 @@ def scene(shape: str, kind: str, lying: np.ndarray, rng: np.random.Generator) ->
     eye = np.array([0.75 * np.cos(angle), 0.75 * np.sin(angle), table.height + rng.uniform(0.75, 1.0)])
     camera = nuno.Camera.look_at(eye, (0.0, 0.0, table.height), np.radians(rng.uniform(48, 60)))
     angle = rng.uniform(0, 2 * np.pi)
-    lamp = nuno.Lamp((2 * np.cos(angle), 2 * np.sin(angle), table.height + rng.uniform(0.8, 2.5)), radius=0.15)
+    lamp = nuno.Lamp((2 * np.cos(angle), 2 * np.sin(angle), table.height + rng.uniform(0.8, 2.5)))
     seed = int(rng.integers(1 << 30))
     taken = nuno.take_picture(world, camera, lamp=lamp, samples=2, noise=3.0, seed=seed)
     without = nuno.take_picture(world, camera, lamp=lamp, samples=2, noise=3.0, seed=seed + 1, without=[cloth])
     things = [body for body in world.bodies if body.name not in ("cloth", "table")]
     alone = nuno.take_picture(world, camera, lamp=lamp, without=things)
-    return Scene(shape, kind, camera, table, taken.color.numpy(), without.color.numpy(), alone.mask("cloth"), taken.mask("cloth"))
+    return Scene(
+        shape, kind, camera, table, taken.color.numpy(), without.color.numpy(), alone.mask("cloth"), taken.mask("cloth")
+    )
 
 
-def make_scenes(count: int, seed: int, device: str = "cpu") -> list[Scene]:
+def make_scenes(count: int, seed: int, device: str = "cpu") -> Iterator[Scene]:
     """Make scenes: half of them towels, a quarter mats, a quarter T-shirts; the same seed makes the same."""
     rng = np.random.default_rng(seed)
-    shares = {"towel": count - 2 * (count // 4), "mat": count // 4, "T-shirt": count // 4}
-    scenes = []
-    for shape, number in shares.items():
-        if not number:
-            continue
-        lying = deformed(shape, rng, number, device)
-        while len([s for s in scenes if s.shape == shape]) < number:
-            k = len([s for s in scenes if s.shape == shape])
-            made = scene(shape, KINDS[k % len(KINDS)], lying[k], rng)
+    turns = [("towel", "mat", "towel", "T-shirt")[k % 4] for k in range(count)]
+    lying = {shape: iter(deformed(shape, rng, turns.count(shape), device)) for shape in OUTLINES if shape in turns}
+    done = dict.fromkeys(OUTLINES, 0)
+    for shape in turns:
+        kind, vertices = KINDS[done[shape] % len(KINDS)], next(lying[shape])
+        done[shape] += 1
+        while True:
+            made = scene(shape, kind, vertices, rng)
             rim = np.concatenate([made.whole[0], made.whole[-1], made.whole[:, 0], made.whole[:, -1]])
             if made.visible.sum() >= 0.75 * made.whole.sum() and not rim.any():
-                scenes.append(made)
-    return scenes
+                yield made
+                break
 
 
 def overlap(found: np.ndarray | None, true: np.ndarray) -> float:
     return 0.0 if found is None else float((found & true).sum() / max((found | true).sum(), 1))
 
 
-def measure(made: Scene) -> dict:
+def measure(made: Scene, with_absent: bool = True) -> dict:
     """One scene: IoU of what each way finds, and the scores with and without the cloth."""
     outline = OUTLINES[made.shape]
     row: dict = {"shape": made.shape, "kind": made.kind, "seen": float(made.visible.sum() / made.whole.sum())}
@@ -203,8 +209,9 @@ def measure(made: Scene) -> dict:
     row["support"], row["bent"] = (best[0].support, best[0].deformation) if best else (0.0, 0.0)
     row["iou"] = max(overlap(best[0].mask, true) for true in (made.whole, made.visible)) if best else 0.0
     row["polygon"] = best[0].polygon.tolist() if best else []
-    absent = nuno.find_shape(made.without, outline, camera=made.camera, table=made.table, least_score=0.0)
-    row["score_without"] = absent[0].score if absent else 0.0
+    if with_absent:
+        absent = nuno.find_shape(made.without, outline, camera=made.camera, table=made.table, least_score=0.0)
+        row["score_without"] = absent[0].score if absent else 0.0
     try:
         mask = nuno.segment_before(made.image, made.camera, made.table)
     except nuno.NunoError as error:
@@ -220,14 +227,18 @@ def picture_of(made: Scene, row: dict) -> np.ndarray:
     colour = (40, 220, 60) if row["iou"] >= GOOD else (230, 40, 40)
     if row["polygon"]:
         cv2.polylines(image, [np.round(row["polygon"]).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
-    text = f"{made.shape}, {made.kind}: IoU {row['iou']:.2f} (colours {row['iou_colour']:.2f}), score {row['score']:.2f}"
+    text = (
+        f"{made.shape}, {made.kind}: IoU {row['iou']:.2f} (colours {row['iou_colour']:.2f}), score {row['score']:.2f}"
+    )
     cv2.rectangle(image, (0, 0), (639, 22), (0, 0, 0), -1)
     cv2.putText(image, text, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
     return image
 
 
 def summary(rows: list[dict]) -> str:
-    lines = [f"{'':22s}{'count':>7s}{'found':>8s}{'IoU>=.8':>9s}{'IoU':>7s}{'colours: IoU>=.8':>18s}{'IoU':>7s}{'CPU s':>7s}"]
+    lines = [
+        f"{'':22s}{'count':>7s}{'found':>8s}{'IoU>=.8':>9s}{'IoU':>7s}{'colours: IoU>=.8':>18s}{'IoU':>7s}{'CPU s':>7s}"
+    ]
     groups = [("all", rows)]
     groups += [(name, [r for r in rows if r["shape"] == name]) for name in OUTLINES]
     groups += [(name, [r for r in rows if r["kind"] == name]) for name in KINDS]
@@ -241,13 +252,17 @@ def summary(rows: list[dict]) -> str:
                 f"{np.mean([r['iou_colour'] for r in own]):7.3f}{np.mean([r['cpu_s'] for r in own]):7.2f}"
             )
     limit = FOUND
-    false = sum(r["score_without"] >= limit for r in rows)
+    absent = np.array([r["score_without"] for r in rows if "score_without" in r])
+    false = int((absent >= limit).sum())
     wrong = sum(r["score"] >= limit and r["iou"] < 0.5 for r in rows)
-    lines.append(f"without the cloth: {false} of {len(rows)} said to be there (score >= {limit}); elsewhere: {wrong}")
-    right, absent = np.array([r["score"] for r in rows if r["iou"] >= GOOD]), np.array([r["score_without"] for r in rows])
-    if len(right):
+    lines.append(f"without the cloth: {false} of {len(absent)} said to be there (score >= {limit}); elsewhere: {wrong}")
+    right = np.array([r["score"] for r in rows if r["iou"] >= GOOD])
+    if len(right) and len(absent):
         area = float((right[:, None] > absent).mean())
-        lines.append(f"scores: right {np.quantile(right, [0.05, 0.5])}, absent {np.quantile(absent, [0.5, 0.95])}, ROC area {area:.3f}")
+        lines.append(
+            f"scores: right {np.quantile(right, [0.05, 0.5])}, absent {np.quantile(absent, [0.5, 0.95])}, ROC area "
+            f"{area:.3f}"
+        )
     return "\n".join(lines)
 
 
@@ -261,14 +276,14 @@ def main() -> None:
     options = parser.parse_args()
     rows = []
     for number, made in enumerate(make_scenes(options.count, options.seed, options.device)):
-        rows.append(measure(made))
+        rows.append(measure(made, number % 2 == 0))
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
             picture = picture_of(made, rows[-1])
             cv2.imwrite(str(options.pictures / f"{number:03d}.png"), picture[..., ::-1])
+        if options.json:
+            options.json.write_text(json.dumps(rows, indent=1))
     print(summary(rows))
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
 
 
 if __name__ == "__main__":

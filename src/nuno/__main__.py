@@ -1,8 +1,4 @@
-<<<<<<< HEAD
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``serve``, ``describe-robot``, ``compare``, ``compile``."""
-=======
-"""The command line: ``nuno pick CASE_DIR``, ``fold``, ``serve``, ``scene``, ``describe-robot``, ``compile``."""
->>>>>>> wt-scenes
+"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``capture``, ``serve``, ``scene``, ``compare`` ..."""
 
 from __future__ import annotations
 
@@ -19,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
+from nuno.estimate.capture_options import add_capture
 from nuno.estimate.lift_prior import SIDEWAYS
 
 if TYPE_CHECKING:
@@ -48,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
+    add_capture(commands)
     serve = commands.add_parser(
         "serve", help="put a simulated robot on the wire, for programs that speak to it as to a real one"
     )
@@ -79,7 +77,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     describe.add_argument("--packages", nargs="+", metavar="DIR", help="folders that package:// is looked up in")
     describe.add_argument("--name", help="what the robot is to be called (default: the file's name)")
     describe.add_argument("--out", metavar="FILE", help="where the table goes (default: to the terminal)")
-<<<<<<< HEAD
     compared = commands.add_parser(
         "compare", help="run a saved world on several engines: a film of them side by side, and how far they come apart"
     )
@@ -90,7 +87,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     compared.add_argument("--seconds", type=float, default=2.0, help="how long it runs (default 2)")
     compared.add_argument("--out", required=True, metavar="DIR", help="where film.html and differences.json go")
-=======
     scene = commands.add_parser(
         "scene", help="what is in a scene file (MJCF, URDF, USD), and what of it a world of Nuno cannot have?"
     )
@@ -101,7 +97,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scene.add_argument("--seconds", type=float, default=0.0, metavar="S", help="let it run so long (default 0)")
     scene.add_argument("--out", metavar="DIR", help="where scene.png goes, and with --seconds film.html")
     scene.add_argument("--save", metavar="FILE", help="write it, as it is then, as MJCF (.xml) or USD (.usda, .usdc)")
->>>>>>> wt-scenes
     ahead = commands.add_parser(
         "compile", help="compile kernels ahead of use into Warp's cache: in a container image, on a cluster",
         description="Compile kernels ahead of use into Warp's cache (WARP_CACHE_PATH); what is there stays. "
@@ -113,12 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     ahead.add_argument("--only", nargs="+", metavar="MODULE", help="these modules of kernels (default: all)")
     ahead.add_argument("--jobs", type=int, metavar="N", help="compile so many at once (default: one for each core)")
-<<<<<<< HEAD
     compared.add_argument("--device", default="cpu", help="cpu (default), cuda, cuda:1 ...; mujoco has the CPU only")
-    for command in (pick, fold, serve):
-=======
     for command in (pick, fold, serve, scene):
->>>>>>> wt-scenes
         command.add_argument("--device", default="auto", help="auto (default), cpu, cuda, cuda:1 ...")
     pick.add_argument("--engine", default="nuno", help="what moves the imagined cloths: nuno (default), mujoco ...")
     for command in (pick, fold, compared):
@@ -129,13 +120,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     logging.basicConfig(format="nuno: %(message)s", level=logging.WARNING)
     try:
-<<<<<<< HEAD
-        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile, "compare": _compare,
-                       "describe-robot": _describe_robot}  # fmt: skip
-=======
-        commands_of = {"pick": _pick, "fold": _fold, "serve": _serve, "compile": _compile,
-                       "describe-robot": _describe_robot, "scene": _scene}  # fmt: skip
->>>>>>> wt-scenes
+        commands_of = {
+            "pick": _pick, "fold": _fold, "capture": _capture, "serve": _serve, "scene": _scene, "compare": _compare,
+            "compile": _compile, "describe-robot": _describe_robot,
+        }  # fmt: skip
         return commands_of[options.command](options)
     except (EstimationError, SimulationDiverged) as error:
         return _failed(error, FAILED)
@@ -206,6 +194,15 @@ def _fold(options: argparse.Namespace) -> int:
         f"replayed {len(result.times)} frames as {result.material_name}, {agreed}in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'}, strip.png, layers.png, hands.png and replay.glb\n"
     )
+    return ANSWERED
+
+
+def _capture(options: argparse.Namespace) -> int:
+    from nuno.estimate.capture_command import run_capture
+
+    if options.out is not None:
+        _check_out(options.out)
+    sys.stdout.write(run_capture(options))
     return ANSWERED
 
 

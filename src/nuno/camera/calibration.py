@@ -19,12 +19,12 @@ from nuno.validation import checked, number
 FEWEST_VIEWS = 6
 """Good images of the board that a calibration needs; 10 to 20 are better."""
 MOST_ERROR = 1.0
-"""Root mean square distance of the corners from where the calibrated camera sees them [px] of an image of 1000 px or less."""
+"""Root mean square distance of corners from where the camera sees them [px], in an image of 1000 px or less."""
 LEAST_COVERED = 0.3
 """Share of the image in which corners were seen, all views together."""
 MOST_DOUBT = 0.01
 """Standard deviation of the focal length, as a share of it."""
-_BOARD_CLIPPED = 0.35  # share of the board in its image that may be clipped: white paper is half of it
+_BOARD_CLIPPED = 0.15  # share of the board in its image that may be clipped: a third of it is white paper
 _OUTLIER = 3.0  # a view whose error is so many times the median is left out
 _CELLS = (8, 6)
 
@@ -53,14 +53,16 @@ class Calibration:
 
 
 @checked
-def calibrate_camera(images: Sequence[np.ndarray], board: CalibrationBoard, names: Sequence[str] | None = None) -> Calibration:
+def calibrate_camera(
+    images: Sequence[np.ndarray], board: CalibrationBoard, names: Sequence[str] | None = None
+) -> Calibration:
     """Return a camera's focal lengths, principal point and distortion (k1, k2, p1, p2), by OpenCV.
 
-    Images that are blurred, badly exposed or show too little of the board are left out, with a warning, as long as enough
-    are left.
+    Images that are blurred, badly exposed or show too little of the board are left out, with a warning, as long as
+    enough are left.
 
     Args:
-        images: Each (h, w, 3) uint8 RGB, with the board at another place, tilted another way, some close and at the border.
+        images: Each (h, w, 3) uint8 RGB, with the board at another place, tilted another way, some at the border.
         board: The board.
         names: Of the images, for messages.
 
@@ -80,7 +82,9 @@ def calibrate_camera(images: Sequence[np.ndarray], board: CalibrationBoard, name
     size = np.shape(images[0])[1::-1]
     for name, image in zip(called, images, strict=True):
         if np.shape(image)[1::-1] != size:
-            raise ImageError(f"{name} measures {np.shape(image)[1::-1]} px, the first image {size}: one camera, one size")
+            raise ImageError(
+                f"{name} measures {np.shape(image)[1::-1]} px, the first image {size}: one camera, one size"
+            )
         try:
             numbers, pixels = _good_corners(image, board, name)
             seen.append((name, numbers, pixels))
@@ -93,15 +97,17 @@ def calibrate_camera(images: Sequence[np.ndarray], board: CalibrationBoard, name
     found, errors = _calibrate(seen, board, size)
     good = errors <= max(_OUTLIER * float(np.median(errors)), 0.3)
     if not good.all():
-        warnings += [f"{seen[k][0]} fits the others badly ({errors[k]:.1f} px) and was left out" for k in np.flatnonzero(~good)]
+        warnings += [
+            f"{seen[k][0]} fits the others badly ({errors[k]:.1f} px) and was left out" for k in np.flatnonzero(~good)
+        ]
         seen = [view for view, keep in zip(seen, good, strict=True) if keep]
         _check_count(len(seen), len(images), warnings)
         found, errors = _calibrate(seen, board, size)
     limit = MOST_ERROR * max(1.0, size[0] / 1000.0)
     if found.error > limit:
         raise CalibrationError(
-            f"the corners are {found.error:.2f} px from where a camera would see them, {limit:.2f} are the limit: is the board "
-            "flat, and are its numbers of squares right? Fisheye lenses are not covered"
+            f"the corners are {found.error:.2f} px from where a camera would see them, {limit:.2f} are the limit: is "
+            "the board flat, and are its numbers of squares right? Fisheye lenses are not covered"
         )
     if found.covered < LEAST_COVERED:
         raise CalibrationError(
@@ -109,8 +115,8 @@ def calibrate_camera(images: Sequence[np.ndarray], board: CalibrationBoard, name
         )
     if found.doubt > MOST_DOUBT:
         raise CalibrationError(
-            f"the focal length is known to {found.doubt:.1%} only, {MOST_DOUBT:.0%} is the limit: tilt the board by 20 to 45 "
-            "degrees, in every direction, and hold it close"
+            f"the focal length is known to {found.doubt:.1%} only, {MOST_DOUBT:.0%} is the limit: tilt the board by 20 "
+            "to 45 degrees, in every direction, and hold it close"
         )
     return replace(found, warnings=tuple(warnings))
 
@@ -120,8 +126,8 @@ _HOW = "hold the board near each corner of the image and in its middle, close, a
 
 @checked
 def camera_over_table(
-    image: ArrayLike, camera: Camera, board: CalibrationBoard, *, table_height: float = 0.0, board_thickness: float = 0.0,
-    board_at: tuple[float, float] = (0.0, 0.0),
+    image: ArrayLike, camera: Camera, board: CalibrationBoard, *, table_height: float = 0.0,
+    board_thickness: float = 0.0, board_at: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Camera, float]:  # fmt: skip
     """Return the camera in a world whose z points up from the table, by an image of the board that lies on it.
 
@@ -147,24 +153,40 @@ def camera_over_table(
     height = number("table_height", table_height) + number("board_thickness", board_thickness, low=0.0, high=0.1)
     rgb = check_image(image, camera, "the image of the board on the table")
     numbers, pixels = _good_corners(rgb, board, "the image of the board on the table")
-    world = board.corners[numbers] + (*board_at, height)
+    flat = board.corners[numbers]
     distortion = np.zeros(5) if camera.distortion is None else camera.distortion
-    _, turn, shift = cv2.solvePnP(world, pixels, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
-    turn, shift = cv2.solvePnPRefineLM(world, pixels, camera.matrix, distortion, turn, shift)
-    rotation = cv2.Rodrigues(turn)[0]
+    turn, shift = _pose(flat, pixels, camera.matrix, distortion)
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation.T, -rotation.T @ shift.ravel()
+    pose[:3, :3] = turn.T
+    pose[:3, 3] = (board_at[0], board_at[1], height) - turn.T @ shift
     found = replace(camera, camera_to_world=pose)
-    error = float(np.sqrt(((found.project(world) - pixels) ** 2).sum(axis=1).mean()))
+    error = float(np.sqrt(((found.project(flat + np.array([*board_at, height])) - pixels) ** 2).sum(axis=1).mean()))
     limit = MOST_ERROR * max(1.0, camera.width / 1000.0)
     if not error <= limit:
         raise CalibrationError(
-            f"the board on the table is {error:.2f} px from where this camera would see it, {limit:.2f} are the limit: is the "
-            "lens that of the other images (focus, zoom, image size), and is the board flat?"
+            f"the board on the table is {error:.2f} px from where this camera would see it, {limit:.2f} are the limit: "
+            "is the lens that of the other images (focus, zoom, image size), and is the board flat?"
         )
     if pose[2, 3] <= height:
         raise CalibrationError("the camera would be under the table: the board must lie with its print up")
     return found, error
+
+
+def _pose(
+    flat: np.ndarray, pixels: np.ndarray, matrix: np.ndarray, distortion: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rotation and place in the camera of a plane's points (n, 3): the better one of the two there may be."""
+    _, turns, shifts, _ = cv2.solvePnPGeneric(flat, pixels, matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
+    best, found = np.inf, None
+    for first, second in zip(turns, shifts, strict=True):
+        turn, shift = cv2.solvePnPRefineLM(flat, pixels, matrix, distortion, first, second)
+        drawn = cv2.projectPoints(flat, turn, shift, matrix, distortion)[0].reshape(-1, 2)
+        error = float(((drawn - pixels) ** 2).sum())
+        if error < best:
+            best, found = error, (cv2.Rodrigues(turn)[0], shift.ravel())
+    if found is None:
+        raise CalibrationError("the board's corners fit no pose: is the board flat, and its number of squares right?")
+    return found
 
 
 def _good_corners(image: np.ndarray, board: CalibrationBoard, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -198,7 +220,12 @@ def _calibrate(
     pixels = [found.astype(np.float32) for _, _, found in seen]
     try:
         error, matrix, distortion, _, _, doubts, _, errors = cv2.calibrateCameraExtended(
-            points, pixels, size, None, None, flags=cv2.CALIB_FIX_K3  # type: ignore[call-overload]
+            points,
+            pixels,
+            size,
+            None,
+            None,
+            flags=cv2.CALIB_FIX_K3,  # type: ignore[call-overload]
         )
     except cv2.error as problem:
         raise CalibrationError(f"the views fit no camera ({problem.err}): {_HOW}") from problem

@@ -45,10 +45,14 @@ class CalibrationBoard:
         columns, rows = count("columns", self.columns, low=3, high=40), count("rows", self.rows, low=3, high=40)
         square = number("square [m]", self.square, low=0.002, high=1.0)
         if self.marker is not None and not 0.4 * square <= number("marker [m]", self.marker) <= 0.9 * square:
-            raise InvalidInputError(f"a marker's side must be 0.4 to 0.9 of a square's, {square:g} m, got {self.marker!r}")
+            raise InvalidInputError(
+                f"a marker's side must be 0.4 to 0.9 of a square's, {square:g} m, got {self.marker!r}"
+            )
         known = int(choice("dictionary", self.dictionary, DICTIONARIES).split("_")[1])
         if columns * rows // 2 > known:
-            raise InvalidInputError(f"a board of {columns} x {rows} squares has more markers than {self.dictionary} has")
+            raise InvalidInputError(
+                f"a board of {columns} x {rows} squares has more markers than {self.dictionary} has"
+            )
 
     @property
     def size(self) -> tuple[float, float]:
@@ -91,7 +95,8 @@ class CalibrationBoard:
         width, height = _PAPERS[choice("paper", paper, tuple(_PAPERS))]
         if self.size[0] + 2 * _EDGE > width or self.size[1] + 2 * _EDGE > height:
             raise InvalidInputError(
-                f"a board of {self.size[0]:.3f} x {self.size[1]:.3f} m does not fit on {paper} ({width:g} x {height:g} m)"
+                f"a board of {self.size[0]:.3f} x {self.size[1]:.3f} m does not fit on {paper} ({width:g} x {height:g} "
+                "m)"
             )
         text = (
             f"Nuno: {self.columns} x {self.rows} squares of {1e3 * self.square:g} mm, markers {self.dictionary}. "
@@ -141,7 +146,12 @@ class CalibrationBoard:
             BoardNotFoundError: it shows fewer than `FEWEST_CORNERS` of its corners.
         """
         array = as_array("image", image, ImageError)
-        if array.dtype != np.uint8 or array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] != 3) or not array.size:
+        if (
+            array.dtype != np.uint8
+            or array.ndim not in (2, 3)
+            or (array.ndim == 3 and array.shape[2] != 3)
+            or not array.size
+        ):
             raise ImageError(f"{name} must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
         grey = cv2.cvtColor(array, cv2.COLOR_RGB2GRAY) if array.ndim == 3 else np.ascontiguousarray(array)
         detector = cv2.aruco.CharucoDetector(self._made())
@@ -151,9 +161,9 @@ class CalibrationBoard:
         if found < fewest:
             seen = 0 if markers is None else len(markers)
             raise BoardNotFoundError(
-                f"{name} shows {found} of the board's {self.corner_count} inner corners ({seen} markers), and {fewest} are "
-                f"needed: show all of the board of {self.columns} x {self.rows} squares with markers {self.dictionary}, "
-                "larger, sharper and evenly lit; or say which board it is"
+                f"{name} shows {found} of the board's {self.corner_count} inner corners ({seen} markers), and {fewest} "
+                f"are needed: show all of the board of {self.columns} x {self.rows} squares with markers "
+                f"{self.dictionary}, larger, sharper and evenly lit; or say which board it is"
             )
         return np.ravel(numbers).astype(int), np.asarray(corners, dtype=float).reshape(-1, 2)
 

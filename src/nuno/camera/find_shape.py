@@ -24,9 +24,9 @@ from nuno.camera.triangulated_polygon import (
 from nuno.errors import ImageError, InvalidInputError
 from nuno.validation import as_array, checked, count, finite_array, flag, number
 
-FOUND = 0.45
-"""Score from which a shape is taken to be there; benchmarks/cluttered_cloths.py counts what it finds and what it lets through."""
-FORM = 0.5
+FOUND = 0.52
+"""Score from which a shape is taken to be there; docs/reports/accuracy.md has how often that is wrong."""
+FORM = 1.0
 """What a mean deformation of one (singular values e : 1) counts, beside the share of the outline that lies on edges."""
 STRETCH = (0.6, 1.1)
 """Lengths between vertices, of the outline's: cloth is pushed together, but hardly stretched."""
@@ -75,11 +75,11 @@ def find_shape(
 ) -> tuple[FoundShape, ...]:  # fmt: skip
     """Find a known shape, such as a towel's or a shirt's, that lies turned and deformed among other things.
 
-    The shape's polygon is triangulated, and the triangles' deformation is traded for edges of the image along the polygon's
-    sides: P. Felzenszwalb, "Representation and Detection of Deformable Shapes" (PAMI 2005). Dynamic programming finds the
-    best places on a coarse grid among all, at every angle; the best of them are refined. What lies inside and what colours
-    it has do not count, so neither clutter of the same colour nor a pattern hides it; an outline of which less than
-    half shows does.
+    The shape's polygon is triangulated, and the triangles' deformation is traded for edges of the image along the
+    polygon's sides: P. Felzenszwalb, "Representation and Detection of Deformable Shapes" (PAMI 2005). Dynamic
+    programming finds the best places on a coarse grid among all, at every angle; the best of them are refined. What lies
+    inside and what colours it has do not count, so neither clutter of the same colour nor a pattern hides it. A shape of
+    whose outline less than half shows is not found.
 
     Args:
         image: (h, w, 3) uint8 RGB; without a camera also (h, w) uint8.
@@ -99,8 +99,8 @@ def find_shape(
 
     Raises:
         ImageError: the image is none or does not fit the camera.
-        InvalidInputError: an outline whose sides cross or that is smaller than 20 px in the image or larger than what is
-            seen; a camera without a table or a plane, or these without a camera; a value out of range.
+        InvalidInputError: an outline whose sides cross or that is smaller than 20 px in the image or larger than what
+            is seen; a camera without a table or a plane, or these without a camera; a value out of range.
     """
     points = check_outline(outline)
     sizes = finite_array("scales", scales, ("k",))
@@ -168,7 +168,12 @@ def _look(
         if table is not None or plane_height is not None:
             raise InvalidInputError("a table or plane_height needs the camera that saw it")
         array = as_array("image", image, ImageError)
-        if array.dtype != np.uint8 or array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] != 3) or not array.size:
+        if (
+            array.dtype != np.uint8
+            or array.ndim not in (2, 3)
+            or (array.ndim == 3 and array.shape[2] != 3)
+            or not array.size
+        ):
             raise ImageError(f"image must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
         if size < 20.0:
             raise InvalidInputError(f"the outline measures {size:.1f} px across, below the 20 px that can be told")
@@ -201,12 +206,14 @@ def _look(
     resolution = max(wanted, 0.5 * float(metres))
     columns, rows = (int(n) for n in np.ceil((high - low) / resolution) + 1)
     if size > 2.0 * float(np.sqrt(np.prod(high - low))):
-        raise InvalidInputError(f"the outline measures {size:.3g} m across, more than the part of the plane that is seen")
+        raise InvalidInputError(
+            f"the outline measures {size:.3g} m across, more than the part of the plane that is seen"
+        )
     grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1) * resolution + low
     pixels = camera.project(np.concatenate([grid, np.full((rows, columns, 1), height)], axis=-1))
     limit = np.array([camera.width, camera.height])
     seen = np.isfinite(pixels).all(axis=-1) & (pixels > 0).all(axis=-1) & (pixels < limit - 1).all(axis=-1)
-    if table is not None and table.half_extents is not None:  # the border of the table is an edge of nothing that lies on it
+    if table is not None and table.half_extents is not None:  # a table's border is no edge of what lies on it
         inside = np.asarray(table.half_extents) - np.abs(grid - np.asarray(table.centre or (0.0, 0.0)))
         seen &= inside.min(axis=-1) > _BORDER
     at = np.where(seen[..., None], pixels, -10.0).astype(np.float32)
@@ -218,7 +225,7 @@ def _look(
 def _at_scale(
     view: _View, outline: np.ndarray, scale: float, stretch: tuple[float, float], turned: bool, wanted: int
 ) -> list[FoundShape]:
-    """Find the shape at one scale: coarse places by dynamic programming, then finer polygons with ever shorter steps."""
+    """Find the shape at one scale: coarse places by dynamic programming, then finer polygons with shorter steps."""
     in_pixels = outline / view.resolution
     coarse = triangulate_polygon(with_vertices(in_pixels, _COARSE))
     area = scale * float(np.sqrt(signed_area(in_pixels)))
@@ -232,22 +239,20 @@ def _at_scale(
     fine = triangulate_polygon(with_vertices(in_pixels, _FINE))
     sharp = edges.widened(1)
     step = spacing / 4.0
-    refined = []
-    for start in starts:
-        points = refine_candidate(coarse, start.points, edges.widened(round(0.25 * spacing)), step, weights, 3).points
-        points = _carried(coarse, points, fine.points)
-        refined.append(refine_candidate(fine, points, sharp, 0.5 * step, weights, 2))
+    wide = edges.widened(round(0.25 * spacing))
+    refined = [refine_candidate(coarse, start.points, wide, step, weights, 2) for start in starts]
     refined.sort(key=lambda each: each.energy)
     found: list[FoundShape] = []
     for each in refined[: 2 * wanted + 2]:
-        best = refine_candidate(fine, each.points, sharp, 0.5 * step, weights, 4)
+        points = _carried(coarse, each.points, fine.points)
+        best = refine_candidate(fine, points, sharp, 0.5 * step, weights, 4)
         best = refine_candidate(fine, best.points, sharp, max(0.25 * step, 0.5), weights, 4)
         found.append(_shape(view, fine, best, sharp, weights, turned, outline))
     return found
 
 
 def _carried(polygon: TriangulatedPolygon, points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return where points (m, 2) of a polygon's plane go if its vertices go to points (n, 2): by the nearest triangle."""
+    """Return where points (m, 2) of a plane go if a polygon's vertices go to points (n, 2): by the nearest triangle."""
     corners = polygon.points[polygon.triangles]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
     shares = np.einsum("tij,mtj->mti", np.linalg.inv(edges), others[:, None] - corners[None, :, 0])

@@ -32,8 +32,8 @@ def find_marker(
         offset: (3,) of the point from the marker's middle [m]: to its right, up its page, and out of it.
 
     Returns:
-        The point (3,) [m]; the marker's four corners (4, 2) [px]; and the root mean square distance of these from where a
-        square of that size would be seen [px].
+        The point (3,) [m]; the marker's four corners (4, 2) [px]; and the root mean square distance of these from where
+        a square of that size would be seen [px].
 
     Raises:
         ImageError: the image does not fit the camera.
@@ -51,8 +51,8 @@ def find_marker(
     seen = [] if numbers is None else np.ravel(numbers).tolist()
     if wanted not in seen:
         raise BoardNotFoundError(
-            f"the image does not show marker {wanted} of {name} (it shows {sorted(seen) or 'none'}): turn it to the camera, "
-            "show all of its white rim, or print it larger; or give the hand's position"
+            f"the image does not show marker {wanted} of {name} (it shows {sorted(seen) or 'none'}): turn it to the "
+            "camera, show all of its white rim, or print it larger; or give the hand's position"
         )
     pixels = np.asarray(corners[seen.index(wanted)], dtype=float).reshape(4, 2)
     square = 0.5 * side * np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])

@@ -13,6 +13,7 @@ from nuno.camera.regions import fill_doubtful_holes, grow, parts_at, sharpen, sh
 from nuno.camera.scene_without_cloth import compare
 from nuno.camera.surface_colours import discriminant, guided_filter
 from nuno.camera.table import Table, plane_coordinates, table_margin
+from nuno.camera.template_segmentation import segment_by_template
 from nuno.errors import ClothNotFoundError, InvalidInputError
 from nuno.validation import checked
 
@@ -22,7 +23,9 @@ _NEAR = 12  # [px] around the cloth what is in doubt counts
 
 
 @checked
-def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None) -> np.ndarray:
+def segment_before(
+    image: ArrayLike, camera: Camera, table: Table, *, hint: ArrayLike | None = None, template: ArrayLike | None = None
+) -> np.ndarray:
     """Find the cloth that lies flat on the table.
 
     The cloth is the largest region on the table's plane that does not look like the table around it. A first
@@ -34,6 +37,8 @@ def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: Arra
         camera: The camera that took it.
         table: The table; where its extents are not known, the cloth must be surrounded by table in the image.
         hint: Where the cloth is: a pixel (u, v) on it, or a box (u0, v0, u1, v1) around it.
+        template: (n, 2) the cloth's outline [m], where it is known: where colours find something else, or nothing,
+            `nuno.find_shape` decides, which finds the outline also among things of the cloth's own colour.
 
     Returns:
         (h, w) bool.
@@ -41,12 +46,16 @@ def segment_before(image: ArrayLike, camera: Camera, table: Table, *, hint: Arra
     Raises:
         ImageError: the image does not fit the camera.
         ClothNotFoundError: nothing on the table differs from it.
-        InvalidInputError: a hint that is neither a pixel nor a box of the image.
+        InvalidInputError: a hint that is neither a pixel nor a box of the image, or a template that is no outline.
     """
     rgb = check_image(image, camera)
     spot = _check_hint(hint, camera)
-    blob, surface = first_look(rgb, camera, table, spot)
-    return refine(rgb, blob, surface)
+
+    def by_colours() -> np.ndarray:
+        blob, surface = first_look(rgb, camera, table, spot)
+        return refine(rgb, blob, surface)
+
+    return by_colours() if template is None else segment_by_template(rgb, camera, table, template, spot, by_colours)
 
 
 @checked

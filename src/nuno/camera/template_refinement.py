@@ -10,7 +10,9 @@ from nuno.camera.triangle_deformation import deformation, to_unit
 from nuno.camera.triangulated_polygon import TriangulatedPolygon
 
 _REACH = 2  # steps that a vertex goes to each side: 25 places
-_TURNED = np.float32(8.0)  # [nats^2] what a triangle costs at most, also one that is turned over, as where a corner is folded
+_TURNED = np.float32(
+    8.0
+)  # [nats^2] what a triangle costs at most, also one that is turned over, as where a corner is folded
 _LONGEST = 24  # points of a side that are looked at
 
 

@@ -1,8 +1,8 @@
-"""The exact best places of a triangulated polygon on a grid, by dynamic programming (Felzenszwalb, PAMI 2005, section 4).
+"""The best places of a triangulated polygon on a grid, by dynamic programming (Felzenszwalb, PAMI 2005, section 4).
 
-The paper's tables have a value for every pair of locations of an edge's two ends. Here the size is known up to a stretch, so
-that the second end lies in a ring around the first: a table has an array over all locations for each step of that ring,
-and a triangle's energy, which depends on steps alone, is added to whole arrays.
+The paper's tables have a value for every pair of locations of an edge's two ends. Here the size is known up to a
+stretch, so that the second end lies in a ring around the first: a table has an array over all locations for each step
+of that ring, and a triangle's energy, which depends on steps alone, is added to whole arrays.
 """
 
 from __future__ import annotations
@@ -175,7 +175,9 @@ class TemplateSearch:
         for (k, i, j), choices in zip(self.polygon.order[::-1], self._choices[::-1], strict=True):
             number = int(self._steps[i, j].number(cells[j] - cells[i]))
             near, far, cost = choices[number]
-            total = self._tables[i, k][near, cells[i][1], cells[i][0]] + self._tables[j, k][far, cells[j][1], cells[j][0]]
+            total = (
+                self._tables[i, k][near, cells[i][1], cells[i][0]] + self._tables[j, k][far, cells[j][1], cells[j][0]]
+            )
             cells[k] = cells[i] + self._steps[i, k].all[near[int((total + cost).argmin())]]
         return cells * self.spacing + self._offset
 

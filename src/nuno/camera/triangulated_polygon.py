@@ -52,7 +52,9 @@ def check_outline(outline: ArrayLike, name: str = "outline") -> np.ndarray:
         raise InvalidInputError(f"{name} has {len(points)} points, at most {MAX_VERTICES} are taken")
     points = points[np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 0.0]
     if len(points) < 3:
-        raise InvalidInputError(f"{name} must be the corners of a polygon, (n, 2) with n >= 3, got {len(points)} points")
+        raise InvalidInputError(
+            f"{name} must be the corners of a polygon, (n, 2) with n >= 3, got {len(points)} points"
+        )
     area = signed_area(points)
     around = float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
     if abs(area) <= _THIN * around * around:

@@ -18,7 +18,8 @@ _SETTLING = 10
 class UsbCamera:
     """A camera that OpenCV opens by its number; close it, or use it in a ``with`` statement.
 
-    Focus, exposure and size are the camera's own; switch its autofocus off, or the lens of one image is not that of another.
+    Focus, exposure and size are the camera's own; switch its autofocus off, or the lens of one image is not that of
+    another.
 
     Args:
         number: Of the camera, 0 is the first one.
@@ -36,8 +37,8 @@ class UsbCamera:
         if not self._source.isOpened():
             self._source.release()
             raise ImageError(
-                f"camera {self.number} cannot be opened: is it plugged in, may this user read it (/dev/video{self.number} on "
-                "Linux), and has no other program opened it?"
+                f"camera {self.number} cannot be opened: is it plugged in, may this user read it "
+                f"(/dev/video{self.number} on Linux), and has no other program opened it?"
             )
         for key, value in ((cv2.CAP_PROP_FRAME_WIDTH, width), (cv2.CAP_PROP_FRAME_HEIGHT, height)):
             if value is not None:

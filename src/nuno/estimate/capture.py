@@ -29,6 +29,9 @@ TABLE_HEIGHT = 0.72
 _MOVED = 1.5
 """[px] (of 1000) A camera that moved more between two images is told of."""
 
+_PAPER = 0.04  # [m] about the board that is its paper
+_FEWEST = 10  # corners in the room that tell whether it moved
+
 Images = Sequence[str | os.PathLike[str] | np.ndarray]
 
 
@@ -88,8 +91,8 @@ def capture_case(
         board_at: x and y of the board's middle from the table's middle [m].
 
     Raises:
-        InvalidInputError: no or two ways to the hand, to the lens; a value out of range; a hand out of the image or under
-            the table.
+        InvalidInputError: no or two ways to the hand, to the lens; a value out of range; a hand out of the image or
+            under the table.
         ImageError: an image that cannot be read, or of another size; BoardNotFoundError and ImageQualityError are such.
         CalibrationError: no camera follows from the images of the board.
         FileWriteError: the folder cannot be written.
@@ -119,20 +122,23 @@ def capture_case(
     seen, board_error = camera_over_table(
         on_table, lens, own, table_height=height, board_thickness=board_thickness, board_at=board_at
     )
+    away = _without_board(seen, own, board_at, height)
     warnings = list(calibration.warnings) if calibration is not None else []
     for name, image in shown.items():
         check_quality(check_image(image, seen, f"the image {name}"), f"the image {name}")
-        moved = _moved(on_table, image)
+        moved = _moved(on_table, image, away)
         if moved > _MOVED * max(1.0, seen.width / 1000.0):
             warnings.append(
-                f"the camera seems to have moved by {moved:.1f} px before the image {name}: fix it, and take the image of the "
-                "board on the table anew"
+                f"the camera seems to have moved by {moved:.1f} px before the image {name}: fix it, and take the image "
+                "of the board on the table anew"
             )
     if given is None:
         assert marker is not None and marker_size is not None
         given, _, marker_error = find_marker(shown["after"], seen, marker, marker_size, offset=offset)
         if marker_error > 1.0:
-            warnings.append(f"the marker's corners are {marker_error:.1f} px from those of a square: is it bent or half hidden?")
+            warnings.append(
+                f"the marker's corners are {marker_error:.1f} px from those of a square: is it bent or half hidden?"
+            )
     place = np.asarray(given, dtype=float)
     _check_hand(place, seen, height)
     goal = made_folder(folder)
@@ -163,28 +169,41 @@ def _read(image: str | os.PathLike[str] | np.ndarray, name: str) -> np.ndarray:
 def _check_hand(hand: np.ndarray, camera: Camera, height: float) -> None:
     """Raise an error where `nuno.estimate_pick` would refuse the hand."""
     pixel = camera.project(hand)
-    if not (np.isfinite(pixel).all() and (pixel > -0.5).all() and (pixel < (camera.width - 0.5, camera.height - 0.5)).all()):
+    if not (
+        np.isfinite(pixel).all() and (pixel > -0.5).all() and (pixel < (camera.width - 0.5, camera.height - 0.5)).all()
+    ):
         raise InvalidInputError(
-            f"the hand at {np.round(hand, 3).tolist()} m would not be in the image after: x and y are measured from the table's "
-            "middle, as board_at is, and z from the floor"
+            f"the hand at {np.round(hand, 3).tolist()} m would not be in the image after: x and y are measured from "
+            "the table's middle, as board_at is, and z from the floor"
         )
     if hand[2] <= height:
         raise InvalidInputError(f"the hand at {np.round(hand, 3).tolist()} m is not above the table, z = {height:g} m")
 
 
-def _moved(first: np.ndarray, second: np.ndarray) -> float:
-    """By how much the camera seems to have moved between two images [px]: what most of their corners have done."""
+def _without_board(camera: Camera, board: CalibrationBoard, at: tuple[float, float], height: float) -> np.ndarray:
+    """(h, w) uint8, 0 where the board lies, with its paper's rim."""
+    half = 0.5 * np.array(board.size) + _PAPER
+    rim = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half + at
+    pixels = camera.project(np.column_stack([rim, np.full(4, height)]))
+    free = np.ones((camera.height, camera.width), dtype=np.uint8)
+    if np.isfinite(pixels).all():
+        cv2.fillConvexPoly(free, np.round(np.clip(pixels, -1e4, 1e4)).astype(np.int32), 0)
+    return free
+
+
+def _moved(first: np.ndarray, second: np.ndarray, where: np.ndarray) -> float:
+    """By how much the camera seems to have moved between two images [px]: what most corners of the first have done."""
     greys = [cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (first, second)]
-    corners = cv2.goodFeaturesToTrack(greys[0], 400, 0.01, 8)
-    if corners is None or len(corners) < 20:
+    corners = cv2.goodFeaturesToTrack(greys[0], 400, 0.01, 8, mask=where)
+    if corners is None or len(corners) < _FEWEST:
         return 0.0
     there, good, _ = cv2.calcOpticalFlowPyrLK(greys[0], greys[1], corners, None)  # type: ignore[call-overload]
     back, again, _ = cv2.calcOpticalFlowPyrLK(greys[1], greys[0], there, None)  # type: ignore[call-overload]
     sure = (good.ravel() == 1) & (again.ravel() == 1) & (np.linalg.norm((back - corners).reshape(-1, 2), axis=1) < 0.5)
-    if sure.sum() < 20:
+    if sure.sum() < _FEWEST:
         return 0.0
     way = np.linalg.norm((there - corners).reshape(-1, 2)[sure], axis=1)
-    return float(np.quantile(way, 0.25))  # the board and the cloth have moved, what is around them has not
+    return float(np.quantile(way, 0.25))  # the cloth has moved, what is around it has not
 
 
 def _entry(camera: Camera) -> dict[str, object]:

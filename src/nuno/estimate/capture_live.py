@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.image_quality import check_quality
-from nuno.errors import ImageError, InvalidInputError
+from nuno.errors import ImageError
 from nuno.estimate.capture import Capture, capture_case
 from nuno.files.whole_file import made_folder, write_whole
 from nuno.validation import checked, count
@@ -21,6 +21,7 @@ VIEWS = 12
 _TRIES = 5  # for each image
 
 
+@runtime_checkable
 class ImageSource(Protocol):
     """What gives images: `nuno.UsbCamera`, or any camera with such a method."""
 
@@ -31,7 +32,8 @@ class ImageSource(Protocol):
 
 @checked
 def take_capture(
-    folder: str | os.PathLike[str], source: ImageSource, ask: Callable[[str], Any], *, board: CalibrationBoard | None = None,
+    folder: str | os.PathLike[str], source: ImageSource, ask: Callable[[str], Any], *, board: CalibrationBoard | None =
+        None,
     views: int = VIEWS, **options: Any,
 ) -> Capture:  # fmt: skip
     """Take the images of a case with a camera, and make the case of them by `nuno.capture_case`.
@@ -52,8 +54,6 @@ def take_capture(
         ImageError: five images after one another cannot be used.
         CalibrationError: as ``capture_case``, as all its errors.
     """
-    if not callable(getattr(source, "take", None)):
-        raise InvalidInputError(f"source must have a method take(), as nuno.UsbCamera has, got {type(source).__name__}")
     wanted = count("views", views, low=6, high=200)
     own = CalibrationBoard() if board is None else board
     raw = made_folder(made_folder(folder) / "raw")
@@ -77,9 +77,13 @@ def take_capture(
     boards = []
     if options.get("camera") is None:
         for k in range(wanted):
-            how = "near a corner of the image" if k % 3 == 0 else "tilted by 20 to 45 degrees" if k % 3 == 1 else "close"
+            how = (
+                "near a corner of the image" if k % 3 == 0 else "tilted by 20 to 45 degrees" if k % 3 == 1 else "close"
+            )
             boards.append(take(f"board_{k:02d}", f"view {k + 1} of {wanted}: hold the board {how}", with_board=True))
-    table = take("board_on_table", "lay the board flat on the table, print up; from now on the camera stays", with_board=True)
+    table = take(
+        "board_on_table", "lay the board flat on the table, print up; from now on the camera stays", with_board=True
+    )
     before = take("before", "take the board away and lay the cloth flat on the table", with_board=False)
     after = take("after", "lift the cloth, hold it still, and keep your arm from before it", with_board=False)
     return capture_case(

@@ -15,7 +15,8 @@ _BAND = 26  # [px] for text
 
 
 def preview(
-    before: np.ndarray, after: np.ndarray, camera: Camera, table_height: float, half: list[float] | None, hand: np.ndarray,
+    before: np.ndarray, after: np.ndarray, camera: Camera, table_height: float, half: list[float] | None, hand:
+        np.ndarray,
     calibration: Calibration | None,
 ) -> np.ndarray:  # fmt: skip
     """Draw both images with a grid of 10 cm on the table, the world's axes and the hand.
@@ -34,7 +35,10 @@ def preview(
     """
     reach = (_REACH, _REACH) if half is None else (half[0], half[1])
     pictures = []
-    for image, text in ((before, "before: grid of 10 cm on the table, x red, y green, z blue"), (after, "after: the hand")):
+    for image, text in (
+        (before, "before: grid of 10 cm on the table, x red, y green, z blue"),
+        (after, "after: the hand"),
+    ):
         drawn = image.copy()
         for axis in range(2):
             steps = np.arange(-np.floor(reach[axis] / _GRID), np.floor(reach[axis] / _GRID) + 1) * _GRID
@@ -43,7 +47,13 @@ def preview(
                 ends[:, axis], ends[:, 1 - axis] = at, np.linspace(-reach[1 - axis], reach[1 - axis], 33)
                 _line(drawn, camera, ends, _LINE, 1)
         for axis, colour in enumerate(_AXES):
-            _line(drawn, camera, np.array([0.0, 0.0, table_height]) + np.linspace(0, 0.15, 9)[:, None] * np.eye(3)[axis], colour, 3)
+            _line(
+                drawn,
+                camera,
+                np.array([0.0, 0.0, table_height]) + np.linspace(0, 0.15, 9)[:, None] * np.eye(3)[axis],
+                colour,
+                3,
+            )
         if text.startswith("after"):
             foot = np.array([hand[0], hand[1], table_height])
             _line(drawn, camera, np.linspace(foot, hand, 17), _HAND, 1)

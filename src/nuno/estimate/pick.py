@@ -56,6 +56,7 @@ def estimate_pick(
     after_mask: ArrayLike | None = None,
     hidden: ArrayLike | None = None,
     hint: ArrayLike | None = None,
+    template: ArrayLike | None = None,
     rectangle: ClothRectangle | None = None,
     discretisations: Sequence[Discretisation] = DISCRETISATIONS,
     sure: float = SURE,
@@ -99,6 +100,8 @@ def estimate_pick(
         hidden: (h, w) pixels of the image after that show something before the cloth, such as the robot's own arm; they
             count neither as cloth nor as background.
         hint: A pixel (u, v) on the cloth before, or a box (u0, v0, u1, v1) around it.
+        template: (n, 2) the cloth's outline [m], where it is known, to find it by before where colours do not tell it
+            from other things (see `nuno.segment_before`); its rectangle is still measured in the image.
         rectangle: The cloth before, instead of measuring it.
         discretisations: Meshes, steps and guesses at the material, in the order in which they are run; the first
             one must look at all candidates.
@@ -152,7 +155,9 @@ def estimate_pick(
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
-    images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES))
+    images, rectangle = find_cloth_before(
+        images, rectangle, hint, settings, choice("shape", shape, SHAPES), template
+    )
     settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(
         images.before, images.after, images.mask_before, images.mask_after, camera=settings.camera,

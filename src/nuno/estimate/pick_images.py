@@ -77,6 +77,7 @@ def find_cloth_before(
     hint: ArrayLike | None,
     settings: PickSettings,
     shape: str = "auto",
+    template: ArrayLike | None = None,
 ) -> tuple[PickImages, ClothRectangle]:
     """Find the cloth's mask and rectangle, or outline, in the image before, as far as they are needed and not given.
 
@@ -89,8 +90,8 @@ def find_cloth_before(
     if images.mask_before is None and (rectangle is None or images.mask_after is None):
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
-        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
-        if hint is None and rectangle is None:
+        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint, template=template))
+        if hint is None and template is None and rectangle is None:
             other = other_cloth(images.before, images.mask_before, camera, table)
     if rectangle is None:
         assert images.mask_before is not None
