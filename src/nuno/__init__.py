@@ -128,6 +128,8 @@ if TYPE_CHECKING:
     from nuno.tasks.pick_towel import TowelPicker
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
+    from nuno.tracking.followed import Followed
+    from nuno.tracking.follower import Follower, follow
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -160,6 +162,8 @@ __all__ = [
     "Film",
     "FoldCase",
     "FoldResult",
+    "Followed",
+    "Follower",
     "Footage",
     "Footstep",
     "Goal",
@@ -271,6 +275,7 @@ __all__ = [
     "fit_material",
     "fitted_tetrahedra",
     "fixed_joint",
+    "follow",
     "hinge",
     "improve_fold",
     "lattice_tetrahedra",
@@ -372,6 +377,8 @@ _LAZY = {
         "nuno.tasks.pick_towel": "TowelPicker",
         "nuno.tasks.play_fold": "PlayedFold play_fold",
         "nuno.tasks.taught_fold": "TaughtFold",
+        "nuno.tracking.followed": "Followed",
+        "nuno.tracking.follower": "Follower follow",
         "nuno.viewer.film": "Film",
         "nuno.viewer.viewer": "Viewer",
         "nuno.world.contact_points": "ContactPoints",
