@@ -5,7 +5,7 @@ The follower begins 4 mm and 0.7 degrees off, with another material, mesh and su
 an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
 
 Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--json FILE] [--strip FILE]
-Trackers: "follow", "masks" (the same without depth), "open loop", and "cpd" (coherent point drift, Myronenko and Song
+Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd" (coherent point drift, Myronenko and Song
 2010, by the package pycpd: pip install pycpd), which goes from frame to frame.
 """
 
@@ -29,7 +29,10 @@ HIDDEN = (1.3, 2.3)  # [s] when a board hides half of the cloth
 NOISE = 0.002  # [m] of the depth at one metre, growing with its square
 OFFSET, TURN, HAND_ERROR = (0.006, -0.005), 0.02, (0.0012, -0.0012, 0.001)
 CAMERA = nuno.Camera.look_at((-0.15, -0.7, TOP + 0.75), (0.0, 0.0, TOP + 0.1), 0.75, width=320, height=240)
-TRACKERS = ("follow", "masks", "open loop", "cpd")
+TRACKERS = ("follow", "masks", "futures", "open loop", "cpd")
+GUESSES = tuple(
+    nuno.Cloth(bending_rigidity=bending, area_density=density) for bending in (1e-5, 5e-5, 2e-4) for density in (0.2, 0.3)
+)
 
 
 def seen(engine: str, name: str, hidden: bool) -> dict[str, Any]:
@@ -130,6 +133,8 @@ def track(tracker: str, case: dict[str, Any], blind: bool = False, **options: An
     if tracker == "cpd":
         return _drift(case)
     world, towel = own_world(case["motion"], RADIUS[case["engine"]], blind)
+    if tracker == "futures":
+        options = {"materials": GUESSES, "iterations": 1, **options}
     follower = nuno.follow(world, towel, CAMERA, **options)
     found, spent = [], []
     for time, mask, depth, board in zip(case["times"], case["masks"], case["depths"], case["board_mask"], strict=True):
@@ -167,10 +172,41 @@ def _drift(case: dict[str, Any]) -> tuple[np.ndarray, float]:
 
 def errors(found: np.ndarray, case: dict[str, Any], towel: Any) -> np.ndarray:
     """Return mean distances (k,) [m] of the vertices from the truth."""
+    return np.linalg.norm(found - case["truth"][:, resampled_order(towel)], axis=-1).mean(axis=1)
+
+
+def strip(case: dict[str, Any], found: dict[str, np.ndarray], path: Path) -> None:
+    """Write a picture: the truth, and below it what trackers tell, at some instants."""
+    import cv2
+
+    world, towel = own_world(case["motion"], RADIUS[case["engine"]])
+    rows, columns = [], np.linspace(4, len(case["times"]) - 1, 5).round().astype(int)
+    flat = resampled_order(towel)
+    for label, shapes in [("truth", case["truth"][:, flat]), *found.items()]:
+        row = []
+        for k in columns:
+            world.set_vertices(towel, shapes[k])
+            hands = [body for body in world.bodies if body.name.startswith("hand")]
+            for body, start, move in zip(hands, add_starts(case), motion(case["motion"]).at(case["times"][k]), strict=True):
+                body.locate(start + move)
+            image = nuno.take_picture(world, CAMERA, samples=2).color.numpy()[40:, 40:280].copy()
+            cv2.putText(image, f"{label} {case['times'][k]:.1f} s", (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (20, 20, 20), 1)
+            row.append(image)
+        rows.append(np.hstack(row))
+    cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
+
+
+def add_starts(case: dict[str, Any]) -> np.ndarray:
+    """Return where the hands of a sequence begin, (hands, 3) [m]."""
+    held = motion(case["motion"]).held
+    return np.array([[(u - 0.5) * SIZE[0], (v - 0.5) * SIZE[1], TOP + RADIUS[case["engine"]]] for u, v in held])
+
+
+def resampled_order(towel: Any) -> np.ndarray:
+    """Return which row of what ``resampled`` gives each vertex of a sheet is."""
     flat = np.stack(np.meshgrid(*(np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, OWN_CELLS, strict=True))), -1)
     rest = towel.shape.mesh()[0][:, :2]
-    order = np.linalg.norm(rest[:, None] - flat.reshape(-1, 1, 2).swapaxes(0, 1), axis=-1).argmin(axis=1)
-    return np.linalg.norm(found - case["truth"][:, order], axis=-1).mean(axis=1)
+    return np.linalg.norm(rest[:, None] - flat.reshape(1, -1, 2), axis=-1).argmin(axis=1)
 
 
 def main() -> None:
@@ -191,8 +227,10 @@ def main() -> None:
             for hidden in (False, True):
                 case = seen(engine, name, hidden)
                 towel = own_world(name, RADIUS[engine])[1]
+                shapes = {}
                 for tracker in options.trackers:
                     found, spent = track(tracker, case, options.blind)
+                    shapes[tracker] = found
                     off = 1000.0 * errors(found, case, towel)
                     covered = float(off[case["covered"]].mean()) if hidden else float("nan")
                     row = {"engine": engine, "motion": name, "hidden": hidden, "tracker": tracker,
@@ -200,6 +238,8 @@ def main() -> None:
                     rows.append(row)
                     print(f"{engine:8} {name:7} {hidden!s:7} {tracker:10} {off.mean():6.1f} {off.max():6.1f} {covered:6.1f}"
                           f"  {spent:18.3f}", flush=True)
+                if options.strip and len(rows) == len(options.trackers):
+                    strip(case, {name: shapes[name] for name in ("follow", "open loop") if name in shapes}, options.strip)
     for tracker in options.trackers:
         own = [row for row in rows if row["tracker"] == tracker]
         print(f"{tracker}: mean {np.mean([r['mean_mm'] for r in own]):.1f} mm, worst sequence "

@@ -7,6 +7,7 @@ they are installed. Each motion is one or two hands on paths that are known; see
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -60,6 +61,7 @@ def flat(cells: tuple[int, int], height: float) -> np.ndarray:
     return np.stack([*np.meshgrid(x, y), np.full((len(y), len(x)), TOP + height)], axis=-1)
 
 
+@lru_cache(maxsize=1)
 def truth(engine: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return times (k,) [s] and vertices (k, ny + 1, nx + 1, 3) [m] of a motion as an engine has it."""
     makers = {"nuno": _nuno, "mujoco": _mujoco, "newton": _newton}

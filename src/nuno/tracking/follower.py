@@ -358,7 +358,7 @@ def checked_cameras(camera: Any) -> tuple[Camera, ...]:
 @checked
 def follow(
     world: World, body: Body | str, camera: Any, *, materials: Sequence[Cloth] = (), reach: float = 0.1,
-    iterations: int = 1, pixels: int = 1500, thorough: bool = True,
+    iterations: int = 2, pixels: int = 1500, thorough: bool = True,
 ) -> Follower:  # fmt: skip
     """Begin to follow a cloth through images: its physics, and forces from what is seen.
 

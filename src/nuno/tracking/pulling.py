@@ -11,7 +11,7 @@ SETTLE = 0.08
 """[s] Time in which a residual falls to 1/e: noise of single images is averaged over it."""
 STEADY = 1.0
 """Share of what a residual that is left asks for, as a steady force on what friction holds."""
-STUCK = 0.03
+STUCK = 0.1
 """[m/s] Speed below which a vertex that is off counts as held by friction."""
 LEAK = 0.95
 """Share of a steady force that is left at the next image; of what moves, half."""
