@@ -149,6 +149,8 @@ if TYPE_CHECKING:
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
     from nuno.viewer.compare_engines import EngineComparison, compare_engines
+    from nuno.tracking.followed import Followed
+    from nuno.tracking.follower import Follower, follow
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -188,6 +190,8 @@ __all__ = [
     "Film",
     "FoldCase",
     "FoldResult",
+    "Followed",
+    "Follower",
     "Footage",
     "Footstep",
     "FoundShape",
@@ -318,6 +322,7 @@ __all__ = [
     "fitted_tetrahedra",
     "fixed_joint",
     "garment",
+    "follow",
     "hinge",
     "image_quality",
     "imagine_holds",
@@ -440,6 +445,8 @@ _LAZY = {
         "nuno.tasks.play_fold": "PlayedFold play_fold",
         "nuno.tasks.taught_fold": "TaughtFold",
         "nuno.viewer.compare_engines": "EngineComparison compare_engines",
+        "nuno.tracking.followed": "Followed",
+        "nuno.tracking.follower": "Follower follow",
         "nuno.viewer.film": "Film",
         "nuno.viewer.viewer": "Viewer",
         "nuno.world.contact_points": "ContactPoints",

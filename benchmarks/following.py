@@ -1,0 +1,252 @@
+"""How well a cloth is followed through images, beside physics without images and a tracker without physics.
+
+The truth is made by engines (``moving_cloths.py``) and seen as depth and masks with noise, or as masks alone, at 10 Hz.
+The follower begins 4 mm and 0.7 degrees off, with another material, mesh and substep, and knows the hands' paths with
+an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
+
+Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--json FILE] [--strip FILE]
+Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd" (coherent point drift, Myronenko and Song
+2010, by the package pycpd: pip install pycpd), which goes from frame to frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import time as clock
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from moving_cloths import CELLS, ENGINES, MOTIONS, RADIUS, SIZE, TOP, motion, resampled, truth
+
+import nuno
+
+OWN_CELLS = (16, 12)
+PERIOD = 0.1  # [s] between images
+HIDDEN = (1.3, 2.3)  # [s] when a board hides half of the cloth
+NOISE = 0.002  # [m] of the depth at one metre, growing with its square
+OFFSET, TURN, HAND_ERROR = (0.006, -0.005), 0.02, (0.0012, -0.0012, 0.001)
+CAMERA = nuno.Camera.look_at((-0.15, -0.7, TOP + 0.75), (0.0, 0.0, TOP + 0.1), 0.75, width=320, height=240)
+TRACKERS = ("follow", "masks", "futures", "open loop", "cpd")
+GUESSES = tuple(
+    nuno.Cloth(bending_rigidity=bending, area_density=density) for bending in (1e-5, 5e-5, 2e-4) for density in (0.2, 0.3)
+)
+
+
+def seen(engine: str, name: str, hidden: bool) -> dict[str, Any]:
+    """Return the truth of a sequence at the images' times, and the images: masks, depths [m] and what is hidden."""
+    times, vertices = truth(engine, name)
+    every = round(PERIOD * (len(times) - 1) / times[-1])
+    times, vertices = times[::every], vertices[::every]
+    world = nuno.World(device="cpu")
+    world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
+    cells = CELLS[engine]
+    towel = world.add(nuno.sheet(SIZE, cells, name="towel", position=(0, 0, TOP + RADIUS[engine])))
+    order = np.argsort(_order(towel, vertices[0].reshape(-1, 3)))
+    world.attach(towel)
+    hands = add_hands(world, name, RADIUS[engine], np.zeros(3), follow=False)
+    board = world.add(nuno.box((0.4, 0.005, 0.3), name="board", position=(0, 0, -5.0)))
+    rng = np.random.default_rng(7)
+    masks, depths = [], []
+    for time, shape in zip(times, vertices, strict=True):
+        world.set_vertices(towel, shape.reshape(-1, 3)[order])
+        for body, start, move in zip(hands[0], hands[1], motion(name).at(time), strict=True):
+            body.locate(start + move)
+        if hidden:
+            middle = shape.reshape(-1, 3).mean(axis=0)
+            eye = CAMERA.camera_to_world[:3, 3]
+            at = middle + 0.3 * (eye - middle) + (0.2, 0.0, 0.0)
+            board.locate(at if HIDDEN[0] <= time < HIDDEN[1] else (0.0, 0.0, -5.0))
+        mask = world.masks(CAMERA, towel).numpy()
+        edge = mask ^ _shifted(mask)
+        masks.append(mask ^ (edge & (rng.random(mask.shape) < 0.3)))
+        depth = world.depth(CAMERA).numpy()
+        depth[~np.isfinite(depth)] = np.nan
+        depth = depth + NOISE * depth**2 * rng.standard_normal(depth.shape)
+        depth[rng.random(depth.shape) < 0.02] = np.nan
+        depths.append(depth)
+    mine = resampled(vertices, OWN_CELLS)
+    covered = [world_time for world_time in times if hidden and HIDDEN[0] <= world_time < HIDDEN[1]]
+    return {"times": times, "masks": masks, "depths": depths, "truth": mine, "covered": np.isin(times, covered),
+            "engine": engine, "motion": name, "board": board, "board_mask": _board_masks(world, board, times, vertices, hidden)}
+
+
+def _board_masks(world: Any, board: Any, times: Any, vertices: Any, hidden: bool) -> list[Any]:
+    """Return where the board is in each image, for masks alone, which do not tell it from the table."""
+    found = []
+    for time, shape in zip(times, vertices, strict=True):
+        if not (hidden and HIDDEN[0] <= time < HIDDEN[1]):
+            found.append(None)
+            continue
+        middle, eye = shape.reshape(-1, 3).mean(axis=0), CAMERA.camera_to_world[:3, 3]
+        board.locate(middle + 0.3 * (eye - middle) + (0.2, 0.0, 0.0))
+        found.append(world.masks(CAMERA, board).numpy())
+    return found
+
+
+def _shifted(mask: np.ndarray) -> np.ndarray:
+    return np.roll(mask, 1, axis=0) & np.roll(mask, 1, axis=1) & np.roll(mask, -1, axis=0) & np.roll(mask, -1, axis=1)
+
+
+def _order(towel: Any, points: np.ndarray) -> np.ndarray:
+    """Return which vertex of a flat sheet each of the points (n, 3) is."""
+    return np.linalg.norm(towel.vertices[None, :, :2] - points[:, None, :2], axis=-1).argmin(axis=1)
+
+
+def add_hands(world: Any, name: str, radius: float, error: np.ndarray, follow: bool) -> tuple[list[Any], np.ndarray]:
+    """Put balls into a world where the hands of a motion begin; on their paths, if they follow them."""
+    hands = motion(name)
+    starts = np.array([[(u - 0.5) * SIZE[0], (v - 0.5) * SIZE[1], TOP + radius] for u, v in hands.held]) + error
+    balls = []
+    for k, start in enumerate(starts):
+        ball = world.add(nuno.sphere(0.014, name=f"hand_{k}", position=start))
+        if follow:
+            world.move(ball, nuno.Path(hands.times, start + hands.moves[k]))
+        balls.append(ball)
+    return balls, starts
+
+
+def own_world(name: str, radius: float, blind: bool = False) -> tuple[nuno.World, nuno.Body]:
+    """Return the world that a follower has: the table, the hands on their paths, and the cloth about where it is.
+
+    A blind one knows of no hands.
+    """
+    world = nuno.World(device="cpu")
+    world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
+    towel = world.add(nuno.sheet(SIZE, OWN_CELLS, name="towel", position=(*OFFSET, TOP + 0.002)))
+    towel.rotate(TURN, "z", wrt="world")
+    world.attach(towel)
+    if blind:
+        return world, towel
+    balls, starts = add_hands(world, name, radius, np.array(HAND_ERROR), follow=True)
+    hands = motion(name)
+    for ball, start, way in zip(balls, starts, hands.moves, strict=True):
+        world.ignore_contact(towel, ball)
+        world.grip(towel, towel.closest(start), to=nuno.Path(hands.times, start + way))
+    return world, towel
+
+
+def track(tracker: str, case: dict[str, Any], blind: bool = False, **options: Any) -> tuple[np.ndarray, float]:
+    """Return the vertices (k, n, 3) [m] that a tracker tells at the images' times, and its CPU seconds an image."""
+    if tracker == "cpd":
+        return _drift(case)
+    world, towel = own_world(case["motion"], RADIUS[case["engine"]], blind)
+    if tracker == "futures":
+        options = {"materials": GUESSES, "iterations": 1, **options}
+    follower = nuno.follow(world, towel, CAMERA, **options)
+    found, spent = [], []
+    for time, mask, depth, board in zip(case["times"], case["masks"], case["depths"], case["board_mask"], strict=True):
+        begin = clock.process_time()
+        if tracker == "open loop":
+            follower.update(time)
+        elif tracker == "masks":
+            follower.update(time, mask, hidden=board)
+        else:
+            follower.update(time, mask, depth)
+        spent.append(clock.process_time() - begin)
+        found.append(towel.vertices)
+    return np.array(found), float(np.mean(spent[1:]))
+
+
+def _drift(case: dict[str, Any]) -> tuple[np.ndarray, float]:
+    """Return what coherent point drift makes of the points of each image, from what it made of the one before."""
+    from pycpd import DeformableRegistration
+
+    _, towel = own_world(case["motion"], RADIUS[case["engine"]])
+    now, found, spent = towel.vertices, [], []
+    rays = CAMERA.rays(np.stack(np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height)), axis=-1).astype(float))
+    for mask, depth in zip(case["masks"], case["depths"], strict=True):
+        chosen = np.argwhere(mask & np.isfinite(depth))[::6]
+        begin = clock.process_time()
+        points = CAMERA.camera_to_world[:3, 3] + rays[tuple(chosen.T)] * depth[tuple(chosen.T)][:, None]
+        if len(points) > 20:
+            now = DeformableRegistration(
+                X=10.0 * points, Y=10.0 * now, alpha=2.0, beta=1.0, w=0.1, max_iterations=40, tolerance=1e-4
+            ).register()[0] / 10.0
+        spent.append(clock.process_time() - begin)
+        found.append(now)
+    return np.array(found), float(np.mean(spent[1:]))
+
+
+def errors(found: np.ndarray, case: dict[str, Any], towel: Any) -> np.ndarray:
+    """Return mean distances (k,) [m] of the vertices from the truth."""
+    return np.linalg.norm(found - case["truth"][:, resampled_order(towel)], axis=-1).mean(axis=1)
+
+
+def strip(case: dict[str, Any], found: dict[str, np.ndarray], path: Path) -> None:
+    """Write a picture: the truth, and below it what trackers tell, at some instants."""
+    import cv2
+
+    world, towel = own_world(case["motion"], RADIUS[case["engine"]])
+    rows, columns = [], np.linspace(4, len(case["times"]) - 1, 5).round().astype(int)
+    flat = resampled_order(towel)
+    for label, shapes in [("truth", case["truth"][:, flat]), *found.items()]:
+        row = []
+        for k in columns:
+            world.set_vertices(towel, shapes[k])
+            hands = [body for body in world.bodies if body.name.startswith("hand")]
+            for body, start, move in zip(hands, add_starts(case), motion(case["motion"]).at(case["times"][k]), strict=True):
+                body.locate(start + move)
+            image = nuno.take_picture(world, CAMERA, samples=2).color.numpy()[40:, 40:280].copy()
+            cv2.putText(image, f"{label} {case['times'][k]:.1f} s", (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (20, 20, 20), 1)
+            row.append(image)
+        rows.append(np.hstack(row))
+    cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
+
+
+def add_starts(case: dict[str, Any]) -> np.ndarray:
+    """Return where the hands of a sequence begin, (hands, 3) [m]."""
+    held = motion(case["motion"]).held
+    return np.array([[(u - 0.5) * SIZE[0], (v - 0.5) * SIZE[1], TOP + RADIUS[case["engine"]]] for u, v in held])
+
+
+def resampled_order(towel: Any) -> np.ndarray:
+    """Return which row of what ``resampled`` gives each vertex of a sheet is."""
+    flat = np.stack(np.meshgrid(*(np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, OWN_CELLS, strict=True))), -1)
+    rest = towel.shape.mesh()[0][:, :2]
+    return np.linalg.norm(rest[:, None] - flat.reshape(1, -1, 2), axis=-1).argmin(axis=1)
+
+
+def main() -> None:
+    """Follow all sequences, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--engines", nargs="+", default=list(ENGINES), choices=ENGINES)
+    parser.add_argument("--motions", nargs="+", default=list(MOTIONS), choices=MOTIONS)
+    parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
+    parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--strip", type=Path, help="a picture: truth, follower and open loop, of the first sequence")
+    options = parser.parse_args()
+    logging.disable(logging.WARNING)
+    rows = []
+    print("engine   motion  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
+    for engine in options.engines:
+        for name in options.motions:
+            for hidden in (False, True):
+                case = seen(engine, name, hidden)
+                towel = own_world(name, RADIUS[engine])[1]
+                shapes = {}
+                for tracker in options.trackers:
+                    found, spent = track(tracker, case, options.blind)
+                    shapes[tracker] = found
+                    off = 1000.0 * errors(found, case, towel)
+                    covered = float(off[case["covered"]].mean()) if hidden else float("nan")
+                    row = {"engine": engine, "motion": name, "hidden": hidden, "tracker": tracker,
+                           "mean_mm": float(off.mean()), "worst_mm": float(off.max()), "hidden_mm": covered, "cpu_s": spent}
+                    rows.append(row)
+                    print(f"{engine:8} {name:7} {hidden!s:7} {tracker:10} {off.mean():6.1f} {off.max():6.1f} {covered:6.1f}"
+                          f"  {spent:18.3f}", flush=True)
+                if options.strip and len(rows) == len(options.trackers):
+                    strip(case, {name: shapes[name] for name in ("follow", "open loop") if name in shapes}, options.strip)
+    for tracker in options.trackers:
+        own = [row for row in rows if row["tracker"] == tracker]
+        print(f"{tracker}: mean {np.mean([r['mean_mm'] for r in own]):.1f} mm, worst sequence "
+              f"{max(r['mean_mm'] for r in own):.1f} mm, hidden {np.nanmean([r['hidden_mm'] for r in own]):.1f} mm")
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""What one camera shows at one instant, on the pixels that a follower looks at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nuno.camera.camera import Camera
+from nuno.camera.image import check_image, check_mask
+from nuno.errors import ImageError
+from nuno.tracking.pixel_grid import PixelGrid
+from nuno.validation import as_array
+
+FARTHEST = 50.0
+"""[m] A cloth that is farther away than this by the median of its depths is most likely given in millimetres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One camera's view of the cloth.
+
+    Attributes:
+        grid: The pixels.
+        cloth: (h, w) bool, where the cloth is seen.
+        depth: (h, w) float [m] along the optical axis, NaN where it is not known; None without depth.
+        hidden: (h, w) bool, where nothing can be told: what is there may hide the cloth.
+    """
+
+    grid: PixelGrid
+    cloth: np.ndarray
+    depth: np.ndarray | None
+    hidden: np.ndarray
+
+    @property
+    def is_empty(self) -> bool:
+        """Return True if no pixel shows the cloth."""
+        return not self.cloth.any()
+
+
+def is_picture(seen: Any) -> bool:
+    """Return True if what was seen has three axes: a colour image, and no mask."""
+    return as_array("seen", seen, ImageError).ndim == 3
+
+
+def check_picture(seen: Any, camera: Camera) -> np.ndarray:
+    """Return a colour image (height, width, 3) uint8, checked against its camera."""
+    return check_image(seen, camera, "image")
+
+
+def observe(grid: PixelGrid, mask: Any, depth: Any, hidden: Any) -> Observation:
+    """Return what a camera shows.
+
+    Args:
+        grid: The pixels to look at.
+        mask: (height, width), where the cloth is seen, of the full camera; or of the grid already, bool.
+        depth: (height, width) [m] along the optical axis, or None; NaN, infinite and 0 are not known.
+        hidden: (height, width) bool, where nothing can be told, or None.
+
+    Raises:
+        ImageError: one does not fit the camera, or depths that are no metres.
+    """
+    reduced = (grid.camera.height, grid.camera.width)
+    if isinstance(mask, np.ndarray) and mask.shape == reduced and mask.dtype == bool and grid.step > 1:
+        cloth = mask
+    else:
+        cloth = grid.take(check_mask(mask, grid.full, "mask"))
+    covered = np.zeros(reduced, dtype=bool)
+    if hidden is not None:
+        covered = grid.take(check_mask(hidden, grid.full, "hidden"))
+    metres = None
+    if depth is not None:
+        metres = grid.take(check_depth(depth, grid.full)).astype(float)
+        metres[~np.isfinite(metres) | (metres <= 0.0)] = np.nan
+        known = metres[cloth & np.isfinite(metres)]
+        if len(known) and np.median(known) > FARTHEST:
+            raise ImageError(f"depth is {np.median(known):.0f} m at the cloth; it is to be metres, not millimetres")
+    return Observation(grid, cloth & ~covered, metres, covered)
+
+
+def check_depth(depth: Any, camera: Camera) -> np.ndarray:
+    """Return depths (height, width) as they are, of the camera's size.
+
+    Raises:
+        ImageError: they are not.
+    """
+    given = as_array("depth", depth.numpy() if hasattr(depth, "numpy") else depth, ImageError)
+    if given.shape != (camera.height, camera.width) or given.dtype.kind not in "iuf":
+        raise ImageError(
+            f"depth must be numbers [m] of shape {(camera.height, camera.width)} to fit its camera, got "
+            f"{given.dtype} of shape {given.shape}"
+        )
+    return given
