@@ -68,8 +68,8 @@ def paths_of_hands(
         hypotheses: They say how it went, and by how many standard deviations it is elsewhere.
         seconds: How long it took [s].
         std: Standard deviation of where it is [m].
-        seen: (k, 3) the way as it was seen [m], or None. It is bent so that it begins at the candidate: the offset there
-            fades out towards the end.
+        seen: (k, 3) the way as it was seen [m], or None. It is bent so that it begins at the candidate: the offset
+            there fades out towards the end.
     """
     ends = np.asarray(hand, dtype=float) + std * np.array([h.hand for h in hypotheses])
     ends[:, 2] += [h.mistake for h in hypotheses]

@@ -105,12 +105,12 @@ def estimate_pick(
             stay below: points about under the hand are likelier before the image after is seen
             (`nuno.estimate.lift_prior`). None takes all candidates as alike: right where the hand was led to the side
             on purpose. "chamfer", "iou" and "eq1" are without it.
-        hand_std: Standard deviation of where the hand is, along each axis [m]. Futures are compared as if it were there,
-            too (`nuno.estimate.hand_error`), and a few of them are imagined so.
-        hand_path: (k, 3) where the hand went [m], at even times from when it held the cloth on, to ``hand``, which took
-            it ``lift_seconds``; or a `nuno.HandPath`, of which the last hold counts. It replaces the guesses that the hand went
-            straight, or up first and sideways then, and the prior of the lift: where it began is where the picked
-            point lay, up to ``hand_std`` and to how high it was then.
+        hand_std: Standard deviation of where the hand is, along each axis [m]. Futures are compared as if it were
+            elsewhere, too (`nuno.estimate.hand_error`), and a few of them are imagined so.
+        hand_path: (k, 3) where the hand went [m], at even times from when it held the cloth on, to ``hand``, which
+            took it ``lift_seconds``; or a `nuno.HandPath`, of which the last hold counts. It replaces the guesses that
+            the hand went straight, or up first and sideways then, and the prior of the lift: where it began is where
+            the picked point lay, up to ``hand_std`` and to how high it was then.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -160,9 +160,10 @@ def _result(
     futures, best_index = trials.batches[batch].whole(world)
     stages.end("compare")
     return PickResult(
-        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1, likely=ranked.likely,
-        rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(), futures=futures,
-        best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks, real=seen.silhouette,
-        image_before=images.before, image_after=images.after, mask_before=images.mask_before, mask_after=seen.mask,
-        seen_warnings=(*seen.warnings, *trials.warnings), sideways=settings.sideways if settings.with_evidence else None,
+        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1,
+        likely=ranked.likely, rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(),
+        futures=futures, best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks,
+        real=seen.silhouette, image_before=images.before, image_after=images.after, mask_before=images.mask_before,
+        mask_after=seen.mask, seen_warnings=(*seen.warnings, *trials.warnings),
+        sideways=settings.sideways if settings.with_evidence else None,
     )  # fmt: skip

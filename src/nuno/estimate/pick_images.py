@@ -84,9 +84,10 @@ def find_cloth_before(
     if images.mask_before is None and (rectangle is None or images.mask_after is None):
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
-        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint))
+        found = segment_before(images.before, camera, table, hint=hint)
+        images = replace(images, mask_before=found)
         if hint is None and rectangle is None:
-            other = other_cloth(images.before, images.mask_before, camera, table)
+            other = other_cloth(images.before, found, camera, table)
     if rectangle is None:
         assert images.mask_before is not None
         over = border_warning(images.mask_before, camera, table)
@@ -94,8 +95,8 @@ def find_cloth_before(
             rectangle = fit_rectangle(images.mask_before, images.before, camera, table.height + settings.rest_height)
         except EstimationError as error:
             raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
-        found = tuple(warning for warning in (over, other) if warning is not None)
-        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *found))
+        odd = tuple(warning for warning in (over, other) if warning is not None)
+        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *odd))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
     return images, rectangle

@@ -101,8 +101,8 @@ def check_settings(
     return PickSettings(
         camera=camera, table=table, hand=hand, labels=labels, uv=uv, grid=grid, rest_height=rest_height,
         lift_seconds=lift_seconds, discretisations=discretisations, sure=sure,
-        turns=angles, poses=poses_of(camera, angles, hand_std if score in EVIDENCE else 0.0), hand_std=hand_std, hand_path=path, sideways=sideways,
-        score=score,
+        turns=angles, poses=poses_of(camera, angles, hand_std if score in EVIDENCE else 0.0), hand_std=hand_std,
+        hand_path=path, sideways=sideways, score=score,
         device=found_device(checked_device(device)), **others,
     )  # fmt: skip
 
