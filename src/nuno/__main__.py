@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
-from nuno.estimate.lift_prior import SIDEWAYS
+from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 
 if TYPE_CHECKING:
     from nuno.robot.simulated_robot import SimulatedRobot
@@ -35,6 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pick.add_argument(
         "--sideways", metavar="SHARE", default=str(SIDEWAYS),
         help=f"how far sideways hands go that lift a cloth, as a share of how high; none: any way (default {SIDEWAYS})",
+    )  # fmt: skip
+    pick.add_argument(
+        "--hand-std", metavar="M", type=float, default=HAND_STD,
+        help="[m] standard deviation of where the hand is, along each axis (default %(default)s)",
     )  # fmt: skip
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
@@ -122,7 +126,9 @@ def _pick(options: argparse.Namespace) -> int:
     case = read_case(options.case)
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
-    result = case.estimate(candidates=grid, sideways=sideways, device=options.device, progress=options.progress)
+    result = case.estimate(
+        candidates=grid, sideways=sideways, hand_std=options.hand_std, device=options.device, progress=options.progress
+    )
     result.save(options.out)
     i, j = result.best
     sys.stdout.write(

@@ -17,8 +17,6 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.estimate.rotations import log_prior
 
-HAND_STD = 0.01
-"""[m] Standard deviation of where a hand is, along each axis, where it is not told."""
 STEP = 1.5
 """Shifts by so many standard deviations are looked at."""
 GROSS = 0.05

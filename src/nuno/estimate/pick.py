@@ -17,10 +17,9 @@ from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.compile_ahead import compile_ahead
 from nuno.estimate.futures import LIFT_SECONDS
-from nuno.estimate.hand_error import HAND_STD
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
-from nuno.estimate.lift_prior import SIDEWAYS
+from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.estimate.pick_images import PickImages, find_cloth_before, read_images
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.pick_settings import PickSettings, check_settings, check_table

@@ -10,7 +10,7 @@ import numpy as np
 
 from nuno.camera.rectangle import SQUARE, ClothRectangle
 from nuno.errors import EstimationError
-from nuno.estimate.doubt import doubted, oddities
+from nuno.estimate.doubt import doubted, oddities, tempered
 from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
 from nuno.estimate.hypotheses import Discretisation
@@ -128,6 +128,8 @@ def try_picks(
     odd = oddities(comparisons, best, settings.score, guess)
     told = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
     ranked = doubted(comparisons, settings.score, len(uv), prior, told)
+    if ranked.likely is not None:  # in one order with the scores
+        ranked = replace(ranked, likely=tempered(ranked.scores, float(ranked.likely[best])))
     return PickTrials(comparisons, batches, ranked, seen, odd)
 
 
