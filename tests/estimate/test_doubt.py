@@ -12,7 +12,6 @@ from nuno.estimate.doubt import (
     misfit,
     oddities,
     share_of_doubt,
-    tempered,
 )
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import Comparison, rank
@@ -99,15 +98,3 @@ def test_other_scores_are_left_alone():
     """They tell no probabilities."""
     ranked = doubted([comparison([[1.0, 9.0]])], "chamfer", 2, None, 3)
     assert ranked.likely is None and ranked.probabilities is None
-
-
-def test_probabilities_are_tempered_to_what_is_trusted():
-    """The best one's is what is trusted, the others' order and shares of logarithms stay; what is less sure stays."""
-    scores = np.array((0.0, -1.0, -3.0, -np.inf))
-    plain = np.exp(scores) / np.exp(scores).sum()
-    np.testing.assert_allclose(tempered(scores, 0.9), plain, rtol=1e-12)
-    cooled = tempered(scores, 0.5)
-    assert cooled[0] == pytest.approx(0.5, abs=1e-9) and cooled.sum() == pytest.approx(1.0)
-    ratios = np.log(cooled[:3] / cooled[0])
-    assert ratios[2] / ratios[1] == pytest.approx(3.0) and cooled[3] == 0.0
-    np.testing.assert_allclose(tempered(scores, 0.1), (1 / 3, 1 / 3, 1 / 3, 0.0), atol=1e-4)

@@ -27,8 +27,6 @@ BAD_SHARE = 0.6
 """Of the broad probabilities in the answer, where the best future fits badly; up to there in proportion."""
 WARNED_SHARE = 0.25
 """Of the broad probabilities, for every warning again of what is left."""
-HOTTEST = 12.0
-"""Logarithm of the highest temperature, at which all are alike."""
 BREADTH = 6.0
 """Evidence's logarithms are divided by this for the broad probabilities."""
 
@@ -103,27 +101,6 @@ def doubted(
     if share > 0.0:
         logs = np.logaddexp(np.log1p(-share) + logs, np.log(share) + _log_shares(ranked.scores / BREADTH))
     return replace(ranked, likely=np.exp(logs))
-
-
-def tempered(scores: np.ndarray, trusted: float) -> np.ndarray:
-    """Return probabilities (k,) in the order of the scores (k,), of which the best one's is no more than is trusted.
-
-    They are as exp of the scores divided by a temperature, 1 where the best one's is no more as it is.
-    """
-    finite = np.isfinite(scores)
-    best = np.where(finite, scores, -np.inf).max()
-
-    def at(temperature: float) -> np.ndarray:
-        weights = np.where(finite, np.exp(np.where(finite, scores - best, 0.0) / temperature), 0.0)
-        return np.asarray(weights / weights.sum())
-
-    low, high = 0.0, HOTTEST
-    if at(1.0).max() <= trusted:
-        return at(1.0)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if at(float(np.exp(middle))).max() <= trusted else (middle, high)
-    return at(float(np.exp(high)))
 
 
 def _log_shares(scores: np.ndarray) -> np.ndarray:

@@ -160,7 +160,7 @@ def _result(
     stages.end("compare")
     return PickResult(
         labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1,
-        likely=ranked.likely, rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(),
+        trusted=trials.trusted, rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(),
         futures=futures, best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks,
         real=seen.silhouette, image_before=images.before, image_after=images.after, mask_before=images.mask_before,
         mask_after=seen.mask, seen_warnings=(*seen.warnings, *trials.warnings),

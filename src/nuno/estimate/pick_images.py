@@ -104,7 +104,7 @@ def find_cloth_before(
 
 def border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
     """Return a warning where the outline of a mask (h, w) runs along the table's border: the cloth goes on there."""
-    if table.half_extents is None:
+    if table.half_extents is None or not mask.any():
         return None
     outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = np.concatenate(outlines)[:, 0].astype(float)
