@@ -1,4 +1,4 @@
-"""Picked cloths that leave the ordinary setting, as images, one departure at a time: ``python benchmarks/varied_cases.py DIR``.
+"""Picked cloths that leave the ordinary setting, one departure a case: ``python benchmarks/varied_cases.py DIR``.
 
 Nuno's own engine makes them, on a mesh and with a step that no estimator uses, or MuJoCo's flexible bodies (``--engine
 mujoco``, where that package is installed). Every case is a folder as `nuno.read_case` reads it, with a truth.json, so
@@ -184,7 +184,9 @@ def photograph(
         options = dict(name=f"thing {k}", position=thing.position, color=thing.colour)
         size = thing.size
         world.add(box((size,) * 3, **options) if thing.kind == "box" else cylinder(size / 2, size, **options))
-    cloth = sheet((rectangle.long_m, rectangle.short_m), cells=cells, name="cloth", position=(0, 0, 3), color=look.cloth)
+    cloth = sheet(
+        (rectangle.long_m, rectangle.short_m), cells=cells, name="cloth", position=(0, 0, 3), color=look.cloth
+    )
     world.add(cloth)
     world.attach(cloth, Cloth())
     world.set_vertices(cloth, vertices)

@@ -186,10 +186,14 @@ def check_failure(said, error, words):
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"), [([], 0.5), (["--sideways", "0.25"], 0.25), (["--sideways", "None"], None)]
-)
-def test_how_far_sideways_is_passed_on(given, expected, tmp_path, monkeypatch):
-    """As the estimate takes it: 0.5 unless given, none for any way."""
+    ("given", "expected"),
+    [
+        ([], {"sideways": 0.5, "hand_std": 0.01}), (["--sideways", "0.25"], {"sideways": 0.25}),
+        (["--sideways", "None"], {"sideways": None}), (["--hand-std", "0.03"], {"hand_std": 0.03}),
+    ],
+)  # fmt: skip
+def test_what_is_known_of_the_hand_is_passed_on(given, expected, tmp_path, monkeypatch):
+    """As the estimate takes it: 0.5 sideways and 1 cm unless given, none for any way."""
     asked = {}
 
     def estimate(case, **options):
@@ -198,7 +202,7 @@ def test_how_far_sideways_is_passed_on(given, expected, tmp_path, monkeypatch):
 
     monkeypatch.setattr(PickCase, "estimate", estimate)
     assert pick(CASE, tmp_path / "out", *given) == 1
-    assert asked["sideways"] == expected
+    assert asked.items() >= expected.items()
 
 
 @pytest.mark.parametrize(
@@ -206,6 +210,7 @@ def test_how_far_sideways_is_passed_on(given, expected, tmp_path, monkeypatch):
     [
         (["--sideways", "far"], "--sideways"),
         (["--sideways", "0"], "sideways"),
+        (["--hand-std", "-1"], "hand_std"),
         (["--candidates", "six"], "--candidates"),
         (["--candidates", "6"], "--candidates"),
         (["--candidates", "6x-1"], "--candidates"),

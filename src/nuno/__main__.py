@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from nuno import __version__
 from nuno.errors import EstimationError, NunoError, SimulationDiverged
 from nuno.estimate.capture_options import add_capture
-from nuno.estimate.lift_prior import SIDEWAYS
+from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 
 if TYPE_CHECKING:
     from nuno.robot.simulated_robot import SimulatedRobot
@@ -42,6 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="auto (default) takes a rectangular cloth as a rectangle, any other by its outline; outline: any as it is",
     )  # fmt: skip
     pick.add_argument("--spacing", type=float, metavar="M", help="of candidates on an outline [m] (default: about 40)")
+    pick.add_argument(
+        "--hand-std", metavar="M", type=float, default=HAND_STD,
+        help="[m] standard deviation of where the hand is, along each axis (default %(default)s)",
+    )  # fmt: skip
     fold = commands.add_parser("fold", help="how does a cloth lie that hands have folded? from a video and their paths")
     fold.add_argument("case", metavar="CASE_DIR", help="folder with input.json and the images that its frames name")
     fold.add_argument("--out", required=True, metavar="DIR", help="where result.json, masks, pictures and replay go")
@@ -154,8 +158,8 @@ def _pick(options: argparse.Namespace) -> int:
     _start_warp()
     grid = (int(parts[0]), int(parts[1]))
     result = case.estimate(
-        candidates=grid, sideways=sideways, shape=options.shape, spacing=options.spacing, device=options.device,
-        engine=options.engine, progress=options.progress,
+        candidates=grid, sideways=sideways, hand_std=options.hand_std, shape=options.shape, spacing=options.spacing,
+        device=options.device, engine=options.engine, progress=options.progress,
     )  # fmt: skip
     result.save(options.out)
     a, b = result.best

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from nuno.estimate.doubt import BAD_SHARE, BADLY, WARNED_SHARE, WELL, doubted, misfit, oddities, share_of_doubt
+from nuno.estimate.doubt import (
+    BAD_SHARE,
+    BADLY,
+    WARNED_SHARE,
+    WELL,
+    doubted,
+    misfit,
+    oddities,
+    share_of_doubt,
+)
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import Comparison, rank
 

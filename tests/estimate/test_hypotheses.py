@@ -13,7 +13,7 @@ def test_no_guess_is_made_twice() -> None:
 
 
 def test_guesses_reach_from_limp_to_stiff() -> None:
-    """From 1e-6 N m, limper than any measured fabric, to 5e-3 N m, a thick place mat; the first stage has a stiff one."""
+    """From 1e-6 N m, limper than measured fabrics, to 5e-3 N m, a thick place mat; one is stiff in the first stage."""
     rigidities = [guess.bending_rigidity for stage in DISCRETISATIONS for guess in stage.hypotheses]
     assert min(rigidities) == 1e-6 and max(rigidities) == 5e-3
     assert max(guess.bending_rigidity for guess in DISCRETISATIONS[0].hypotheses) >= 2e-3

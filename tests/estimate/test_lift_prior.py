@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nuno.camera.rectangle import ClothRectangle
-from nuno.estimate.lift_prior import LOWEST, log_prior_of_lift
+from nuno.estimate.lift_prior import LOWEST, TOUCH, log_prior_of_lift, log_prior_of_start
 
 TOP = 0.72  # [m]
 
@@ -53,3 +53,16 @@ def test_a_hand_that_is_low_counts_as_at_the_lowest(up):
     """Dragged over the table, or hung over its edge: the scale is not below that of a lift of 0.2 m."""
     found = log_prior_of_lift(rectangle(), [(0.5, 0.5)], (0.3 + 0.1, 0.2, TOP + up), 0.5)
     assert found[0] == pytest.approx(-2 * np.log(2.0), rel=1e-12)
+
+
+def test_where_a_path_begins_tells_the_point():
+    """At the cloth it is known to the hand's deviation, the density's scale there; higher up the lift's prior holds."""
+    uv = [(0.0, 0.0), (1.0, 0.0)]
+    touched = log_prior_of_start(rectangle(), uv, (0.0, 0.0, TOP), 0.03)
+    np.testing.assert_allclose(touched, (0.0, -2.0 * np.log1p((0.6 / 0.03) ** 2)), rtol=1e-12)
+    np.testing.assert_allclose(
+        log_prior_of_start(rectangle(), uv, (0.0, 0.0, TOP), 0.0)[1], -2.0 * np.log1p((0.6 / TOUCH) ** 2)
+    )
+    high = log_prior_of_start(rectangle(), uv, (0.0, 0.0, TOP + 0.4), 0.0)
+    # hypot(0.2, TOUCH) is 0.2 to 0.13 %
+    np.testing.assert_allclose(high, log_prior_of_lift(rectangle(), uv, (0.0, 0.0, TOP + 0.4), 0.5), rtol=3e-3)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nuno.estimate.ranking import Comparison, Ranked, confidence, probabilities, rank
+from nuno.estimate.ranking import Comparison, Ranked, confidence, probabilities, rank, tempered
 
 
 def looked_at(candidates, chamfer):
@@ -88,3 +88,15 @@ def test_a_future_that_is_no_number_is_never_the_best():
     for score in ("evidence", "chamfer", "iou", "eq1"):
         assert comparison.error(score)[0, 0, 0] == np.inf and np.isfinite(comparison.error(score)[0, 0, 1])
         assert rank([comparison], score, 2).order[0] == 1
+
+
+def test_probabilities_are_tempered_to_what_is_trusted():
+    """The best one's is what is trusted, the others' order and shares of logarithms stay; what is less sure stays."""
+    scores = np.array((0.0, -1.0, -3.0, -np.inf))
+    plain = np.exp(scores) / np.exp(scores).sum()
+    np.testing.assert_allclose(tempered(scores, 0.9), plain, rtol=1e-12)
+    cooled = tempered(scores, 0.5)
+    assert cooled[0] == pytest.approx(0.5, abs=1e-9) and cooled.sum() == pytest.approx(1.0)
+    ratios = np.log(cooled[:3] / cooled[0])
+    assert ratios[2] / ratios[1] == pytest.approx(3.0) and cooled[3] == 0.0
+    np.testing.assert_allclose(tempered(scores, 0.1), (1 / 3, 1 / 3, 1 / 3, 0.0), atol=1e-4)

@@ -306,8 +306,7 @@ def _labelled(pose: _Pose, camera: Camera, height: float, residual: float, warni
         a, b = pixels[order[1]] - pixels[first], pixels[order[2]] - pixels[first]
         swap = a[0] * b[1] - a[1] * b[0] < 0
         warnings.append(
-            f"{SQUARE}{ahead:.3f} and {behind:.3f} m, are within 2 %: "
-            "i runs to the next corner clockwise in the image"
+            f"{SQUARE}{ahead:.3f} and {behind:.3f} m, are within 2 %: i runs to the next corner clockwise in the image"
         )
     else:
         swap = behind > ahead

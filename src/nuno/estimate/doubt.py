@@ -3,8 +3,8 @@
 Evidence (`nuno.estimate.ranking`) takes it that one of the guesses is right up to chance. Where it is not, three things
 tell so. The answer may hang on a single future: so it is asked for again without the best guess of every candidate, and
 the mean of both probabilities counts. Even the best future may fit badly: the hand, the camera, the table or the cloth
-are not what they are taken for. And a warning may say that what was seen is odd. The last two mix the probabilities with
-broad ones, whose logarithms are a fraction of the evidence's.
+are not what they are taken for. And a warning may say that what was seen is odd. The last two mix the probabilities
+with broad ones, whose logarithms are a fraction of the evidence's.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ BREADTH = 6.0
 
 
 def misfit(comparisons: Sequence[Comparison], candidate: int) -> float:
-    """Return -log likelihood of the silhouette of the future of a candidate that fits best, its pose's prior left out."""
+    """Return -log likelihood of the silhouette of a candidate's best future, its pose's prior left out."""
     found = [np.inf]
     for comparison in comparisons:
         at = comparison.candidates == candidate
-        error = CONTOUR_WEIGHT * np.log1p(comparison.chamfer[..., at]) + OVERLAP_WEIGHT * (1.0 - comparison.iou[..., at])
+        chamfer, missed = comparison.chamfer[..., at], 1.0 - comparison.iou[..., at]
+        error = CONTOUR_WEIGHT * np.log1p(chamfer) + OVERLAP_WEIGHT * missed
         error = np.where(comparison.finite[:, at], error, np.inf)
         found.append(float(error.min(initial=np.inf)))
     return min(found)
@@ -56,7 +57,8 @@ def oddities(comparisons: Sequence[Comparison], candidate: int, score: str, gues
     if guess.mistake != 0.0:
         return (
             f"the image after looks as if the hand were {100.0 * abs(guess.mistake):.0f} cm "
-            f"{'higher' if guess.mistake > 0.0 else 'lower'} than it is told to be: are hand, camera and table_height right?",
+            f"{'higher' if guess.mistake > 0.0 else 'lower'} than it is told to be: are hand, camera and table_height "
+            "right?",
         )
     if misfit(comparisons, candidate) < POORLY:
         return ()

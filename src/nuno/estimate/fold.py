@@ -195,8 +195,8 @@ def replay_fold(
     drawn = _in_pieces(vertices, faces, camera, spheres, scene)
     if real and scores[list(named)[best]] < LOW_MEAN:
         warnings.append(
-            f"even the best material, {list(named)[best]}, agrees with the video by {max(scores.values()):.2f} only in the "
-            "mean: materials= takes others; are the hands' paths, the camera and the table right?"
+            f"even the best material, {list(named)[best]}, agrees with the video by {scores[list(named)[best]]:.2f} "
+            "only, in the mean: materials= takes others; are the hands' paths, the camera and the table right?"
         )
     low = [k for k, value in agreements[best].items() if value < LOW_AGREEMENT]
     if low:

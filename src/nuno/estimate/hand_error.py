@@ -1,7 +1,7 @@
 """Where the hand may be instead of where it is told, and how likely: a measured hand is off by a centimetre or so.
 
-A cloth in a hand that is elsewhere is seen elsewhere, so a future is compared where it was imagined and where it is once
-it is moved along with the hand, across the view and up or down; along the line of sight hardly anything would change.
+A cloth in a hand that is elsewhere is seen elsewhere, so a future is compared where it was imagined and where it is
+once it is moved along with the hand, across the view and up or down; along the line of sight little would change.
 The same holds to first order for a camera that looks a little aside and for a table of another height, so these shifts
 stand for such errors too. An error of a few centimetres, such as that of a table measured wrongly, is not expected, but
 known to happen. How much of the cloth is lifted changes with it, so it is imagined: some guesses
@@ -17,8 +17,6 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.estimate.rotations import log_prior
 
-HAND_STD = 0.01
-"""[m] Standard deviation of where a hand is, along each axis, where it is not told."""
 STEP = 1.5
 """Shifts by so many standard deviations are looked at."""
 GROSS = 0.05

@@ -21,6 +21,8 @@ SIDEWAYS = 0.5
 """Of the way up: half of all hands are taken to go no farther sideways."""
 LOWEST = 0.2
 """[m] A hand that is not as high counts as if it were: who drags a cloth over the table does not lift it."""
+HAND_STD = 0.01
+"""[m] Standard deviation of where a hand is, along each axis, where it is not told."""
 TOUCH = 0.01
 """[m] Where a path begins tells no better than this where the cloth was touched."""
 

@@ -17,10 +17,9 @@ from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.compile_ahead import compile_ahead
 from nuno.estimate.futures import LIFT_SECONDS
-from nuno.estimate.hand_error import HAND_STD
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
-from nuno.estimate.lift_prior import SIDEWAYS
+from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.estimate.outline_candidates import with_outline_candidates
 from nuno.estimate.outline_or_rectangle import SHAPES
 from nuno.estimate.pick_images import PickImages, find_cloth_before, read_images
@@ -120,12 +119,12 @@ def estimate_pick(
             candidates along it and inside, labelled by their positions [m] along the longer and shorter side of the
             smallest rectangle around it, from that one's corner C00 (docs/picks.md).
         spacing: Of an outline's candidates [m]; None gives about 40 of them.
-        hand_std: Standard deviation of where the hand is, along each axis [m]. Futures are compared as if it were there,
-            too (`nuno.estimate.hand_error`), and a few of them are imagined so.
-        hand_path: (k, 3) where the hand went [m], at even times from when it held the cloth on, to ``hand``, which took
-            it ``lift_seconds``; or a `nuno.HandPath`, of which the last hold counts. It replaces the guesses that the hand went
-            straight, or up first and sideways then, and the prior of the lift: where it began is where the picked
-            point lay, up to ``hand_std`` and to how high it was then.
+        hand_std: Standard deviation of where the hand is, along each axis [m]. Futures are compared as if it were
+            elsewhere, too (`nuno.estimate.hand_error`), and a few of them are imagined so.
+        hand_path: (k, 3) where the hand went [m], at even times from when it held the cloth on, to ``hand``, which
+            took it ``lift_seconds``; or a `nuno.HandPath`, of which the last hold counts. It replaces the guesses that
+            the hand went straight, or up first and sideways then, and the prior of the lift: where it began is where
+            the picked point lay, up to ``hand_std`` and to how high it was then.
         score: What ranks: "evidence" of silhouette and pattern, "silhouette" alone, "chamfer", "iou" or "eq1" (see
             `nuno.estimate.ranking`).
         device: "auto", "cpu", "cuda:0" ...
@@ -185,9 +184,10 @@ def _result(
     futures, best_index = trials.batches[batch].whole(world)
     stages.end("compare")
     return PickResult(
-        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1, likely=ranked.likely,
-        rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(), futures=futures,
-        best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks, real=seen.silhouette,
-        image_before=images.before, image_after=images.after, mask_before=images.mask_before, mask_after=seen.mask,
-        seen_warnings=(*seen.warnings, *trials.warnings), sideways=settings.sideways if settings.with_evidence else None,
+        labels=settings.labels, order=ranked.order, scores=ranked.scores, score_name=ranked.name, eq1=ranked.eq1,
+        trusted=trials.trusted, rectangle=rectangle, camera=settings.camera, grid=settings.grid, seconds=stages.total(),
+        futures=futures, best_index=best_index, turn=float(settings.poses.turns[turn]), hand=settings.hand, masks=masks,
+        real=seen.silhouette, image_before=images.before, image_after=images.after, mask_before=images.mask_before,
+        mask_after=seen.mask, seen_warnings=(*seen.warnings, *trials.warnings),
+        sideways=settings.sideways if settings.with_evidence else None,
     )  # fmt: skip

@@ -90,9 +90,10 @@ def find_cloth_before(
     if images.mask_before is None and (rectangle is None or images.mask_after is None):
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
-        images = replace(images, mask_before=segment_before(images.before, camera, table, hint=hint, template=template))
+        found = segment_before(images.before, camera, table, hint=hint, template=template)
+        images = replace(images, mask_before=found)
         if hint is None and template is None and rectangle is None:
-            other = other_cloth(images.before, images.mask_before, camera, table)
+            other = other_cloth(images.before, found, camera, table)
     if rectangle is None:
         assert images.mask_before is not None
         over = border_warning(images.mask_before, camera, table)
@@ -101,8 +102,8 @@ def find_cloth_before(
             rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
         except EstimationError as error:
             raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
-        found = tuple(warning for warning in (over, other) if warning is not None)
-        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *found))
+        odd = tuple(warning for warning in (over, other) if warning is not None)
+        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *odd))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
     return images, rectangle
@@ -110,7 +111,7 @@ def find_cloth_before(
 
 def border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:
     """Return a warning where the outline of a mask (h, w) runs along the table's border: the cloth goes on there."""
-    if table.half_extents is None:
+    if table.half_extents is None or not mask.any():
         return None
     outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     outline = np.concatenate(outlines)[:, 0].astype(float)

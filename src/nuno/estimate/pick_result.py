@@ -13,7 +13,7 @@ import numpy as np
 from nuno.camera.camera import Camera
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
-from nuno.estimate.ranking import confidence, probabilities
+from nuno.estimate.ranking import confidence, probabilities, tempered
 from nuno.estimate.rotations import turn
 from nuno.estimate.similarity import Silhouette
 from nuno.files.html_table import html_table
@@ -58,8 +58,7 @@ class PickResult:
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
         seen_warnings: What was odd about how it was seen.
-        likely: (k,) float by candidate, how likely each is as far as the evidence may be trusted
-            (`nuno.estimate.doubt`); None: as the scores say.
+        trusted: No candidate is likelier than this, however sure the evidence is (`nuno.estimate.doubt`).
         sideways: Of the prior of the lift that is in scores of evidence (`nuno.estimate.lift_prior`); None is no prior.
     """
 
@@ -83,7 +82,7 @@ class PickResult:
     mask_before: np.ndarray | None = field(default=None, repr=False)
     mask_after: np.ndarray | None = field(default=None, repr=False)
     seen_warnings: tuple[str, ...] = ()
-    likely: np.ndarray | None = None
+    trusted: float = 1.0
     sideways: float | None = None
 
     def __repr__(self) -> str:
@@ -131,13 +130,14 @@ class PickResult:
         Other scores tell no probability: there it is how much worse the second is, see
         `nuno.estimate.ranking.confidence`.
         """
-        likely = self.likely
-        return confidence(self.score_name, self.scores) if likely is None else float(likely[self.order[0]])
+        likely = self.probabilities
+        return confidence(self.score_name, self.scores) if likely is None else float(likely.max())
 
     @property
     def probabilities(self) -> np.ndarray | None:
         """(k,) float by candidate, how likely each is; None where something else than evidence ranks."""
-        return probabilities(self.score_name, self.scores) if self.likely is None else self.likely
+        likely = probabilities(self.score_name, self.scores)
+        return None if likely is None else tempered(self.scores, self.trusted)
 
     @cached_property
     def warnings(self) -> list[str]:

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table, table_margin
 from nuno.errors import InvalidInputError
-from nuno.estimate.hand_error import HAND_STD, Poses, poses_of
+from nuno.estimate.hand_error import Poses, poses_of
 from nuno.estimate.hypotheses import Discretisation
 from nuno.estimate.lift_path import checked_path
+from nuno.estimate.lift_prior import HAND_STD
 from nuno.estimate.ranking import EVIDENCE, RANKINGS
 from nuno.estimate.rotations import checked_turns
 from nuno.validation import LONGEST_WAIT, finite_array, number

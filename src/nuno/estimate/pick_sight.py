@@ -20,7 +20,7 @@ from nuno.camera.table import Table
 from nuno.estimate import pattern, similarity
 from nuno.estimate.futures import DRAWN_THICKNESS, Futures
 from nuno.estimate.pattern import Pattern, begin_pattern
-from nuno.estimate.rotations import STILL, Pose, turn, view_of_turned
+from nuno.estimate.rotations import STILL, UNMOVED, Pose, turn, view_of_turned
 from nuno.estimate.similarity import Silhouette, begin_scores
 
 MARGIN = 4
@@ -59,7 +59,7 @@ def score_futures(
     positions = futures.positions
     faces = _on_device(futures.body.faces, wp.vec3i, device)
     finite = futures.finite.ravel()
-    seen = {pose: (camera, real) if coarse is None or pose == Pose() else coarse for pose in poses}
+    seen = {pose: (camera, real) if coarse is None or pose == UNMOVED else coarse for pose in poses}
     regions = regions_of(positions, [view_of_turned(seen[p][0], hand, *p) for p in poses], margin=MARGIN)
     around = dict(zip(poses, regions, strict=True))
     ground = _ground(futures, table, device)
@@ -95,7 +95,7 @@ def _at_each(begin: Callable[[Pose], Callable[[], Scores]], poses: list[Pose], d
         module.load(device)
     with ThreadPoolExecutor(min(cores, len(poses))) as threads:
         # what is not moved takes longest, so it goes first
-        waiting = {p: threads.submit(lambda p: begin(p)(), p) for p in sorted(poses, key=lambda p: p != Pose())}
+        waiting = {p: threads.submit(lambda p: begin(p)(), p) for p in sorted(poses, key=lambda p: p != UNMOVED)}
         return [waiting[pose].result() for pose in poses]
 
 
@@ -145,7 +145,7 @@ def masks_of_turned(
     futures: Futures, worlds: np.ndarray, turns: np.ndarray, camera: Camera, table: Table, hand: ArrayLike,
     shifts: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Masks (k, h, w) bool of some worlds (k,) of a batch, each at a turn (k,) [rad] and shift (k, 3) [m] of its own."""
+    """Masks (k, h, w) bool of worlds (k,) of a batch, each at a turn (k,) [rad] and shift (k, 3) [m] of its own."""
     positions = futures.positions
     moved = np.stack([turn(p, hand, a) for p, a in zip(positions.numpy()[worlds], turns, strict=True)])
     moved = moved if shifts is None else moved + shifts[:, None]
@@ -168,7 +168,7 @@ def _ground(futures: Futures, table: Table, device: Any) -> Ground:
 
 
 def _drawn(
-    positions: wp.array, faces: wp.array, camera: Camera, region: Region, ground: Ground, pose: Pose = Pose(),
+    positions: wp.array, faces: wp.array, camera: Camera, region: Region, ground: Ground, pose: Pose = UNMOVED,
     hand: ArrayLike = STILL,
 ) -> wp.array:  # fmt: skip
     device: Any = positions.device

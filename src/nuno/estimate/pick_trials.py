@@ -35,6 +35,7 @@ class PickTrials:
         ranked: The ranking by all of them.
         seen: The image after.
         warnings: What is odd about how the futures fit.
+        trusted: How likely the best candidate is, as far as the evidence may be trusted.
     """
 
     comparisons: list[Comparison]
@@ -42,6 +43,7 @@ class PickTrials:
     ranked: Ranked
     seen: Seen
     warnings: tuple[str, ...] = ()
+    trusted: float = 1.0
 
     def best_match(self, candidate: int, score: str) -> tuple[int, int, int]:
         """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image."""
@@ -128,7 +130,8 @@ def try_picks(
     odd = oddities(comparisons, best, settings.score, guess)
     told = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
     ranked = doubted(comparisons, settings.score, len(uv), prior, told)
-    return PickTrials(comparisons, batches, ranked, seen, odd)
+    trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
+    return PickTrials(comparisons, batches, ranked, seen, odd, trusted)
 
 
 def _weighed(comparison: Comparison, discretisation: Discretisation) -> Comparison:

@@ -38,6 +38,9 @@ class Pose(NamedTuple):
     shift: tuple[float, float, float] = STILL
 
 
+UNMOVED = Pose()
+
+
 def checked_turns(turns: Sequence[float]) -> np.ndarray:
     """(t,) float [rad], turns to compare at; 0 must be among them.
 
