@@ -58,7 +58,7 @@ def load_scene(
     Args:
         path: Ends with .xml or .mjcf (MJCF, the extra ``mujoco``), .urdf (the extra ``robot``), or .usd, .usda, .usdc
             or .usdz (the extra ``usd``).
-        world: The world to add to, which keeps its own gravity; None makes one with the file's.
+        world: The world to add to, which keeps its own gravity and frame rate; None makes one with the file's.
         keyframe: Of MJCF, the key frame to begin in; None is the model's initial state, or where Nuno saved it.
         fixed_base: Of URDF, whether the root link stands still; otherwise it moves freely.
         package_dirs: Of URDF, folders that ``package://`` names are looked up in; those above the file always are.
@@ -88,8 +88,11 @@ def load_scene(
     if goal is None:
         settings = {} if scene.frame_rate is None else {"frame_rate": scene.frame_rate, "substeps": scene.substeps}
         goal = World(gravity=scene.gravity, **settings)  # type: ignore[arg-type]
-    elif not np.allclose(goal.gravity, scene.gravity, rtol=0.0, atol=1e-6):
-        scene.note("the world keeps its own gravity", f"{tuple(scene.gravity)} m/s2")
+    else:
+        if not np.allclose(goal.gravity, scene.gravity, rtol=0.0, atol=1e-6):
+            scene.note("the world keeps its own gravity", f"{tuple(scene.gravity)} m/s2")
+        if scene.frame_rate is not None and scene.frame_rate != goal.frame_rate:
+            scene.note("the world keeps its own frame rate", f"{scene.frame_rate} 1/s")
     bodies, joints, grips = build_world(scene, goal)
     return LoadedScene(goal, bodies, joints, tuple(grips), report_of(scene, source, "loaded"))
 

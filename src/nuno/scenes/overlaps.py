@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from nuno.robot.coal_shapes import convex, primitive
-from nuno.robot.link_geometry import few_corners
-from nuno.robot.pinocchio import coal
 from nuno.scenes.scene_description import SceneBody
 from nuno.scenes.shape_parts import parts_of
 from nuno.shapes import quaternion as quat
@@ -33,6 +30,10 @@ def overlapping_pairs(bodies: Sequence[SceneBody]) -> Iterator[tuple[str, str]]:
 
 def _solids(body: SceneBody) -> list[tuple[Any, Any]]:
     """Return coal's geometry of each part, and where it is in the world."""
+    from nuno.robot.coal_shapes import convex, primitive
+    from nuno.robot.link_geometry import few_corners
+    from nuno.robot.pinocchio import coal
+
     found = []
     for shape, place, turn in parts_of(body.shape):
         if isinstance(shape, Plane):
@@ -59,4 +60,6 @@ def _bounds(solids: list[tuple[Any, Any]]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _collide(one: tuple[Any, Any], other: tuple[Any, Any]) -> bool:
+    from nuno.robot.pinocchio import coal
+
     return bool(coal.collide(one[0], one[1], other[0], other[1], coal.CollisionRequest(), coal.CollisionResult()))

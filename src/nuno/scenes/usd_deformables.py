@@ -98,7 +98,8 @@ def _material(scene: SceneDescription, stage: UsdStage, prim: Any, name: str, is
             density=density or material.density, youngs_modulus=young or material.youngs_modulus,
             poisson_ratio=ratio, friction=friction,
         )  # fmt: skip
-    thickness = said("surfaceThickness", 0.0) * stage.unit
+    own = np.ravel(stage.value(prim, "physics:thicknesses", []))
+    thickness = (float(own.mean()) if len(own) else said("surfaceThickness", 0.0)) * stage.unit
     contact = said("contactThickness", 0.0) * stage.unit or thickness or float(Cloth.thickness)
     if young <= 0.0 or thickness <= 0.0:
         return Cloth(friction=friction, thickness=contact)

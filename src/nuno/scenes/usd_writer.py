@@ -231,6 +231,9 @@ class UsdWriter:
         bound = material.GetPrim()
         bound.AddAppliedSchema(SURFACE_MATERIAL if body.shape.is_cloth else VOLUME_MATERIAL)
         values = self._elasticity(body)
+        if "thickness" in values:  # of the plate, which AOUSD's proposal keeps with the geometry
+            sim.CreateAttribute("physics:thicknesses", types.FloatArray, False).Set([values.pop("thickness")])
+            sim.CreateAttribute("physics:thicknesses:elementType", types.Token, False).Set("constant")
         for name, value in values.items():
             bound.CreateAttribute(f"physics:{name}", types.Float, False).Set(value)
         usd.UsdShade.MaterialBindingAPI.Apply(sim).Bind(material, materialPurpose="physics")
@@ -250,7 +253,7 @@ class UsdWriter:
             self.scene.note("a cloth is an even plate to USD, with another shear or the mean of its values", body.name)
         return {
             "density": mean_of(material.area_density) / plate.thickness, "youngsModulus": plate.youngs_modulus,
-            "poissonsRatio": plate.poisson_ratio, "surfaceThickness": plate.thickness,
+            "poissonsRatio": plate.poisson_ratio, "thickness": plate.thickness,
             "contactThickness": mean_of(material.thickness),
         }  # fmt: skip
 
