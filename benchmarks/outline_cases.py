@@ -2,18 +2,23 @@
 
 A scene is one flat cloth cut as a garment's front, an L, or a towel with round corners, on one table before one camera.
 Masks only, their edges displaced by smooth noise as in ``generated_cases``. Garments may have both layers, of which the
-upper one is picked.
+upper one is picked. ``python benchmarks/outline_cases.py --help`` tells how well they are estimated.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import logging
+import time
 from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from generated_cases import HAND_RADIUS, REST_HEIGHT, displaced, looking_at
 
-from nuno import Cloth, Path, World, box, cloth_mesh, garment, plane
+from nuno import Cloth, Path, World, box, cloth_mesh, estimate_pick, garment, plane
 from nuno.camera.camera import Camera
 from nuno.camera.table import Table
 from nuno.mesh.triangulated import triangulate
@@ -122,3 +127,47 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
             float(area),
         ))  # fmt: skip
     return cases
+
+
+def judged(case: OutlineCase, device: str) -> dict[str, Any]:
+    """One case's line: how far the answer, the best of three and the nearest candidate are from the truth [m]."""
+    clock = time.process_time()
+    result = estimate_pick(
+        None, None, camera=case.camera, table_height=case.table.height, table_half_extents=case.table.half_extents,
+        table_centre=case.table.centre, hand=case.hand, before_mask=case.mask_before, after_mask=case.mask_after,
+        shape="outline", device=device, progress=False,
+    )  # fmt: skip
+    places = result.rectangle.world_positions(result.fractions)  # type: ignore[attr-defined]
+    away = np.linalg.norm(places - case.picked, axis=1)[result.order]
+    return {
+        "shape": case.shape, "candidates": len(away), "distance": float(away[0]), "of_three": float(away[:3].min()),
+        "nearest": float(away.min()), "rank": int(away.argmin()) + 1, "confidence": result.confidence,
+        "cpu_s": round(time.process_time() - clock, 1),
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Make cases, estimate, print a line of each."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shapes", nargs="+", default=list(SHAPES), choices=SHAPES)
+    parser.add_argument("--picks", type=int, default=4, help="of each shape")
+    parser.add_argument("--seed", type=int, default=9000)
+    parser.add_argument("--layers", type=int, default=1, choices=[1, 2], help="of garments that have two")
+    parser.add_argument("--device", default="cpu")
+    parser.add_argument("--json", type=FilePath)
+    options = parser.parse_args()
+    rows = []
+    for case in generate(tuple(options.shapes), options.picks, options.seed, options.device, options.layers):
+        rows.append(judged(case, options.device))
+        print(rows[-1], flush=True)
+    print({
+        "cases": len(rows), "nearest_first": sum(r["rank"] == 1 for r in rows),
+        "nearest_in_three": sum(r["rank"] <= 3 for r in rows),
+        "median_distance_m": round(float(np.median([r["distance"] for r in rows])), 3),
+    })  # fmt: skip
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
