@@ -1,4 +1,4 @@
-"""Where hinges and sliders are and how fast they go, of one joint or of many at once."""
+"""Positions and rates of hinges and sliders, of one joint or of many at once."""
 
 from __future__ import annotations
 
