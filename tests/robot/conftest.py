@@ -49,3 +49,21 @@ def simulated(links):
     yield robot
     robot.world.stop()
     robot.leave()
+
+
+@pytest.fixture(scope="module")
+def floor_world():
+    """A world with a floor and a standing Talos with dynamics, as it is after 0.3 s; whoever uses it restores it."""
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="floor"))
+    robot = SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
+    robot.sleep(0.3)
+    return world, robot, world.save()
+
+
+@pytest.fixture
+def standing(floor_world):
+    """The world and the robot of ``floor_world``, as they were."""
+    world, robot, saved = floor_world
+    world.restore(saved)
+    return world, robot

@@ -12,24 +12,6 @@ HAND = ("arm_right_7_link", "gripper_right_fingertip_1_link", "gripper_right_fin
 SOLES = {"leg_left_6_link", "leg_right_6_link"}
 
 
-@pytest.fixture(scope="module")
-def floor_world():
-    """A world with a floor and a standing Talos, as it is after 0.3 s; whoever uses it restores it."""
-    world = nuno.World(device="cpu")
-    world.add(nuno.plane(name="floor"))
-    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
-    robot.sleep(0.3)
-    return world, robot, world.save()
-
-
-@pytest.fixture
-def standing(floor_world):
-    """The world and the robot of ``floor_world``, as they were."""
-    world, robot, saved = floor_world
-    world.restore(saved)
-    return world, robot
-
-
 def lower_hand(robot, angle=0.5):
     """Send the right hand down by the elbow, and wait until it rests on what is there."""
     k = robot.actual.joint_index(ELBOW)
@@ -149,14 +131,17 @@ def test_zero_moment_point_of_contacts_is_that_of_inverse_dynamics(standing):
     np.testing.assert_allclose(robot.read().zero_moment_point, centre[:2], atol=1e-3)
 
 
-def feels_alike(world, robot, seconds):
-    """Assert that copies in imagined worlds feel what the robot does after some seconds, bit for bit."""
+def felt_by_copies(world, seconds):
+    """Let some seconds pass; return what the joints of two imagined copies then bear, and what the table does to them.
+
+    Returns:
+        (2, n, 6) [N, N m] and (2, 3) [N].
+    """
     futures = world.imagine(2)
     futures.run(seconds)
     world.run(seconds)
-    for copy in futures.robot.state():
-        np.testing.assert_array_equal(copy.joint_wrenches, robot.state().joint_wrenches)
-        np.testing.assert_array_equal(by_table(copy), by_table(robot.state()))
+    states = futures.robot.state()
+    return [state.joint_wrenches for state in states], [by_table(state) for state in states]
 
 
 def test_feelings_are_restored_and_imagined(standing):
@@ -165,7 +150,9 @@ def test_feelings_are_restored_and_imagined(standing):
     world.add(table_under(robot))
     lower_hand(robot)
     told, state, saved = robot.read(), robot.state(), world.save()
-    feels_alike(world, robot, 0.05)
+    wrenches, forces = felt_by_copies(world, 0.05)
+    np.testing.assert_array_equal(wrenches, [robot.state().joint_wrenches] * 2)
+    np.testing.assert_array_equal(forces, [by_table(robot.state())] * 2)
     world.restore(saved)
     np.testing.assert_array_equal(robot.state().joint_wrenches, state.joint_wrenches)
     for name, wrench in told.wrenches.items():
@@ -186,4 +173,6 @@ def test_a_copy_whose_hand_presses_a_table_keeps_the_bits(standing):
     world, robot = standing
     world.add(table_under(robot))
     lower_hand(robot)
-    feels_alike(world, robot, 0.5)
+    wrenches, forces = felt_by_copies(world, 0.5)
+    np.testing.assert_array_equal(wrenches, [robot.state().joint_wrenches] * 2)
+    np.testing.assert_array_equal(forces, [by_table(robot.state())] * 2)

@@ -29,24 +29,6 @@ def robot_in(world, name="talos", **options):
     return nuno.SimulatedRobot(nuno.Humanoid(name), world, dynamics=True, **options)
 
 
-@pytest.fixture(scope="module")
-def floor_world():
-    """A world with a floor and a standing Talos, as it is after 0.3 s; whoever uses it restores it."""
-    world = nuno.World(device="cpu")
-    world.add(nuno.plane(name="floor"))
-    robot = robot_in(world)
-    robot.sleep(0.3)
-    return world, robot, world.save()
-
-
-@pytest.fixture
-def standing(floor_world):
-    """The world and the robot of ``floor_world``, as they were."""
-    world, robot, saved = floor_world
-    world.restore(saved)
-    return world, robot
-
-
 def momentum(robot):
     """Linear and angular momentum (6,) about the centre of mass, by Pinocchio."""
     state, model = robot.state(), robot.actual.model

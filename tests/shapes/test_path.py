@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from nuno import InvalidInputError, Path
+from nuno.shapes import quaternion as quat
 
 EXACT = 1e-12  # a few roundings of float64 at lengths of about 1
 
@@ -63,3 +64,12 @@ def test_bad_paths(arguments):
     """Times that do not increase, values that are not finite, shapes that do not fit."""
     with pytest.raises(InvalidInputError):
         Path(*arguments)
+
+
+def test_at_its_ends_a_turn_keeps_the_bits():
+    """Slerp at 0 and at 1 as a number, which needs no sines, is that of an array of such: also of equal and opposite."""
+    random = np.random.default_rng(0)
+    a, b = (part / np.linalg.norm(part, axis=1, keepdims=True) for part in random.normal(size=(2, 300, 4)))
+    b[:30], b[30:60] = a[:30], -a[30:60]
+    for end in (0.0, 1.0):
+        np.testing.assert_array_equal(quat.slerp(a, b, np.array(end)), quat.slerp(a, b, np.full(300, end)))

@@ -20,6 +20,7 @@ from nuno.joints.joint_drives import (
     motor_drives,
     spring_drives,
 )
+from nuno.joints.joint_motion import positions_of, velocities_of
 from nuno.materials import Rigid
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose
@@ -92,13 +93,11 @@ class Joint(Grip):
         """
         with self._live().lock:
             pose, other = self._poses()
+            if self.kind in ("hinge", "slider"):
+                return self._given(positions_of(self.kind == "slider", pose, other))
             turn = quat.multiply(quat.inverse(other[1]), pose[1])
             turn = np.where(turn[:, :1] < 0.0, -turn, turn)
-            if self.kind == "hinge":
-                found = 2.0 * np.arctan2(turn[:, 3], turn[:, 0])
-            elif self.kind == "slider":
-                found = quat.rotate(quat.inverse(other[1]), pose[0] - other[0])[:, 2]
-            elif self.kind == "ball":
+            if self.kind == "ball":
                 sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
                 angle = 2.0 * np.arctan2(sine, turn[:, :1])
                 local = turn[:, 1:] * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
@@ -117,13 +116,11 @@ class Joint(Grip):
         with self._live().lock:
             pose, other = self._poses()
             own, others = self._motion(self.body, pose[0]), self._motion(self.target, pose[0])
-            axis = quat.rotate(other[1], np.broadcast_to((0.0, 0.0, 1.0), pose[0].shape))
             if self.kind == "ball":
                 return self._given(own[1] - others[1])
             if self.kind == "fixed":
-                return self._given(np.zeros(len(axis)))
-            k = 1 if self.kind == "hinge" else 0
-            return self._given(np.einsum("wx,wx->w", own[k] - others[k], axis))
+                return self._given(np.zeros(len(pose[0])))
+            return self._given(velocities_of(self.kind == "slider", own[0] - others[0], own[1] - others[1], other))
 
     @property
     def effort(self) -> Any:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.robot.link_batch import LinkBatch
+from nuno.robot.motion_batch import MotionBatch
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.robot_state import RobotState
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
@@ -70,6 +71,7 @@ class ImaginedRobot:
             own.gait.looks = self._guards[k].velocities_of(own)
         self._before = self._states
         self._batch = LinkBatch(original.links, world, self._links)
+        self._together = MotionBatch(original.actual, self._motions, self._guards)
 
     def __repr__(self) -> str:
         return f"<ImaginedRobot {self.original.actual.name!r} in {self.world.world_count} worlds>"
@@ -138,6 +140,7 @@ class ImaginedRobot:
         """Send each world's joints through angles (worlds, k, n), each of which takes a span (k,) [s]."""
         if self._servo is not None or any(own.gait.is_walking for own in self._motions):
             raise BodyStateError(f"{self.original.actual.name!r} walks or is under a servo command there")
+        self._together.bring()
         shortest = self.original.angle_vector_duration
         for own, begin, goals in zip(self._motions, self._present(), wanted, strict=True):
             steps = np.array([self.original.sub_angle_vector(b, a) for a, b in pairwise((begin, *goals))])
@@ -157,6 +160,7 @@ class ImaginedRobot:
         """Return of one world what ``SimulatedRobot.saved`` does of the robot."""
         if not 0 <= world < len(self._motions):
             raise InvalidInputError(f"world must be in 0 to {len(self._motions) - 1}, got {world}")
+        self._together.bring()
         found = self._guards[world].save() if self._guards else None
         return self._states[world], self._motions[world].save(), self._servo, found
 
@@ -168,34 +172,28 @@ class ImaginedRobot:
             return
         span, self._before = end - start, list(self._states)
         servo = None if self.balance is not None or self._servo is None else self._serve
-        if span > 0.0:
-            for guard, own in zip(self._guards, self._motions, strict=False):
-                guard.before_frame(own, span)
-        aims = [own.begin(end, span, servo) for own in self._motions]
-        if span <= 0.0:
+        if self.balance is None:
+            aims, angles = self._together.begin(end, span, servo)
+            if span > 0.0:
+                if not all(np.array_equal(a.q, b.q) for a, b in zip(aims, self._states, strict=True)):
+                    self._batch.lead(start, end, [aim.q for aim in aims], angles)
+                self._states = list(aims)
             return
-        if self.balance is not None:
+        aims = [own.begin(end, span, servo) for own in self._motions]
+        if span > 0.0:
             told = [
                 self.balance.command(state, aim, span, self._servo)
                 for state, aim in zip(self._states, aims, strict=True)
             ]
             self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
             self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
-            return
-        moved = not all(np.array_equal(aim.q, before.q) for aim, before in zip(aims, self._states, strict=True))
-        if moved:
-            configurations = [aim.q for aim in aims]
-            self._batch.lead(start, end, configurations, np.array([own.robot._angles for own in self._motions]))
-        self._states = aims
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
         if not self._is_whole():
             return
         if self.balance is None:
-            for own in self._motions:
-                own.joints.take_step()
-                own.gait.end_frame()
+            self._together.end()
             self._states = [
                 state if guard.met is None else replace(state, collision=guard.met)
                 for guard, state in zip(self._guards, self._states, strict=True)
@@ -214,6 +212,9 @@ class ImaginedRobot:
     def cancel_frame(self) -> None:
         """Go back to where the robot was when the frame began."""
         self._states = list(self._before)
+        if self.balance is None:
+            self._together.cancel()
+            return
         for own in self._motions:
             own.cancel()
 
@@ -221,12 +222,14 @@ class ImaginedRobot:
         """Return all that it is, for a snapshot."""
         joints = () if self.balance is None else self.balance.dynamics.save()
         found = [guard.save() for guard in self._guards]
+        self._together.bring()
         return list(self._states), [own.save() for own in self._motions], joints, self._servo, found
 
     def load(self, saved: Any) -> None:
         """Become what it was when a snapshot was taken."""
         states, motions, joints, self._servo, found = saved
         self._states = list(states)
+        self._together.forget()
         for own, motion in zip(self._motions, motions, strict=True):
             own.load(motion)
         for guard, own in zip(self._guards, found, strict=True):

@@ -12,6 +12,7 @@ from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import Motor, Spring
+from nuno.joints.joint_motion import positions_of, velocities_of
 from nuno.materials import Rigid
 from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
 from nuno.robot.pinocchio import pin
@@ -204,21 +205,16 @@ class LinkDynamics:
             np.stack([getattr(spec, name) for spec in specs], axis=1)
             for name in ("place", "turn", "other_place", "other_turn")
         )
-        its = quat.multiply(turns[:, other], other_turn)
-        point = places[:, own] + quat.rotate(turns[:, own], place)
-        other_point = places[:, other] + quat.rotate(turns[:, other], other_place)
-        axis = quat.rotate(its, np.broadcast_to((0.0, 0.0, 1.0), point.shape))
-        across = quat.multiply(quat.inverse(its), quat.multiply(turns[:, own], turn))
-        across = np.where(across[..., :1] < 0.0, -across, across)
-        slides = np.array([spec.kind == "slider" for spec in specs])
-        along = quat.rotate(quat.inverse(its), point - other_point)[..., 2]
-        speed = (
-            velocities[:, own] + np.cross(spins[:, own], point - places[:, own])
-            - velocities[:, other] - np.cross(spins[:, other], point - places[:, other])
+        frame = (places[:, own] + quat.rotate(turns[:, own], place), quat.multiply(turns[:, own], turn))
+        its = (
+            places[:, other] + quat.rotate(turns[:, other], other_place), quat.multiply(turns[:, other], other_turn)
         )  # fmt: skip
-        motion = np.where(slides[:, None], speed, spins[:, own] - spins[:, other])
-        angles = np.where(slides, along, 2.0 * np.arctan2(across[..., 3], across[..., 0]))
-        return angles, np.einsum("wkx,wkx->wk", motion, axis)
+        slides, spin = np.array([spec.kind == "slider" for spec in specs]), spins[:, own] - spins[:, other]
+        speed = (
+            velocities[:, own] + np.cross(spins[:, own], frame[0] - places[:, own])
+            - velocities[:, other] - np.cross(spins[:, other], frame[0] - places[:, other])
+        )  # fmt: skip
+        return positions_of(slides, frame, its), velocities_of(slides, speed, spin, its)
 
     def felt(self, span: float) -> tuple[list[Contacts], np.ndarray, np.ndarray]:
         """Return what touched links, what joints bore, and what their motors did over the last frame.

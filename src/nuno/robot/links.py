@@ -115,7 +115,7 @@ class Links:
         if self._turned_by_all.shape[0] != worlds * len(joints):
             self._turned_by_all = np.tile(self._turned_by, (worlds, 1, 1))
         offsets = np.broadcast_to(self.finger_bodies.offset(self._offsets, angles), (worlds, len(joints), 3))
-        # one long list, of matrices that lie column by column as Pinocchio's do: otherwise einsum would round otherwise
+        # one long list, of matrices that lie column by column as Pinocchio's do: einsum rounds others in another way
         by_column, own_origins, turns = (
             part[:, joints].reshape(-1, *part.shape[2:])
             for part in (np.swapaxes(axes, -1, -2), origins, quaternions_of(axes)[..., [3, 0, 1, 2]])

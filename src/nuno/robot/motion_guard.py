@@ -121,14 +121,9 @@ class MotionGuard:
             span: [s] of the frame that comes.
         """
         joints, gait = motion.joints, motion.gait
-        if joints.commands == self._rests_since or self.mode == "ignore":
+        if not self.is_due(motion, joints.clock, span):
             return
-        key = (joints.commands, gait.walk, self._shapes().key())
-        if self._key is SAME:
-            self._key = key
-        at = joints.clock + span - SOON
-        if key == self._key and at <= self._until and at <= self._acts:
-            return
+        key, at = (joints.commands, gait.walk, self._shapes().key()), joints.clock + span - SOON
         if gait.walk is None and joints.is_resting:
             self._rests_since = joints.commands
             return
@@ -137,6 +132,22 @@ class MotionGuard:
             self._key = (joints.commands, gait.walk, key[2])
         if joints.clock + span > self._acts + SOON:
             self._stop(motion)
+
+    def is_due(self, motion: WantedMotion, clock: float, span: float) -> bool:
+        """Return True if ``before_frame`` has anything to do.
+
+        Args:
+            motion: What the robot is asked to do.
+            clock: That of its joints [s].
+            span: [s] of the frame that comes.
+        """
+        commands = motion.joints.commands
+        if commands == self._rests_since or self.mode == "ignore":
+            return False
+        key, at = (commands, motion.gait.walk, self._shapes().key()), clock + span - SOON
+        if self._key is SAME:
+            self._key = key
+        return bool(key != self._key or at > self._until or at > self._acts)
 
     def after_step(self, motion: WantedMotion, before: np.ndarray) -> Collision | None:
         """Return what the links run into in a frame that nobody could look ahead to, None for nothing.

@@ -72,6 +72,11 @@ class SimulatedJoints:
             return False
         return bool((self.desired[0] == self.positions).all()) and not self.velocities.any()
 
+    @property
+    def followed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the polynomials (6, 3, n) that the joints follow, with derivatives, and since when (n,) [s]."""
+        return self._polynomials, self._begin
+
     def ahead(self, times: np.ndarray, given: np.ndarray | None = None, rows: Any = ()) -> np.ndarray:
         """Return where the joints will be (k, n) at times (k,) [s] from now on, evenly spaced; nothing changes.
 

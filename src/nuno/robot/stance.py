@@ -27,6 +27,9 @@ class Stance:
 
     Args:
         robot: The robot; of one without legs the base stays.
+
+    Attributes:
+        rows: Joints of all legs, (k,): while they rest the base stays.
     """
 
     def __init__(self, robot: Humanoid) -> None:
@@ -34,6 +37,7 @@ class Stance:
         frames = [robot.frame_index(foot) for foot in robot.description.feet]
         joints = [int(model.frames[frame].parentJoint) for frame in frames]
         self._rows = [np.array([j - 2 for j in model.supports[joint] if j >= 2], dtype=int) for joint in joints]
+        self.rows = np.unique(np.concatenate([np.zeros(0, dtype=int), *self._rows]))
         self._placements = [model.frames[frame].placement.copy() for frame in frames]
         # Pinocchio's own: where the soles are now, and how the feet would move with a base that rests
         self._soles = [robot.data.oMf[frame] for frame in frames]

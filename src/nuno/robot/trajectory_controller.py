@@ -89,6 +89,16 @@ class TrajectoryController:
         """Return True if a goal is under way."""
         return self.goal is not None and not self.goal.is_done
 
+    @property
+    def next_event(self) -> float:
+        """Until when [s] no other polynomial is due and no goal can end, so that nobody need ask at every frame."""
+        if self.is_busy and self.tolerances.path:
+            return -np.inf
+        earliest = np.inf if self._next is None else self._next[1]
+        if self._spline is not None:
+            earliest = min(earliest, self.piece.end, self._spline.end if self.is_busy else np.inf)
+        return float(earliest - 2.0 * SOON)
+
     def accept(
         self, trajectory: JointTrajectory, now: float, start_time: float = 0.0, tolerances: Tolerances | None = None
     ) -> Goal:

@@ -47,6 +47,16 @@ class WantedMotion:
         self.aim = RobotState(time, robot.configuration(), nothing, nothing)
         self._kept: tuple[Any, ...] | None = None  # what it was when the frame began
 
+    @property
+    def leg_rows(self) -> np.ndarray:
+        """Joints that move the base, (k,), where the feet stay on the ground."""
+        return self.stance.rows
+
+    def take(self, state: RobotState) -> None:
+        """Be how a state says, whose joints ``joints`` has already: as after a frame in which no leg moved."""
+        self.aim = state
+        self.robot.move_to(self.joints.positions)
+
     def begin(self, end: float, span: float, servo: Servo | None = None) -> RobotState:
         """Return how the robot is to move at a time ``end`` [s], ``span`` [s] from now; ``end_frame`` takes that."""
         before, robot = self.aim, self.robot

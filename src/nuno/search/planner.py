@@ -73,7 +73,8 @@ def plan(
         bounds: Lowest and highest knots, each a number, (d,) or (k, d); None is none.
         seed: Of the samples.
         device: Where futures run; None is where the world runs.
-        thorough: As of ``World.imagine``; without, fast motions are imagined in less time, and less truly.
+        thorough: As of ``World.imagine``; without, fast motions are imagined in less time, and less
+            truly: the world itself goes through fast frames twice, and ends elsewhere.
 
     Raises:
         InvalidInputError: an argument out of range, or costs of another shape.

@@ -56,7 +56,14 @@ class PathBatch:
         """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path.keys_around`` says of times."""
         first, last, s = between
         a, b, turns = self.positions[..., first, :], self.positions[..., last, :], self.quaternions
-        return a + s[..., None] * (b - a), quat.slerp(turns[..., first, :], turns[..., last, :], s)
+        placed = a + s[..., None] * (b - a)
+        if turns.ndim < 4 or s.ndim == 0:
+            return placed, quat.slerp(turns[..., first, :], turns[..., last, :], s)
+        # of many worlds one instant after the other: most are at a key, where there is nothing to interpolate
+        turned = np.empty((*placed.shape[:-1], 4))
+        for k, part in enumerate(s):
+            turned[..., k, :] = quat.slerp(turns[..., first[k], :], turns[..., last[k], :], part)
+        return placed, turned
 
 
 class KinematicGroup:

@@ -48,7 +48,7 @@ LONGEST = 3600.0
 """[s] The longest time that a client may ask for at once."""
 
 
-Pace = float | None
+RealTimeFactor = float | None
 """Simulated over real time; infinite where nothing waits."""
 
 
@@ -86,7 +86,7 @@ class RobotServer:
     @checked
     def __init__(
         self, robot: RobotInterface, host: str = "127.0.0.1", port: int = 9090, *,
-        real_time_factor: Pace = 1.0, names: Names | None = None, max_message: int = 2**23,
+        real_time_factor: RealTimeFactor = 1.0, names: Names | None = None, max_message: int = 2**23,
         alive: float = 20.0, tick: float | None = None, origins: tuple[str, ...] = (), image_rate: float = 10.0,
     ) -> None:  # fmt: skip
         if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
