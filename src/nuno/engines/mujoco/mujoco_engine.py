@@ -26,7 +26,7 @@ BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
     "self-contact of soft bodies", "restitution", "sliding grips", "compliant grips", "limited grips", "sliders",
-    "joint drives", "effort", "impulses", "cuda", "robots",
+    "joint drives", "effort", "impulses", "cuda", "robots with dynamics",
 }  # fmt: skip
 
 
