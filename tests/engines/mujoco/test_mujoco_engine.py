@@ -320,3 +320,16 @@ def test_materials_by_warp_weft_and_element_are_taken():
     assert drops[0] > 0.1
     assert drops[1] == pytest.approx(expected, rel=0.15)
     assert drops[2] == pytest.approx(expected, rel=0.15)
+
+
+def test_contacts_are_told_of_a_table_on_a_path_after_a_change():
+    """A model that is compiled anew between two steps has the table where its path is: it bears the block's weight."""
+    world = nuno.World(device="cpu", engine="mujoco")
+    table = world.add(nuno.box((0.5, 0.5, 0.02), position=(0.0, 0.0, 0.99), name="table"))
+    block = world.attach(world.add(nuno.box((0.05, 0.05, 0.05), position=(0.0, 0.0, 1.025), name="block")))
+    world.move(table, nuno.Path([0.0, 1.0], [(0.0, 0.0, 0.99), (0.1, 0.0, 0.99)], None, "linear"))
+    world.run(0.3)
+    world.add(nuno.sphere(0.05, position=(2.0, 0.0, 1.0)))
+    found = world.contacts(block)
+    assert set(found.others) == {"table"}
+    assert found.forces.sum(axis=0)[2] == pytest.approx(9.81 * block.mass, rel=0.05)

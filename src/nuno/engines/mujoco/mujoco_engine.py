@@ -144,6 +144,12 @@ class MujocoEngine(Engine):
             if own.role == "static":
                 k = int(scene.model.body_mocapid[own.id])
                 batch.bind("mocap_pos")[:, k], batch.bind("mocap_quat")[:, k] = body.pose()
+            elif own.role == "moving":  # where it is now; a step sends it on
+                at, to = int(own.qpos[0]), int(own.dof[0])
+                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = body.pose()
+                velocity, spin = self.velocity_at(body, qpos[:, at : at + 3].copy())
+                qvel[:, to : to + 3] = velocity
+                qvel[:, to + 3 : to + 6] = quat.rotate(quat.inverse(qpos[:, at + 3 : at + 7]), spin)
             if dynamics is None:
                 continue
             values = dynamics.values
