@@ -333,3 +333,17 @@ def test_contacts_are_told_of_a_table_on_a_path_after_a_change():
     found = world.contacts(block)
     assert set(found.others) == {"table"}
     assert found.forces.sum(axis=0)[2] == pytest.approx(9.81 * block.mass, rel=0.05)
+
+
+def test_substeps_and_gravity_may_change_between_runs():
+    """The next step has them: a fall by semi-implicit steps says how long they are, and how strong gravity is."""
+    world = nuno.World(device="cpu", engine="mujoco", substeps=4)
+    ball = world.attach(world.add(nuno.sphere(0.05, position=(0.0, 0.0, 1.0))))
+    world.run(0.1)
+    # z = 1 - g t (t + h) / 2, with h = 1/240 s
+    assert ball.position[2] == pytest.approx(1.0 - 0.5 * 9.81 * 0.1 * (0.1 + 1.0 / 240.0), abs=1e-9)
+    start = ball.position[2]
+    world.set_velocity(ball)
+    world.substeps, world.gravity = 2, (0.0, 0.0, -1.0)
+    world.run(0.1)
+    assert ball.position[2] == pytest.approx(start - 0.5 * 0.1 * (0.1 + 1.0 / 120.0), abs=1e-9)

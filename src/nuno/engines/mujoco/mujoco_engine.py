@@ -41,6 +41,7 @@ class MujocoEngine(Engine):
         mujoco_package()
         self._scene: Any = None
         self._is_current = False
+        self._settings: tuple[Any, ...] = ()
 
     # Dynamics
 
@@ -76,9 +77,10 @@ class MujocoEngine(Engine):
             from nuno.engines.mujoco.mujoco_scene import MujocoScene
 
             self._scene = MujocoScene(self.world)
-        if not self._is_current:
+        settings = (self.world.gravity, self.world.frame_rate, self.world.substeps, self.world.world_count)
+        if not self._is_current or settings != self._settings:
             self._scene.bring(self.substep)
-            self._is_current = True
+            self._is_current, self._settings = True, settings
         return self._scene
 
     @property
