@@ -73,6 +73,7 @@ for module in pkgutil.walk_packages(nuno.__path__, "nuno."):
         ("nuno.Viewer", "tornado", "viewer"),
         ("nuno.Viewer(nuno.World())", "meshcat", "viewer"),
         ("nuno.Humanoid('talos')", "example-robot-data", "robot"),
+        ("nuno.World(engine='mujoco')", "mujoco 4", "mujoco"),
         ("nuno.minimise(lambda world, params: None, {'x': (0, 1)}, value='v')", "cma", "search"),
     ],
 )
