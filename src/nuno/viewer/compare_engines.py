@@ -32,7 +32,7 @@ from nuno.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class EngineComparison:
-    """What became of one world on several engines; ``compare_engines`` returns it.
+    """One world as several engines moved it; ``compare_engines`` returns it.
 
     Attributes:
         engines: The names of those that ran, in the order that was asked for; differences are from the first.
