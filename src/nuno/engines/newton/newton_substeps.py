@@ -55,7 +55,6 @@ class NewtonSubsteps:
         self.forces_on: Any = wp.zeros(int(model.particle_count), dtype=wp.vec3, device=self.device)
         twist: Any = wp.spatial_vector
         self.wrenches_on: Any = wp.zeros(int(model.body_count), dtype=twist, device=self.device)
-        self.points: dict[str, np.ndarray] = {}
         self.leads: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.body_leads: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._tables: dict[str, Any] = {}
