@@ -8,7 +8,7 @@ import pytest
 
 import nuno
 from nuno.engines.engine import CAPABILITIES
-from nuno.engines.engine_registry import ENGINES, engine_class, engines_with
+from nuno.engines.engine_registry import ENGINES, engine_class, engines_with, make_engine
 
 DOCS = Path(__file__).parents[2] / "docs" / "engines.md"
 
@@ -77,9 +77,6 @@ def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():
 def test_a_device_that_an_engine_does_not_run_on_is_refused():
     """MuJoCo runs on the CPU."""
     pytest.importorskip("mujoco", minversion="4.0")
-    from nuno.engines.mujoco.mujoco_engine import MujocoEngine
-
     world = nuno.World(device="cpu")
-    world._device = "cuda:0"
     with pytest.raises(nuno.EngineCapabilityError, match="mujoco has no cuda"):
-        MujocoEngine(world)
+        make_engine("mujoco", world, "cuda:0", world.engine.rules)

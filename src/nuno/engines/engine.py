@@ -15,9 +15,11 @@ from nuno.errors import EngineCapabilityError
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.bodies.contact_rules import ContactRules
     from nuno.bodies.dynamics import Dynamics, State
     from nuno.joints.grip import Grip
     from nuno.materials import Material
+    from nuno.tables.kinematic_motion import Schedule
     from nuno.world.simulation import Simulation
 
 CAPABILITIES: dict[str, str] = {
@@ -71,18 +73,22 @@ class Engine(ABC):
         capabilities: The names in `CAPABILITIES` that it has.
         is_builtin: Whether it is Nuno's own, whose states and steps are the world's.
         world: The world.
+        rules: The rules of which pairs touch, and their friction; the world's own.
+        schedule: Where kinematic bodies are in the present step, None where there are none.
 
     Args:
         world: The world, still empty.
 
     Raises:
         MissingPackageError: the engine's package is not installed.
-        EngineCapabilityError: the world's device is one that it does not run on.
     """
 
     name: ClassVar[str]
     capabilities: ClassVar[frozenset[str]]
     is_builtin: ClassVar[bool] = False
+
+    rules: ContactRules
+    schedule: Schedule | None = None
 
     def __init__(self, world: Simulation) -> None:
         self.world = world
@@ -165,7 +171,7 @@ class Engine(ABC):
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s], a frame or a part of one.
 
-        Kinematic bodies are where ``world._schedule`` says, grips lead where `nuno.engines.led` says, and a body is
+        Kinematic bodies are where `schedule` says, grips lead where `nuno.engines.led` says, and a body is
         pushed by ``Dynamics.pushing(start)`` throughout.
         """
 

@@ -9,6 +9,7 @@ from nuno.errors import UnknownNameError
 from nuno.validation import checked
 
 if TYPE_CHECKING:
+    from nuno.bodies.contact_rules import ContactRules
     from nuno.engines.engine import Engine
     from nuno.world.simulation import Simulation
 
@@ -33,15 +34,25 @@ def engine_class(name: Any) -> type[Engine]:
     return found
 
 
-def make_engine(name: Any, world: Simulation) -> Engine:
+def make_engine(name: Any, world: Simulation, device: str, rules: ContactRules) -> Engine:
     """Return an engine for a world.
+
+    Args:
+        name: Of the engine.
+        world: The world.
+        device: The device that was asked for: "auto", "cpu", "cuda" ...
+        rules: The world's rules of which pairs touch.
 
     Raises:
         UnknownNameError: there is no such engine.
         MissingPackageError: its package is not installed.
         EngineCapabilityError: it does not run on the world's device.
     """
-    return engine_class(name)(world)
+    made = engine_class(name)(world)
+    made.rules = rules
+    if device.startswith("cuda"):
+        made.require("cuda")
+    return made
 
 
 def engines_with(capability: str) -> tuple[str, ...]:

@@ -1,10 +1,8 @@
-"""A world as an engine reads it: its bodies, what moves them, its rules, and where what follows paths is."""
+"""A world as an engine reads it: its bodies by key, and what moves them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -14,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def bodies_by_key(world: Simulation) -> dict[str, Body]:
-    """Return the bodies of a world by their keys, in their order; not to be written to."""
-    return world._bodies
+    """Return the bodies of a world by their keys, in their order."""
+    return {body.key: body for body in world.bodies}
 
 
 def dynamics_of(body: Body) -> Any:
@@ -25,24 +23,14 @@ def dynamics_of(body: Body) -> Any:
 
 def attached(world: Simulation) -> list[Any]:
     """Return the dynamics of all dynamic bodies."""
-    return list(world._attached())
+    return [dynamics_of(body) for body in world.bodies if body.is_dynamic]
 
 
 def rules_of(world: Simulation) -> ContactRules:
     """Return the rules of which pairs touch, and their friction."""
-    return world._rules
+    return world.engine.rules
 
 
 def schedule_of(world: Simulation) -> Schedule | None:
     """Return where kinematic bodies are in the present step, None where there are none."""
-    return world._schedule
-
-
-def present_vertices(body: Body) -> np.ndarray:
-    """Return (n, 3) or (worlds, n, 3) [m], not to be written to."""
-    return body._vertices()
-
-
-def deformation_of(body: Body) -> Any:
-    """Return what a static body was deformed to: the same object for as long as it stays so."""
-    return body._deformed
+    return world.engine.schedule

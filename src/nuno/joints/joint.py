@@ -206,7 +206,7 @@ class Joint(Grip):
         with world._change("set on a joint"):
             drives = drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)
             changed = replace(self.spec, drives=drives)
-            world.engine.allow_grip(changed, self.target is not None and self.target._dynamics is not None)
+            world.engine.allow_grip(changed, self.target is not None and self.target.is_dynamic)
             self.spec = changed
             world.engine.changed()
 

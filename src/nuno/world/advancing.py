@@ -105,6 +105,7 @@ class Advancing(Simulation):
         for stop in _apart([*ends.tolist(), *pushes, *asked.tolist()], start, finish):
             kinematic, self._rests = self._kinematic_bodies(), False
             self._schedule = make_schedule(kinematic, now, stop - now, frame) if kinematic else None
+            self._engine.schedule = self._schedule
             self._engine.step(now, stop)
             broken = [body for body in self._bodies.values() if body.is_dynamic and not self._engine.finite(body).all()]
             if broken:

@@ -87,7 +87,7 @@ class Simulation:
         self._rigid: RigidScene | None = None
         self._stepping = Stepping(self)
         self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
-        self._engine = make_engine(engine, self)
+        self._engine = make_engine(engine, self, self._device, self._rules)
 
     def __repr__(self) -> str:
         batch = f", {self.world_count} worlds" if self.world_count > 1 else ""
@@ -206,7 +206,7 @@ class Simulation:
 
     def _hold(self, grip: Grip) -> None:
         assert grip.body._dynamics is not None
-        self._engine.allow_grip(grip.spec, grip.target is not None and grip.target._dynamics is not None)
+        self._engine.allow_grip(grip.spec, grip.target is not None and grip.target.is_dynamic)
         grip._world = self
         self._grips_by_key[grip.key] = grip
         grip.body._dynamics.grips.append(grip)

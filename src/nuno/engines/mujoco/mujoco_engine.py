@@ -12,7 +12,7 @@ from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.led import led_poses
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
-from nuno.engines.world_view import attached, bodies_by_key, dynamics_of, present_vertices
+from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
 from nuno.materials import Material, Rigid
 from nuno.shapes import quaternion as quat
 
@@ -39,8 +39,6 @@ class MujocoEngine(Engine):
     def __init__(self, world: Simulation) -> None:
         super().__init__(world)
         mujoco_package()
-        if world._device.startswith("cuda"):
-            self.require("cuda")
         self._scene: Any = None
         self._is_current = False
 
@@ -54,8 +52,7 @@ class MujocoEngine(Engine):
             still = np.zeros((worlds, 3))
             values = {"place": place, "turn": turn, "velocity": still, "spin": still}
             return ArrayRigid(body, material, material.friction, self.world, values)
-        vertices = present_vertices(body)
-        vertices = np.broadcast_to(vertices, (worlds, *vertices.shape[-2:]))
+        vertices = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
         values = {"positions": vertices, "velocities": np.zeros(vertices.shape)}
         return ArrayParticles(body, material, material.friction, self.world, values)
 

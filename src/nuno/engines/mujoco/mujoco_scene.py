@@ -17,7 +17,7 @@ from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
-from nuno.engines.world_view import bodies_by_key, deformation_of, dynamics_of, rules_of
+from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
@@ -241,4 +241,4 @@ def _signature(world: Simulation, body: Body, role: str) -> tuple[Any, ...]:
     if dynamics_of(body) is not None:
         # another material makes other dynamics
         return role, id(dynamics_of(body)), rules_of(world).touches_itself(body)
-    return role, id(body.shape), id(deformation_of(body)), body.thickness
+    return role, id(body.shape), body.local_vertices().tobytes() if body.is_deformed else None, body.thickness
