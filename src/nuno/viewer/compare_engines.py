@@ -22,10 +22,10 @@ from nuno.errors import (
     SimulationDiverged,
 )
 from nuno.files.recording import Recording
+from nuno.files.side_by_side import side_by_side
 from nuno.files.whole_file import file_path, write_whole
 from nuno.validation import checked, count, number
 from nuno.viewer.film import Film
-from nuno.viewer.side_by_side import side_by_side
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
@@ -102,7 +102,7 @@ class EngineComparison:
 
     def film(self) -> Film:
         """Return a film with one column an engine, from left to right."""
-        return side_by_side([Film.of(self.recordings[engine]) for engine in self.engines], self.engines)
+        return Film.of(side_by_side([self.recordings[engine] for engine in self.engines], self.engines))
 
     @checked
     def save(self, folder: str | os.PathLike[str]) -> None:
