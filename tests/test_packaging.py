@@ -16,7 +16,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 # Import names of what extras bring, none of which `pip install .` has.
 OPTIONAL = (
     "pinocchio", "coal", "example_robot_data", "pink", "daqp", "meshcat", "tornado", "websockets", "cma", "distributed",
-    "pytetwild", "IPython", "gymnasium",
+    "pytetwild", "IPython", "gymnasium", "mujoco",
 )  # fmt: skip
 BLOCKER = """
 import importlib.metadata, sys
@@ -73,6 +73,7 @@ for module in pkgutil.walk_packages(nuno.__path__, "nuno."):
         ("nuno.Viewer", "tornado", "viewer"),
         ("nuno.Viewer(nuno.World())", "meshcat", "viewer"),
         ("nuno.Humanoid('talos')", "example-robot-data", "robot"),
+        ("nuno.World(engine='mujoco')", "mujoco 4", "mujoco"),
         ("nuno.minimise(lambda world, params: None, {'x': (0, 1)}, value='v')", "cma", "search"),
     ],
 )

@@ -114,6 +114,12 @@ class Simulation:
         return self._device
 
     @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, in the order in which they were added."""
+        with self._call():
+            return tuple(self._bodies.values())
+
+    @property
     def engine(self) -> Engine:
         """The engine that moves what is dynamic: its ``name``, and its ``capabilities``."""
         return self._engine

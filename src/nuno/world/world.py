@@ -61,12 +61,6 @@ class World(Setting):
 
     # Bodies
 
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """All bodies, in the order in which they were added."""
-        with self._call():
-            return tuple(self._bodies.values())
-
     def add(self, body: Body) -> Body:
         """Put a body into the world and return it; a name that is taken gets a number ("box_1").
 
