@@ -124,8 +124,8 @@ def drape_over_box(world: nuno.World) -> Measure:
     world.add(nuno.box((0.16, 0.16, 0.2), name="box", position=(0, 0, 0.1), color="#8070b0"))
     sheet = world.add(nuno.sheet((0.4, 0.4), cells=(12, 12), name="cloth", position=(0, 0, 0.21)))
     world.attach(sheet, nuno.Cloth(air_drag=4.0, friction=0.5))
-    i, j = np.meshgrid(np.arange(7), np.arange(7))
-    weights = np.stack([i, j, 6 - i - j], axis=-1)[i + j <= 6] / 6.0
+    i, j = np.meshgrid(np.arange(31), np.arange(31))
+    weights = np.stack([i, j, 30 - i - j], axis=-1)[i + j <= 30] / 30.0
 
     def nearest_to_box() -> float:
         points = np.einsum("kc,fcx->fkx", weights, sheet.vertices[sheet.faces]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The command line: ``nuno pick CASE_DIR --out DIR``, ``fold``, ``capture``, ``serve``, ``scene``, ``compare`` ..."""
+"""The command line: ``nuno pick CASE_DIR --out DIR``, and what else ``nuno --help`` lists."""
 
 from __future__ import annotations
 

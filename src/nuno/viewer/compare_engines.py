@@ -22,17 +22,17 @@ from nuno.errors import (
     SimulationDiverged,
 )
 from nuno.files.recording import Recording
+from nuno.files.side_by_side import side_by_side
 from nuno.files.whole_file import file_path, write_whole
 from nuno.validation import checked, count, number
 from nuno.viewer.film import Film
-from nuno.viewer.side_by_side import side_by_side
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
 
 @dataclass(frozen=True, eq=False)
 class EngineComparison:
-    """What became of one world on several engines; ``compare_engines`` returns it.
+    """One world as several engines moved it; ``compare_engines`` returns it.
 
     Attributes:
         engines: The names of those that ran, in the order that was asked for; differences are from the first.
@@ -102,7 +102,7 @@ class EngineComparison:
 
     def film(self) -> Film:
         """Return a film with one column an engine, from left to right."""
-        return side_by_side([Film.of(self.recordings[engine]) for engine in self.engines], self.engines)
+        return Film.of(side_by_side([self.recordings[engine] for engine in self.engines], self.engines))
 
     @checked
     def save(self, folder: str | os.PathLike[str]) -> None:

@@ -11,6 +11,7 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.engine import Engine
 from nuno.engines.led import led_hold, led_points, led_poses
+from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
 from nuno.kernels.quiet import quiet_warp
@@ -57,7 +58,7 @@ class NewtonEngine(Engine):
                 body, material, {"place": place, "turn": turn, "velocity": still, "spin": still.copy()},
                 material.friction,
             )  # fmt: skip
-        vertices = body._vertices()
+        vertices = body.vertices
         positions = np.array(np.broadcast_to(vertices, (worlds, *vertices.shape[-2:])), float)
         state = {"positions": positions, "velocities": np.zeros_like(positions)}
         return self.make(body, material, state, material.friction)
@@ -72,8 +73,7 @@ class NewtonEngine(Engine):
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
-        assert body._dynamics is not None
-        body._dynamics.load_state(state)
+        dynamics_of(body).load_state(state)
 
     def changed(self) -> None:
         """Build the model anew before the next step."""
@@ -81,10 +81,10 @@ class NewtonEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
-        if self._made is None or any(own.grips_changed for own in self.world._attached()):
+        if self._made is None or any(own.grips_changed for own in attached(self.world)):
             from nuno.engines.newton.newton_model import build_model
 
-            for each in self.world._attached():
+            for each in attached(self.world):
                 each.grips_changed = False
             self._made, self._substeps = build_model(self.world), None
         if self._substeps is None:
@@ -97,7 +97,7 @@ class NewtonEngine(Engine):
         times = start + span * np.arange(1, count + 1) / count
         substeps, worlds = self._substeps, self.world.world_count
         for body in self._moving():
-            dynamics: Any = body._dynamics
+            dynamics: Any = dynamics_of(body)
             if isinstance(dynamics, ArrayParticles):
                 substeps.put_particles(body, dynamics)
                 if substeps.held(body):
@@ -111,19 +111,19 @@ class NewtonEngine(Engine):
                     holds = [grip for grip in dynamics.grips if isinstance(grip.spec, HoldSpec)]
                     ends = np.concatenate([[start], times])
                     substeps.lead_body(body, *led_hold(holds[-1], start, end, ends, worlds), span / count)
-        for body in self.world._kinematic_bodies():
-            if body.key in self._made.led_bodies:
+        for body in self.world.bodies:
+            if not body.is_dynamic and body.key in self._made.led_bodies:
                 ends = np.concatenate([[start], times])
                 substeps.lead_body(body, *led_poses(self.world, body, start, end, ends), span / count)
         for body in self._moving():
-            for push in body._dynamics.pushing(start):  # type: ignore[union-attr]
+            for push in dynamics_of(body).pushing(start):
                 substeps.push(body, push.force)
         substeps.run(count, span / count)
         for body in self._moving():
-            substeps.read(body, body._dynamics)
+            substeps.read(body, dynamics_of(body))
 
     def _count(self) -> int:
         return self.world.substeps or SUBSTEPS
 
     def _moving(self) -> list[Body]:
-        return [body for body in self.world._bodies.values() if body._dynamics is not None]
+        return [body for body in self.world.bodies if body.is_dynamic]

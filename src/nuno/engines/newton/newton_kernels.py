@@ -9,7 +9,7 @@ import warp as wp
 
 @wp.kernel
 def lead_particles(
-    # led
+    # driven
     indices: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
     places: wp.array2d(dtype=wp.vec3),  # type: ignore[valid-type]
     substep: int,
@@ -17,7 +17,7 @@ def lead_particles(
     position_out: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
     velocity_out: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
 ) -> None:
-    """Put each led particle where it is at the end of a substep."""
+    """Put each held particle where it is at the end of a substep."""
     k = wp.tid()
     i = indices[k]
     position_out[i] = places[substep, k]
@@ -26,7 +26,7 @@ def lead_particles(
 
 @wp.kernel
 def lead_bodies(
-    # led
+    # driven
     indices: wp.array(dtype=wp.int32),  # type: ignore[valid-type]
     poses: wp.array2d(dtype=wp.transform),  # type: ignore[valid-type]
     speeds: wp.array2d(dtype=wp.spatial_vector),  # type: ignore[valid-type]
@@ -35,7 +35,7 @@ def lead_bodies(
     pose_out: wp.array(dtype=wp.transform),  # type: ignore[valid-type]
     speed_out: wp.array(dtype=wp.spatial_vector),  # type: ignore[valid-type]
 ) -> None:
-    """Put each led body where it is at the end of a substep."""
+    """Put each kinematic body where it is at the end of a substep."""
     k = wp.tid()
     i = indices[k]
     pose_out[i] = poses[substep, k]

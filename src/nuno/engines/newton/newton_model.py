@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.rigid_dynamics import parts_of
-from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.array_dynamics import ArrayParticles
 from nuno.engines.newton.hinges import mesh_hinges, sheet_hinges
 from nuno.engines.newton.newton_shapes import add_part
+from nuno.engines.world_view import dynamics_of, rules_of
 from nuno.joints.grip import GripSpec
 from nuno.materials import Cloth, Soft
 from nuno.shapes.shape import Plane, Sheet
+from nuno.tables.kinematic_motion import is_kinematic
 from nuno.topology.soft_topology import moduli
 
 if TYPE_CHECKING:
@@ -70,10 +72,10 @@ def build_model(world: Simulation) -> NewtonModel:
     """Return the model of a world's bodies, in the shapes that they have at rest and where static ones are now."""
     import newton
 
-    bodies = list(world._bodies.values())
-    moving = [body for body in bodies if body._dynamics is not None]
-    deforming = [body for body in moving if isinstance(body._dynamics, ArrayParticles)]
-    centres = [body._dynamics.pose(body)[0].reshape(-1, 3).mean(axis=0) for body in moving]  # type: ignore[union-attr]
+    bodies = list(world.bodies)
+    moving = [body for body in bodies if body.is_dynamic]
+    deforming = [body for body in moving if isinstance(dynamics_of(body), ArrayParticles)]
+    centres = [dynamics_of(body).pose(body)[0].reshape(-1, 3).mean(axis=0) for body in moving]
     origin = np.round(np.mean(centres, axis=0) * 16) / 16 if centres else np.zeros(3)
     down: Any = tuple(float(g) for g in world.gravity)
     scene = newton.ModelBuilder(gravity=down)
@@ -93,12 +95,12 @@ def build_model(world: Simulation) -> NewtonModel:
         scene.end_world()
     scene.color(include_bending=True)
     model: Any = scene.finalize(device=str(world.device))
-    frictions = [float(np.mean(body._dynamics.friction)) for body in deforming]  # type: ignore[union-attr]
+    frictions = [float(np.mean(dynamics_of(body).friction)) for body in deforming]
     if frictions and np.ptp(frictions) > 1e-9:
         logger.warning("newton: all deformable bodies have one coefficient of friction, the mean of theirs")
     model.soft_contact_ke, model.soft_contact_kd = PARTICLE_STIFFNESS, 0.0
     model.soft_contact_mu = float(np.mean(frictions)) if frictions else 0.5
-    itself = [body for body in deforming if world._rules.touches_itself(body) and isinstance(_of(body), Cloth)]
+    itself = [body for body in deforming if rules_of(world).touches_itself(body) and isinstance(_of(body), Cloth)]
     if itself or len(deforming) > 1:
         made.touching = max((_thickness(body) for body in deforming), default=0.0) or 1e-3
     made.model = model
@@ -108,7 +110,7 @@ def build_model(world: Simulation) -> NewtonModel:
 def held_vertices(body: Body) -> list[tuple[Any, np.ndarray]]:
     """Return a deformable body's grips with the vertices (worlds, k) that each leads, -1 for none."""
     found = []
-    for grip in body._dynamics.grips:  # type: ignore[union-attr]
+    for grip in dynamics_of(body).grips:
         spec = grip.spec
         if not isinstance(spec, GripSpec):
             continue
@@ -122,7 +124,7 @@ def held_vertices(body: Body) -> list[tuple[Any, np.ndarray]]:
 
 
 def _of(body: Body) -> Any:
-    return body._dynamics.material  # type: ignore[union-attr]
+    return dynamics_of(body).material
 
 
 def _thickness(body: Body) -> float:
@@ -130,13 +132,13 @@ def _thickness(body: Body) -> float:
     material = _of(body)
     if not isinstance(material, Cloth):
         return 0.0
-    return min(float(np.max(material.thickness)), 0.5 * body._dynamics.topology.cell_size)  # type: ignore[union-attr]
+    return min(float(np.max(material.thickness)), 0.5 * dynamics_of(body).topology.cell_size)
 
 
 def _add_particles(scene: Any, body: Body, index: int, world: Simulation) -> None:
     import warp as wp
 
-    dynamics: Any = body._dynamics
+    dynamics: Any = dynamics_of(body) if body.is_dynamic else None
     topology, first = dynamics.topology, len(scene.particle_q)
     rest = np.asarray(topology.rest, float)
     own = dynamics.material.of_world(index, world.world_count)
@@ -179,8 +181,8 @@ def _add_particles(scene: Any, body: Body, index: int, world: Simulation) -> Non
 def _add_shapes(
     scene: Any, body: Body, index: int, made: NewtonModel, shapes: list[list[int]], world: Simulation
 ) -> None:
-    dynamics: Any = body._dynamics
-    kinematic = body in world._kinematic_bodies() or (isinstance(dynamics, ArrayRigid) and bool(dynamics.grips))
+    dynamics: Any = dynamics_of(body) if body.is_dynamic else None
+    kinematic = is_kinematic(body) if dynamics is None else bool(dynamics.grips)
     worlds = world.world_count
     number, place, turn = -1, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     pose = body.pose() if dynamics is None else dynamics.pose(body)
@@ -224,7 +226,7 @@ def _filter(scene: Any, world: Simulation, bodies: list[Body], shapes: dict[str,
     with_shapes = [body for body in bodies if shapes[body.key]]
     for k, a in enumerate(with_shapes):
         for b in with_shapes[k + 1 :]:
-            if not world._rules.touch(a, b):
+            if not rules_of(world).touch(a, b):
                 for one in shapes[a.key][index]:
                     for other in shapes[b.key][index]:
                         scene.add_shape_collision_filter_pair(one, other)
@@ -232,7 +234,7 @@ def _filter(scene: Any, world: Simulation, bodies: list[Body], shapes: dict[str,
 
 def _warn_of_exceptions(world: Simulation, deforming: list[Body], bodies: list[Body]) -> None:
     for a in deforming:
-        passed = [b.name for b in bodies if b is not a and not world._rules.touch(a, b)]
+        passed = [b.name for b in bodies if b is not a and not rules_of(world).touch(a, b)]
         if passed:
             logger.warning(
                 "newton: %r touches %s all the same, as no pair with a deformable body can be left out",

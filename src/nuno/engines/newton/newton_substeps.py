@@ -9,6 +9,7 @@ import warp as wp
 
 from nuno.engines.array_dynamics import ArrayRigid
 from nuno.engines.newton import newton_kernels as kernels
+from nuno.engines.world_view import dynamics_of
 from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
@@ -55,7 +56,6 @@ class NewtonSubsteps:
         self.forces_on: Any = wp.zeros(int(model.particle_count), dtype=wp.vec3, device=self.device)
         twist: Any = wp.spatial_vector
         self.wrenches_on: Any = wp.zeros(int(model.body_count), dtype=twist, device=self.device)
-        self.points: dict[str, np.ndarray] = {}
         self.leads: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.body_leads: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._tables: dict[str, Any] = {}
@@ -65,14 +65,15 @@ class NewtonSubsteps:
     def _air_drags(self, world: Simulation) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of particles and of bodies [1/s]."""
         of_particles, of_bodies = np.zeros(self.model.particle_count), np.zeros(self.model.body_count)
-        for body in world._bodies.values():
-            if body._dynamics is None:
+        for body in world.bodies:
+            if not body.is_dynamic:
                 continue
-            rates = np.broadcast_to(np.asarray(body._dynamics.material.air_drag).reshape(-1), (self.worlds,))  # type: ignore[attr-defined]
+            dynamics = dynamics_of(body)
+            rates = np.broadcast_to(np.asarray(dynamics.material.air_drag).reshape(-1), (self.worlds,))
             if body.key in self.made.bodies:
                 of_bodies[self.made.bodies[body.key]] = rates
             else:
-                count = body._dynamics.mass.shape[1]  # type: ignore[attr-defined]
+                count = dynamics.mass.shape[1]
                 for first, rate in zip(self.made.particles[body.key], rates, strict=True):
                     of_particles[first : first + count] = rate
         return of_particles, of_bodies
@@ -95,7 +96,7 @@ class NewtonSubsteps:
 
     def held(self, body: Body) -> bool:
         """Return True if a body may have led vertices."""
-        return bool(body._dynamics.grips)  # type: ignore[union-attr]
+        return bool(dynamics_of(body).grips)
 
     def lead_particles(self, body: Body, grips: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Take where grips' vertices (worlds, k) are led at each substep's end, (worlds, k, substeps, 3) [m]."""

@@ -91,7 +91,7 @@ def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices():
     stiffness = np.array([30.0, 15.0])
     futures.attach(strip, nuno.Cloth(stretch_stiffness=stiffness, shear_stiffness=0.5 * stiffness, air_drag=6.0))
     goal = start[top].mean(axis=0)
-    raised = goal + (0.0, 0.0, 0.05)
+    raised = goal + np.array([0.0, 0.0, 0.05])
     futures.grip(strip, top, to=nuno.Path([0.0, 0.5], [goal, raised], interpolation="minimum_jerk"))
     futures.run(2.0)
     ends = strip.vertices
@@ -122,8 +122,8 @@ def test_attaching_and_detaching_carries_the_state_over():
             assert box.position[2] == before < 1.0
         return ball.position
 
-    # coordinates have another origin with the box; SolverVBD reads velocities off floats, and half a metre's last digit,
-    # 6e-8 m in a substep of 0.4 ms, is 0.15 mm/s: 720 of them, at random, make 1 mm in 0.3 s
+    # coordinates have another origin with the box; SolverVBD reads velocities off floats, and the last digit of half a
+    # metre, 6e-8 m in a substep of 0.4 ms, is 0.15 mm/s: 720 of them, at random, make 1 mm in 0.3 s
     assert falling(True) == pytest.approx(falling(False), abs=1e-3)
 
 
