@@ -24,7 +24,7 @@ from nuno.camera.triangulated_polygon import (
 from nuno.errors import ImageError, InvalidInputError
 from nuno.validation import as_array, checked, count, finite_array, flag, number
 
-FOUND = 0.52
+FOUND = 0.57
 """Score from which a shape is taken to be there; docs/reports/accuracy.md has how often that is wrong."""
 FORM = 1.0
 """What a mean deformation of one (singular values e : 1) counts, beside the share of the outline that lies on edges."""
