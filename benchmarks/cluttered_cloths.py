@@ -203,14 +203,14 @@ def measure(made: Scene, with_absent: bool = True) -> dict:
     outline = OUTLINES[made.shape]
     row: dict = {"shape": made.shape, "kind": made.kind, "seen": float(made.visible.sum() / made.whole.sum())}
     start = time.process_time()
-    best = nuno.find_shape(made.image, outline, camera=made.camera, table=made.table, least_score=0.0)
+    best = nuno.find_shape(made.image, outline, camera=made.camera, table=made.table, min_score=0.0)
     row["cpu_s"] = time.process_time() - start
     row["score"] = best[0].score if best else 0.0
     row["support"], row["bent"] = (best[0].support, best[0].deformation) if best else (0.0, 0.0)
     row["iou"] = max(overlap(best[0].mask, true) for true in (made.whole, made.visible)) if best else 0.0
     row["polygon"] = best[0].polygon.tolist() if best else []
     if with_absent:
-        absent = nuno.find_shape(made.without, outline, camera=made.camera, table=made.table, least_score=0.0)
+        absent = nuno.find_shape(made.without, outline, camera=made.camera, table=made.table, min_score=0.0)
         row["score_without"] = absent[0].score if absent else 0.0
     try:
         mask = nuno.segment_before(made.image, made.camera, made.table)

@@ -236,7 +236,7 @@ CALLS = {
     "box": {"size": (1.0, 1.0, 1.0)},
     "box_tetrahedra": {"size": (1.0, 1.0, 1.0), "cells": (1, 1, 1)},
     "calibrate_camera": {"images": [IMAGE], "board": lambda s: nuno.CalibrationBoard()},
-    "camera_over_table": {"image": IMAGE, "camera": lambda s: s.camera, "board": lambda s: nuno.CalibrationBoard()},
+    "camera_above_table": {"image": IMAGE, "camera": lambda s: s.camera, "board": lambda s: nuno.CalibrationBoard()},
     "capsule": {"radius": 0.1, "height": 0.2},
     "capture_case": {
         "folder": "case", "before": IMAGE, "after": IMAGE, "board_on_table": IMAGE, "camera": lambda s: s.camera,
@@ -535,6 +535,7 @@ UNCALLED = {
         "TowelPicker.*",
         "Footage.watch",
     ),
+    "of a camera that is not plugged in": ("UsbCamera.*",),
     "between the parts of the package, with checked numbers": (
         "Grip.lead",
         "HoldResult.of",

@@ -76,7 +76,7 @@ from nuno.world.world import World
 
 if TYPE_CHECKING:
     from nuno.bodies.element_state import ElementState, elements
-    from nuno.camera.calibration import Calibration, calibrate_camera, camera_over_table
+    from nuno.camera.calibration import Calibration, calibrate_camera, camera_above_table
     from nuno.camera.calibration_board import CalibrationBoard
     from nuno.camera.find_shape import FoundShape, find_shape
     from nuno.camera.image_quality import ImageQuality, image_quality
@@ -85,7 +85,7 @@ if TYPE_CHECKING:
     from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
     from nuno.camera.usb_camera import UsbCamera
-    from nuno.estimate.capture import Capture, capture_case
+    from nuno.estimate.capture_case import Capture, capture_case
     from nuno.estimate.capture_live import take_capture
     from nuno.engines.engine_registry import engine_capabilities
     from nuno.estimate.case import PickCase, read_case
@@ -298,7 +298,7 @@ __all__ = [
     "box",
     "box_tetrahedra",
     "calibrate_camera",
-    "camera_over_table",
+    "camera_above_table",
     "capsule",
     "capture_case",
     "carry_mat",
@@ -371,7 +371,7 @@ _LAZY = {
     name: module
     for module, names in {
         "nuno.bodies.element_state": "ElementState elements",
-        "nuno.camera.calibration": "Calibration calibrate_camera camera_over_table",
+        "nuno.camera.calibration": "Calibration calibrate_camera camera_above_table",
         "nuno.camera.calibration_board": "CalibrationBoard",
         "nuno.camera.find_shape": "FoundShape find_shape",
         "nuno.camera.image_quality": "ImageQuality image_quality",
@@ -381,7 +381,7 @@ _LAZY = {
         "nuno.camera.segmentation": "segment_after segment_before",
         "nuno.camera.table": "Table",
         "nuno.camera.usb_camera": "UsbCamera",
-        "nuno.estimate.capture": "Capture capture_case",
+        "nuno.estimate.capture_case": "Capture capture_case",
         "nuno.estimate.capture_live": "take_capture",
         "nuno.engines.engine_registry": "engine_capabilities",
         "nuno.estimate.case": "PickCase read_case",

@@ -82,7 +82,7 @@ def test_another_lens_than_the_tables():
     camera = over_table(eye=(-0.1, 0.05, 1.0))
     other = nuno.Camera(640, 480, 840.0, 840.0, 325.0, 236.0, distortion=[2.0, 0.0, 0.05, 0.05])
     with pytest.raises(nuno.CalibrationError, match=r"is the lens that of the other images"):
-        nuno.camera_over_table(table_view(camera), other, BOARD)
+        nuno.camera_above_table(table_view(camera), other, BOARD)
 
 
 @pytest.mark.parametrize("thickness", [0.0, 0.01])
@@ -93,7 +93,7 @@ def test_the_pose_over_the_table(thickness):
     """
     camera = over_table()
     image = table_view(camera, thickness=thickness)
-    found, error = nuno.camera_over_table(
+    found, error = nuno.camera_above_table(
         image, LENS, BOARD, table_height=0.72, board_thickness=thickness, board_at=(0.05, -0.02)
     )
     assert error < 0.3

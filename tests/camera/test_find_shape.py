@@ -94,7 +94,7 @@ def test_rags_alone_are_no_towel():
     """On a table with the same rags but no towel nothing is found, and the likeliest place has a lower score."""
     empty = drawn(seed=1)
     assert nuno.find_shape(empty, TOWEL, camera=CAMERA, table=TABLE) == ()
-    (likeliest,) = nuno.find_shape(empty, TOWEL, camera=CAMERA, table=TABLE, least_score=0.0)
+    (likeliest,) = nuno.find_shape(empty, TOWEL, camera=CAMERA, table=TABLE, min_score=0.0)
     assert likeliest.score < nuno.camera.find_shape.FOUND
 
 
@@ -103,7 +103,7 @@ def test_two_instances_best_first():
     """Two towels are found apart, the better one first; a third there is not."""
     small = 0.55 * TOWEL
     places = [turned(small, 0.3, (-0.1, -0.22)), turned(small, 1.4, (0.1, 0.25))]
-    found = nuno.find_shape(drawn(*places, seed=2, clutter=False), small, camera=CAMERA, table=TABLE, most=3)
+    found = nuno.find_shape(drawn(*places, seed=2, clutter=False), small, camera=CAMERA, table=TABLE, max_count=3)
     assert len(found) == 2
     assert found[0].score >= found[1].score
     for place in places:
@@ -116,7 +116,7 @@ def test_the_other_side_up():
     ell = np.array([[0, 0], [0.3, 0], [0.3, 0.1], [0.1, 0.1], [0.1, 0.24], [0, 0.24]]) - (0.12, 0.1)
     place = turned(ell * (-1.0, 1.0), 0.8, (0.0, 0.05))
     image = drawn(place, seed=3, clutter=False)
-    best = nuno.find_shape(image, ell, camera=CAMERA, table=TABLE, mirrored=True, least_score=0.0)[0]
+    best = nuno.find_shape(image, ell, camera=CAMERA, table=TABLE, mirrored=True, min_score=0.0)[0]
     assert best.mirrored
     assert overlap(best.mask, mask_of(place)) > 0.85
 
@@ -163,7 +163,7 @@ def test_bad_input():
         ({"outline": 100 * TOWEL, "scales": ()}, nuno.InvalidInputError, "scales"),
         ({"outline": 100 * TOWEL, "scales": (0.0,)}, nuno.InvalidInputError, "positive"),
         ({"outline": TOWEL, "stretch": (1.1, 0.9), **seen}, nuno.InvalidInputError, "stretch"),
-        ({"outline": TOWEL, "most": 0, **seen}, nuno.InvalidInputError, "most"),
+        ({"outline": TOWEL, "max_count": 0, **seen}, nuno.InvalidInputError, "max_count"),
     ):
         with pytest.raises(error, match=words):
             nuno.find_shape(image, **given)

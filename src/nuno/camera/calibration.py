@@ -18,11 +18,11 @@ from nuno.validation import checked, number
 
 FEWEST_VIEWS = 6
 """Good images of the board that a calibration needs; 10 to 20 are better."""
-MOST_ERROR = 1.0
+MAX_ERROR = 1.0
 """Root mean square distance of corners from where the camera sees them [px], in an image of 1000 px or less."""
-LEAST_COVERED = 0.3
+MIN_COVERED = 0.3
 """Share of the image in which corners were seen, all views together."""
-MOST_DOUBT = 0.01
+MAX_DOUBT = 0.01
 """Standard deviation of the focal length, as a share of it."""
 _BOARD_CLIPPED = 0.15  # share of the board in its image that may be clipped: a third of it is white paper
 _OUTLIER = 3.0  # a view whose error is so many times the median is left out
@@ -31,7 +31,7 @@ _CELLS = (8, 6)
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a lens does.
+    """A lens, measured.
 
     Attributes:
         camera: With `distortion`, at the world's origin.
@@ -103,19 +103,19 @@ def calibrate_camera(
         seen = [view for view, keep in zip(seen, good, strict=True) if keep]
         _check_count(len(seen), len(images), warnings)
         found, errors = _calibrate(seen, board, size)
-    limit = MOST_ERROR * max(1.0, size[0] / 1000.0)
+    limit = MAX_ERROR * max(1.0, size[0] / 1000.0)
     if found.error > limit:
         raise CalibrationError(
             f"the corners are {found.error:.2f} px from where a camera would see them, {limit:.2f} are the limit: is "
             "the board flat, and are its numbers of squares right? Fisheye lenses are not covered"
         )
-    if found.covered < LEAST_COVERED:
+    if found.covered < MIN_COVERED:
         raise CalibrationError(
-            f"the board was seen in {found.covered:.0%} of the image, {LEAST_COVERED:.0%} are needed: {_HOW}"
+            f"the board was seen in {found.covered:.0%} of the image, {MIN_COVERED:.0%} are needed: {_HOW}"
         )
-    if found.doubt > MOST_DOUBT:
+    if found.doubt > MAX_DOUBT:
         raise CalibrationError(
-            f"the focal length is known to {found.doubt:.1%} only, {MOST_DOUBT:.0%} is the limit: tilt the board by 20 "
+            f"the focal length is known to {found.doubt:.1%} only, {MAX_DOUBT:.0%} is the limit: tilt the board by 20 "
             "to 45 degrees, in every direction, and hold it close"
         )
     return replace(found, warnings=tuple(warnings))
@@ -125,7 +125,7 @@ _HOW = "hold the board near each corner of the image and in its middle, close, a
 
 
 @checked
-def camera_over_table(
+def camera_above_table(
     image: ArrayLike, camera: Camera, board: CalibrationBoard, *, table_height: float = 0.0,
     board_thickness: float = 0.0, board_at: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Camera, float]:  # fmt: skip
@@ -161,7 +161,7 @@ def camera_over_table(
     pose[:3, 3] = (board_at[0], board_at[1], height) - turn.T @ shift
     found = replace(camera, camera_to_world=pose)
     error = float(np.sqrt(((found.project(flat + np.array([*board_at, height])) - pixels) ** 2).sum(axis=1).mean()))
-    limit = MOST_ERROR * max(1.0, camera.width / 1000.0)
+    limit = MAX_ERROR * max(1.0, camera.width / 1000.0)
     if not error <= limit:
         raise CalibrationError(
             f"the board on the table is {error:.2f} px from where this camera would see it, {limit:.2f} are the limit: "

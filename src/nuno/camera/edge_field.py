@@ -1,4 +1,4 @@
-"""How much a picture shows an edge at a place and in a direction, whatever its contrast and colours."""
+"""The edges of a picture by place and direction, whatever their contrast and colours."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class EdgeField:
         """Return the field in which an edge is seen up to a radius [px] to both its sides, as coarse grids need it."""
         if radius < 1:
             return self
-        wide = np.empty_like(self.maps)
+        widened = np.empty_like(self.maps)
         size = 2 * radius + 1
         for k in range(DIRECTIONS):
             angle = 2.0 * np.pi * k / DIRECTIONS
@@ -61,9 +61,9 @@ class EdgeField:
             reach = np.array([np.cos(angle), np.sin(angle)]) * radius
             a, b = np.round(radius - reach).astype(int), np.round(radius + reach).astype(int)
             cv2.line(line, (int(a[0]), int(a[1])), (int(b[0]), int(b[1])), 1)
-            wide[k] = cv2.dilate(self.maps[k], line)
-        _without_rim(wide)
-        return EdgeField(wide)
+            widened[k] = cv2.dilate(self.maps[k], line)
+        _without_rim(widened)
+        return EdgeField(widened)
 
 
 def edge_field(image: np.ndarray, seen: np.ndarray, blur: float = 1.0) -> EdgeField:

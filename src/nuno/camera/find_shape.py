@@ -24,7 +24,7 @@ from nuno.camera.triangulated_polygon import (
 from nuno.errors import ImageError, InvalidInputError
 from nuno.validation import as_array, checked, count, finite_array, flag, number
 
-FOUND = 0.52
+FOUND = 0.57
 """Score from which a shape is taken to be there; docs/reports/accuracy.md has how often that is wrong."""
 FORM = 1.0
 """What a mean deformation of one (singular values e : 1) counts, beside the share of the outline that lies on edges."""
@@ -33,7 +33,7 @@ STRETCH = (0.6, 1.1)
 _CELLS = 11.0  # cells of the coarse grid along the square root of the shape's area
 _CELL_PIXELS = 8  # of the plane's picture, along a cell
 _LOCATIONS = 4000  # of the grid at most
-_COARSE, _FINE = 10, 20  # vertices
+_COARSE, _DETAILED = 10, 20  # vertices
 _CANDIDATES = 12
 _BORDER = 0.008  # [m] of a table's top along its border that counts as not seen
 _SAME = 0.3  # of two instances that share more of their area the better one is kept
@@ -71,15 +71,15 @@ class FoundShape:
 def find_shape(
     image: ArrayLike, outline: ArrayLike, *, camera: Camera | None = None, table: Table | None = None,
     plane_height: float | None = None, scales: ArrayLike = (1.0,), stretch: tuple[float, float] = STRETCH,
-    mirrored: bool = False, most: int = 1, least_score: float = FOUND,
+    mirrored: bool = False, max_count: int = 1, min_score: float = FOUND,
 ) -> tuple[FoundShape, ...]:  # fmt: skip
     """Find a known shape, such as a towel's or a shirt's, that lies turned and deformed among other things.
 
     The shape's polygon is triangulated, and the triangles' deformation is traded for edges of the image along the
     polygon's sides: P. Felzenszwalb, "Representation and Detection of Deformable Shapes" (PAMI 2005). Dynamic
-    programming finds the best places on a coarse grid among all, at every angle; the best of them are refined. What lies
-    inside and what colours it has do not count, so neither clutter of the same colour nor a pattern hides it. A shape of
-    whose outline less than half shows is not found.
+    programming finds the best places on a coarse grid among all, at every angle; the best of them are refined. What
+    lies inside and what colours it has do not count, so neither clutter of the same colour nor a pattern hides it. A
+    shape of whose outline less than half shows is not found.
 
     Args:
         image: (h, w, 3) uint8 RGB; without a camera also (h, w) uint8.
@@ -91,8 +91,8 @@ def find_shape(
         scales: (k,) sizes to look for, of the outline's.
         stretch: The least and greatest length between vertices, of the outline's.
         mirrored: Look for the shape's other side too; one that is its own mirror image needs no such look.
-        most: How many instances to look for.
-        least_score: The score from which a shape counts as found; 0 returns the likeliest places in any case.
+        max_count: How many instances to look for.
+        min_score: The score from which a shape counts as found; 0 returns the likeliest places in any case.
 
     Returns:
         What was found, best first, none on another; empty where the shape is not there.
@@ -105,8 +105,8 @@ def find_shape(
     points = check_outline(outline)
     sizes = finite_array("scales", scales, ("k",))
     ends = finite_array("stretch", stretch, (2,))
-    number("least_score", least_score, low=0.0, high=1.0)
-    wanted = count("most", most, high=64)
+    number("min_score", min_score, low=0.0, high=1.0)
+    wanted = count("max_count", max_count, high=64)
     both = flag("mirrored", mirrored)
     if not 0.2 <= ends[0] <= 1.0 <= ends[1] <= 2.0:
         raise InvalidInputError(f"stretch must have 0.2 <= least <= 1 <= greatest <= 2, got {ends.tolist()}")
@@ -122,7 +122,7 @@ def find_shape(
     found.sort(key=lambda each: -each.score)
     kept: list[FoundShape] = []
     for each in found:
-        if len(kept) < wanted and each.score >= least_score and all(_apart(each, other) for other in kept):
+        if len(kept) < wanted and each.score >= min_score and all(_apart(each, other) for other in kept):
             kept.append(each)
     return tuple(kept)
 
@@ -180,7 +180,7 @@ def _look(
         rows, columns = array.shape[:2]
         resolution = max(wanted, 1.0)
         small = (max(1, round(columns / resolution)), max(1, round(rows / resolution)))
-        colours = array.astype(np.float32)
+        colours: np.ndarray = array.astype(np.float32)
         if resolution > 1.0:
             colours = cv2.resize(colours, small, interpolation=cv2.INTER_AREA)
         seen = np.ones(colours.shape[:2], dtype=bool)
@@ -236,18 +236,18 @@ def _at_scale(
     weights = Weights(FORM, scale, stretch)
     search = TemplateSearch(coarse, edges.widened(round(0.5 * spacing)), spacing, weights)
     starts = search.best(max(_CANDIDATES, 4 * wanted))
-    fine = triangulate_polygon(with_vertices(in_pixels, _FINE))
-    sharp = edges.widened(1)
+    detailed = triangulate_polygon(with_vertices(in_pixels, _DETAILED))
+    edges_near = edges.widened(1)
     step = spacing / 4.0
-    wide = edges.widened(round(0.25 * spacing))
-    refined = [refine_candidate(coarse, start.points, wide, step, weights, 2) for start in starts]
+    edges_around = edges.widened(round(0.25 * spacing))
+    refined = [refine_candidate(coarse, start.points, edges_around, step, weights, 2) for start in starts]
     refined.sort(key=lambda each: each.energy)
     found: list[FoundShape] = []
     for each in refined[: 2 * wanted + 2]:
-        points = _carried(coarse, each.points, fine.points)
-        best = refine_candidate(fine, points, sharp, 0.5 * step, weights, 4)
-        best = refine_candidate(fine, best.points, sharp, max(0.25 * step, 0.5), weights, 4)
-        found.append(_shape(view, fine, best, sharp, weights, turned, outline))
+        points = _carried(coarse, each.points, detailed.points)
+        best = refine_candidate(detailed, points, edges_near, 0.5 * step, weights, 4)
+        best = refine_candidate(detailed, best.points, edges_near, max(0.25 * step, 0.5), weights, 4)
+        found.append(_shape(view, detailed, best, edges_near, weights, turned, outline))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Whether an image is sharp and well exposed enough to measure in."""
+"""Sharpness and exposure of images, and limits to measure in them."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import ArrayLike
 from nuno.errors import ImageError, ImageQualityError
 from nuno.validation import as_array, checked
 
-MOST_BLUR = 2.0
+MAX_BLUR = 2.0
 """Standard deviation of an edge's blur [px] of an image of 1000 px or less; of wider ones 0.2 % of the width."""
-MOST_CLIPPED = 0.15
+MAX_CLIPPED = 0.15
 """Share of an image's pixels that may be as bright as can be told."""
-LEAST_BRIGHT = 40
+MIN_BRIGHT = 40
 """Level of 255 that the brightest tenth of an image reaches."""
 _CLIPPED = 252  # cameras and JPEG put what is clipped a little below 255
 _SMOOTHING = 0.8  # [px]
 _OWN = _SMOOTHING**2 + 1.0 / 3.0  # [px^2] what the smoothing and central differences add to an edge's variance
-_WINDOW = 15  # [px] about an edge in which its contrast is measured
+_NEAR = 15  # [px] about an edge in which its contrast is measured
 _CONTRAST = 24.0  # levels from which it counts as one
 
 
 @dataclass(frozen=True)
 class ImageQuality:
-    """How sharp and how exposed an image is.
+    """Sharpness and exposure of an image.
 
     Attributes:
         blur: Standard deviation of its edges' blur [px], by the quarter of them that is sharpest: an edge of contrast c
@@ -68,8 +68,8 @@ def image_quality(image: ArrayLike, region: ArrayLike | None = None) -> ImageQua
     grey = (cv2.cvtColor(array, cv2.COLOR_RGB2GRAY) if array.ndim == 3 else array).astype(np.float32)
     smooth = cv2.GaussianBlur(grey, (0, 0), _SMOOTHING)  # else noise is taken for sharpness
     slope = np.hypot(*(cv2.Sobel(smooth, cv2.CV_32F, *way, scale=0.125) for way in ((1, 0), (0, 1))))
-    window = np.ones((_WINDOW, _WINDOW), np.uint8)
-    contrast = cv2.dilate(smooth, window) - cv2.erode(smooth, window)
+    near = np.ones((_NEAR, _NEAR), np.uint8)
+    contrast = cv2.dilate(smooth, near) - cv2.erode(smooth, near)
     steepest = (slope >= cv2.dilate(slope, np.ones((5, 5), np.uint8))) & (contrast > _CONTRAST) & where
     blur = np.inf
     if steepest.sum() >= 20:
@@ -79,7 +79,7 @@ def image_quality(image: ArrayLike, region: ArrayLike | None = None) -> ImageQua
 
 
 def check_quality(
-    image: np.ndarray, name: str, region: np.ndarray | None = None, clipped: float = MOST_CLIPPED
+    image: np.ndarray, name: str, region: np.ndarray | None = None, clipped: float = MAX_CLIPPED
 ) -> ImageQuality:
     """Return an image's quality where it is good enough.
 
@@ -93,10 +93,10 @@ def check_quality(
         ImageQualityError: blurred, too bright or too dark.
     """
     found = image_quality(image, region)
-    limit = MOST_BLUR * max(1.0, image.shape[1] / 1000.0)
-    if found.bright < LEAST_BRIGHT:
+    limit = MAX_BLUR * max(1.0, image.shape[1] / 1000.0)
+    if found.bright < MIN_BRIGHT:
         raise ImageQualityError(
-            f"{name} is too dark: its brightest tenth begins at level {found.bright:.0f} of 255, {LEAST_BRIGHT} are "
+            f"{name} is too dark: its brightest tenth begins at level {found.bright:.0f} of 255, {MIN_BRIGHT} are "
             "needed; more light, or a longer exposure"
         )
     if found.clipped > clipped:

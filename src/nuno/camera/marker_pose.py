@@ -1,4 +1,4 @@
-"""Where a marker of known size is, by one image."""
+"""The place of a marker of known size, by one image."""
 
 from __future__ import annotations
 

@@ -16,13 +16,13 @@ from nuno.camera.triangle_deformation import deformation, to_unit
 from nuno.camera.triangulated_polygon import TriangulatedPolygon
 
 _LIMIT = 0.6  # [nats^2] a triangle of the coarse search that is deformed more is left out: singular values 2.2 : 1
-_TURN = 0.35  # [rad] two candidates whose root edges differ less, in place and direction, are one
+_ANGLE = 0.35  # [rad] two candidates whose root edges differ less, in place and direction, are one
 _NEAR = 2.0  # [cells]
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """What the terms of the energy count.
+    """Weights of the energy's terms.
 
     Attributes:
         form: Of the triangles' mean deformation, beside the share of the outline that lies on edges.
@@ -152,7 +152,7 @@ class TemplateSearch:
         _, i, j = self.polygon.order[-1]
         steps, table = self._steps[i, j], self._tables[i, j].copy()
         rows, columns = np.indices(self.shape)
-        found = []
+        found: list[Candidate] = []
         angles = np.arctan2(steps.all[:, 1], steps.all[:, 0])
         middles = np.stack([columns, rows], axis=-1)[None] + 0.5 * steps.all[:, None, None]
         while len(found) < count:
@@ -162,7 +162,7 @@ class TemplateSearch:
             if not np.isfinite(energy):
                 break
             found.append(Candidate(self._trace(a, np.array([x, y])), energy))
-            turned = np.abs((angles - angles[a] + np.pi) % (2.0 * np.pi) - np.pi) < _TURN
+            turned = np.abs((angles - angles[a] + np.pi) % (2.0 * np.pi) - np.pi) < _ANGLE
             close = np.linalg.norm(middles - middles[a, y, x], axis=-1) < _NEAR
             table[turned[:, None, None] & close] = np.inf
         return found

@@ -37,7 +37,7 @@ def segment_by_template(
         ClothNotFoundError: neither colours nor outline find it.
         InvalidInputError: an outline that cannot be one.
     """
-    found = find_shape(image, template, camera=camera, table=table, most=1 if hint is None else _INSTANCES)
+    found = find_shape(image, template, camera=camera, table=table, max_count=1 if hint is None else _INSTANCES)
     chosen = next((each for each in found if hint is None or _fits(each, hint)), None)
     try:
         mask = by_colours()
@@ -55,7 +55,7 @@ def segment_by_template(
 
 
 def _fits(found: FoundShape, hint: np.ndarray) -> bool:
-    """Return whether a shape lies where a hint says."""
+    """A shape lies where a hint says."""
     if len(hint) == 2:
         u, v = np.clip(np.round(hint).astype(int), 0, np.array(found.mask.shape[::-1]) - 1)
         return bool(found.mask[v, u])

@@ -100,7 +100,7 @@ def triangulate_polygon(points: np.ndarray) -> TriangulatedPolygon:
 
 
 def _crosses(points: np.ndarray) -> bool:
-    """Return whether two sides of a polygon (n, 2) that are no neighbours meet, or neighbours lie on each other."""
+    """Tell if two sides of a polygon (n, 2) meet that are no neighbours, or neighbours lie on each other."""
     a, b = points, np.roll(points, -1, axis=0)
     for k in range(len(points)):
         forward, onward = b[k] - a[k], np.roll(points, -2, axis=0)[k] - b[k]
@@ -160,8 +160,8 @@ def _flip(points: np.ndarray, triangles: list[tuple[int, int, int]]) -> list[tup
     for _ in range(len(found) * len(found) + 1):
         owners: dict[frozenset[int], list[int]] = {}
         for t, (a, b, c) in enumerate(found):
-            for edge in ((a, b), (b, c), (c, a)):
-                owners.setdefault(frozenset(edge), []).append(t)
+            for pair in ((a, b), (b, c), (c, a)):
+                owners.setdefault(frozenset(pair), []).append(t)
         for edge, both in owners.items():
             if len(both) != 2:
                 continue
@@ -197,4 +197,5 @@ def _elimination(triangles: list[tuple[int, int, int]]) -> list[tuple[int, int, 
         steps.append((k, triangles[t][(at + 1) % 3], triangles[t][(at + 2) % 3]))
         left.remove(t)
     when = {step[0]: (number, 0) for number, step in enumerate(steps)}
-    return [(k, *sorted((i, j), key=lambda v: when.get(v, (len(steps), v)), reverse=True)) for k, i, j in steps]
+    ranks = {v: when.get(v, (len(steps), v)) for step in steps for v in step}
+    return [(k, i, j) if ranks[i] > ranks[j] else (k, j, i) for k, i, j in steps]

@@ -1,4 +1,4 @@
-"""What ``nuno capture`` does."""
+"""The work of ``nuno capture``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.camera import Camera
 from nuno.errors import FileFormatError, InvalidInputError
-from nuno.estimate.capture import capture_case
+from nuno.estimate.capture_case import capture_case
 
 
 def run_capture(options: argparse.Namespace) -> str:
@@ -60,12 +60,12 @@ def run_capture(options: argparse.Namespace) -> str:
     for warning in made.warnings:
         sys.stderr.write(f"nuno: {warning}\n")
     lens = made.calibration
-    told = (
+    report = (
         "" if lens is None else f"lens {lens.error:.2f} px over {lens.views} views ({lens.covered:.0%} of the image), "
     )
     return (
-        f"{told}board on the table {made.board_error:.2f} px; look at {made.folder / 'preview.png'}: the grid must lie "
-        f"on the table and the cross on the hand. Then: nuno pick {made.folder} --out out\n"
+        f"{report}board on the table {made.board_error:.2f} px; look at {made.folder / 'preview.png'}: the grid must "
+        f"lie on the table and the cross on the hand. Then: nuno pick {made.folder} --out out\n"
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.image_quality import check_quality
 from nuno.errors import ImageError
-from nuno.estimate.capture import Capture, capture_case
+from nuno.estimate.capture_case import Capture, capture_case
 from nuno.files.whole_file import made_folder, write_whole
 from nuno.validation import checked, count
 
@@ -23,7 +23,7 @@ _TRIES = 5  # for each image
 
 @runtime_checkable
 class ImageSource(Protocol):
-    """What gives images: `nuno.UsbCamera`, or any camera with such a method."""
+    """A camera that gives images: `nuno.UsbCamera`, or any with such a method."""
 
     def take(self) -> np.ndarray:
         """Return an image, (h, w, 3) uint8 RGB."""

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.camera.calibration import Calibration, calibrate_camera, camera_over_table
+from nuno.camera.calibration import Calibration, calibrate_camera, camera_above_table
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, read_image
@@ -119,7 +119,7 @@ def capture_case(
                  for k, image in enumerate(board_images)]  # fmt: skip
         calibration = calibrate_camera([_read(image, "of the board") for image in board_images], own, names)
         lens = calibration.camera
-    seen, board_error = camera_over_table(
+    seen, board_error = camera_above_table(
         on_table, lens, own, table_height=height, board_thickness=board_thickness, board_at=board_at
     )
     away = _without_board(seen, own, board_at, height)
@@ -160,7 +160,7 @@ def capture_case(
 
 def _read(image: str | os.PathLike[str] | np.ndarray, name: str) -> np.ndarray:
     if not isinstance(image, np.ndarray):
-        return read_image(image)
+        return read_image(FilePath(image))
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
         raise ImageError(f"the image {name} must be RGB uint8 (h, w, 3), got {image.dtype} of shape {image.shape}")
     return image
