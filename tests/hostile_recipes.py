@@ -73,6 +73,11 @@ class Scene:
         return nuno.SweepResult({"x": np.arange(2.0)}, trials)
 
     @cached_property
+    def follower(self):
+        """One of the towel."""
+        return nuno.follow(self.world, self.towel, self.camera)
+
+    @cached_property
     def viewer(self):
         """Nobody looks at it."""
         return nuno.Viewer(self.world)
@@ -227,6 +232,7 @@ CALLS = {
     "fit_material": {"seen": None},
     "fitted_tetrahedra": {"vertices": CUBE[0], "faces": CUBE[1], "cell": 0.5},
     "fixed_joint": RIGID_JOINT,
+    "follow": {"world": lambda s: s.world, "body": lambda s: s.towel, "camera": lambda s: s.camera},
     "hinge": {**RIGID_JOINT, "point": POINT, "axis": (1, 0, 0)},
     "improve_fold": {"motion": None, "cloth": lambda s: s.still},
     "lattice_tetrahedra": {"vertices": CUBE[0], "faces": CUBE[1], "cell": 0.5},
@@ -315,7 +321,8 @@ CALLS = {
     "Coordinates.locate": {"position": POINT}, "Coordinates.rotate": {"angle": 0.1, "axis": "x"},
     "Coordinates.to_local": {"points": [POINT]}, "Coordinates.to_world": {"points": [POINT]},
     "Coordinates.transform": {"other": lambda s: nuno.Coordinates()}, "Coordinates.translate": {"offset": POINT},
-    "Film.save": {"path": "out.html"}, "Grip.release": {},
+    "Film.save": {"path": "out.html"}, "Follower.update": {"time": 0.0, "seen": np.ones((48, 64), bool)},
+    "Follower.through": {"frames": lambda s: [(0.0,)]}, "Grip.release": {},
     "HandPath.at": {"time": 0.5}, "HandPath.holds_at": {"time": 0.5},
     "JointTrajectory.of": {"names": ("head_1_joint",)},
     "Layers.over": {"u": 0.5, "v": 0.5},
@@ -389,7 +396,8 @@ CALLS = {
 # The object whose method is called
 OWNERS = {
     "Body": lambda s: s.towel, "Camera": lambda s: s.camera, "Cloth": lambda s: nuno.Cloth(),
-    "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
+    "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Follower": lambda s: s.follower,
+    "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
     "HandPath": lambda s: s.hand, "JointTrajectory": lambda r: r.trajectory, "Layers": lambda s: s.layers,
     "Knots": lambda s: nuno.Knots([0.0, 0.0, 0.0], [POINT], 1.0),
     "Path": lambda s: s.path, "Recording": lambda s: s.recording, "Snapshot": lambda s: s.snapshot,
@@ -423,6 +431,8 @@ UNCALLED = {
         "Film",
         "FoldCase",
         "FoldResult",
+        "Followed",
+        "Follower",
         "Grip",
         "HandTrack",
         "ImprovedFold",

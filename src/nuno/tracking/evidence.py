@@ -83,8 +83,8 @@ class Evidence:
 
 
 def weigh(
-    seen: Observation, image: ClothImage, vertices: np.ndarray, normals: np.ndarray, inwards: np.ndarray, faces: np.ndarray,
-    spacing: float, reach: float, evidence: Evidence,
+    seen: Observation, image: ClothImage, vertices: np.ndarray, normals: np.ndarray, inwards: np.ndarray,
+    faces: np.ndarray, spacing: float, reach: float, evidence: Evidence,
 ) -> None:  # fmt: skip
     """Add what one camera says to the evidence.
 
