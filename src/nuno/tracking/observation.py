@@ -1,4 +1,4 @@
-"""What one camera shows at one instant, on the pixels that a follower looks at."""
+"""The view of one camera at one instant, on the pixels that a follower looks at."""
 
 from __future__ import annotations
 
