@@ -33,6 +33,8 @@ from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
 
+ARGUMENTS = ("time", "seen", "depth", "hidden", "camera")
+"""Of an image of a stream."""
 SOON = 1e-6
 """[s] Instants so near to each other are one."""
 LONGEST = 0.2
@@ -103,21 +105,23 @@ class Follower:
         Raises:
             InvalidInputError: what is neither; and as ``update``.
         """
-        from nuno.world.progress import with_bar
-
-        if not isinstance(frames, Iterable) or isinstance(frames, str | bytes | Mapping):
+        if not isinstance(frames, Iterable) or isinstance(frames, str | bytes | Mapping | np.ndarray | set | type):
             raise InvalidInputError(f"frames must be a stream of images, got {type(frames).__name__}")
         if progress is not None:
             flag("progress", progress)
+        if isinstance(frames, Sequence):
+            if not len(frames):
+                raise InvalidInputError("frames must be at least one image")
+            for frame in frames:
+                _check_frame(frame)
+        return self._through(frames, progress)
+
+    def _through(self, frames: Iterable[Any], progress: bool | None) -> Iterator[Followed]:
+        from nuno.world.progress import with_bar
+
         for frame in with_bar(frames, "following", progress) if isinstance(frames, Sequence) else frames:
-            if isinstance(frame, Mapping) and "time" in frame and all(isinstance(name, str) for name in frame):
-                yield self.update(**frame)
-            elif isinstance(frame, tuple | list) and 1 <= len(frame) <= 4:
-                yield self.update(*frame)
-            else:
-                raise InvalidInputError(
-                    f"an image of a stream is (time, seen, depth, hidden) or a mapping of these, got {frame!r:.100}"
-                )
+            _check_frame(frame)
+            yield self.update(**frame) if isinstance(frame, Mapping) else self.update(*frame)
 
     def update(
         self, time: float, seen: Any = None, depth: Any = None, hidden: Any = None, *, camera: Any = None
@@ -349,3 +353,20 @@ class Follower:
             own.agreement if own.compared else float("nan"),
             forces[self._adopted] if forces.ndim else np.zeros_like(vertices), self._adopted, self.probabilities,
         )  # fmt: skip
+
+
+def _check_frame(frame: Any) -> None:
+    """Check one image of a stream.
+
+    Raises:
+        InvalidInputError: neither a tuple nor a mapping of the arguments of ``Follower.update``.
+    """
+    named = isinstance(frame, Mapping) and "time" in frame and set(frame) <= set(ARGUMENTS)
+    if not named and not (isinstance(frame, tuple | list) and 1 <= len(frame) <= 4):
+        raise InvalidInputError(
+            f"an image of a stream is (time, seen, depth, hidden) or a mapping of these, got {frame!r:.100}"
+        )
+    given = frame if named else dict(zip(ARGUMENTS, frame, strict=False))
+    number("time", given["time"], high=1e9)
+    if isinstance(given.get("seen"), int | float):
+        raise InvalidInputError(f"seen must be a mask or an image, got {given['seen']!r}")
