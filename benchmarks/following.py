@@ -5,8 +5,8 @@ The follower begins 4 mm and 0.7 degrees off, with another material, mesh and su
 an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
 
 Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--json FILE] [--strip FILE]
-Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd" (coherent point drift, Myronenko and Song
-2010, by the package pycpd: pip install pycpd), which goes from frame to frame.
+Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd"
+(coherent point drift, Myronenko and Song 2010, by the package pycpd: pip install pycpd), from frame to frame.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ OFFSET, TURN, HAND_ERROR = (0.006, -0.005), 0.02, (0.0012, -0.0012, 0.001)
 CAMERA = nuno.Camera.look_at((-0.15, -0.7, TOP + 0.75), (0.0, 0.0, TOP + 0.1), 0.75, width=320, height=240)
 TRACKERS = ("follow", "masks", "futures", "open loop", "cpd")
 GUESSES = tuple(
-    nuno.Cloth(bending_rigidity=bending, area_density=density) for bending in (1e-5, 5e-5, 2e-4) for density in (0.2, 0.3)
+    nuno.Cloth(bending_rigidity=bending, area_density=density)
+    for bending in (1e-5, 5e-5, 2e-4)
+    for density in (0.2, 0.3)
 )
 
 
@@ -68,9 +70,10 @@ def seen(engine: str, name: str, hidden: bool) -> dict[str, Any]:
         depth[rng.random(depth.shape) < 0.02] = np.nan
         depths.append(depth)
     mine = resampled(vertices, OWN_CELLS)
-    covered = [world_time for world_time in times if hidden and HIDDEN[0] <= world_time < HIDDEN[1]]
-    return {"times": times, "masks": masks, "depths": depths, "truth": mine, "covered": np.isin(times, covered),
-            "engine": engine, "motion": name, "board": board, "board_mask": _board_masks(world, board, times, vertices, hidden)}
+    covered = np.array([hidden and HIDDEN[0] <= time < HIDDEN[1] for time in times])
+    boards = _board_masks(world, board, times, vertices, hidden)
+    return {"times": times, "masks": masks, "depths": depths, "truth": mine, "covered": covered, "engine": engine,
+            "motion": name, "board_mask": boards}  # fmt: skip
 
 
 def _board_masks(world: Any, board: Any, times: Any, vertices: Any, hidden: bool) -> list[Any]:
@@ -162,9 +165,12 @@ def _drift(case: dict[str, Any]) -> tuple[np.ndarray, float]:
         begin = clock.process_time()
         points = CAMERA.camera_to_world[:3, 3] + rays[tuple(chosen.T)] * depth[tuple(chosen.T)][:, None]
         if len(points) > 20:
-            now = DeformableRegistration(
-                X=10.0 * points, Y=10.0 * now, alpha=2.0, beta=1.0, w=0.1, max_iterations=40, tolerance=1e-4
-            ).register()[0] / 10.0
+            now = (
+                DeformableRegistration(
+                    X=10.0 * points, Y=10.0 * now, alpha=2.0, beta=1.0, w=0.1, max_iterations=40, tolerance=1e-4
+                ).register()[0]
+                / 10.0
+            )
         spent.append(clock.process_time() - begin)
         found.append(now)
     return np.array(found), float(np.mean(spent[1:]))
@@ -187,10 +193,12 @@ def strip(case: dict[str, Any], found: dict[str, np.ndarray], path: Path) -> Non
         for k in columns:
             world.set_vertices(towel, shapes[k])
             hands = [body for body in world.bodies if body.name.startswith("hand")]
-            for body, start, move in zip(hands, add_starts(case), motion(case["motion"]).at(case["times"][k]), strict=True):
+            moves = motion(case["motion"]).at(case["times"][k])
+            for body, start, move in zip(hands, add_starts(case), moves, strict=True):
                 body.locate(start + move)
             image = nuno.take_picture(world, CAMERA, samples=2).color.numpy()[40:, 40:280].copy()
-            cv2.putText(image, f"{label} {case['times'][k]:.1f} s", (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (20, 20, 20), 1)
+            text = f"{label} {case['times'][k]:.1f} s"
+            cv2.putText(image, text, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (20, 20, 20), 1)
             row.append(image)
         rows.append(np.hstack(row))
     cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
@@ -204,7 +212,8 @@ def add_starts(case: dict[str, Any]) -> np.ndarray:
 
 def resampled_order(towel: Any) -> np.ndarray:
     """Return which row of what ``resampled`` gives each vertex of a sheet is."""
-    flat = np.stack(np.meshgrid(*(np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, OWN_CELLS, strict=True))), -1)
+    axes = [np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, OWN_CELLS, strict=True)]
+    flat = np.stack(np.meshgrid(*axes), axis=-1)
     rest = towel.shape.mesh()[0][:, :2]
     return np.linalg.norm(rest[:, None] - flat.reshape(1, -1, 2), axis=-1).argmin(axis=1)
 
@@ -233,17 +242,20 @@ def main() -> None:
                     shapes[tracker] = found
                     off = 1000.0 * errors(found, case, towel)
                     covered = float(off[case["covered"]].mean()) if hidden else float("nan")
-                    row = {"engine": engine, "motion": name, "hidden": hidden, "tracker": tracker,
-                           "mean_mm": float(off.mean()), "worst_mm": float(off.max()), "hidden_mm": covered, "cpu_s": spent}
-                    rows.append(row)
-                    print(f"{engine:8} {name:7} {hidden!s:7} {tracker:10} {off.mean():6.1f} {off.max():6.1f} {covered:6.1f}"
-                          f"  {spent:18.3f}", flush=True)
+                    row = {"engine": engine, "motion": name, "hidden": hidden, "tracker": tracker}
+                    row |= {"mean_mm": float(off.mean()), "worst_mm": float(off.max())}
+                    rows.append(row | {"hidden_mm": covered, "cpu_s": spent})
+                    figures = f"{off.mean():6.1f} {off.max():6.1f} {covered:6.1f}  {spent:18.3f}"
+                    print(f"{engine:8} {name:7} {hidden!s:7} {tracker:10} {figures}", flush=True)
                 if options.strip and len(rows) == len(options.trackers):
-                    strip(case, {name: shapes[name] for name in ("follow", "open loop") if name in shapes}, options.strip)
+                    shown = {each: shapes[each] for each in ("follow", "open loop") if each in shapes}
+                    strip(case, shown, options.strip)
     for tracker in options.trackers:
         own = [row for row in rows if row["tracker"] == tracker]
-        print(f"{tracker}: mean {np.mean([r['mean_mm'] for r in own]):.1f} mm, worst sequence "
-              f"{max(r['mean_mm'] for r in own):.1f} mm, hidden {np.nanmean([r['hidden_mm'] for r in own]):.1f} mm")
+        print(
+            f"{tracker}: mean {np.mean([r['mean_mm'] for r in own]):.1f} mm, worst sequence "
+            f"{max(r['mean_mm'] for r in own):.1f} mm, hidden {np.nanmean([r['hidden_mm'] for r in own]):.1f} mm"
+        )
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
 

@@ -22,7 +22,7 @@ ENGINES = ("nuno", "mujoco", "newton")
 
 @dataclass(frozen=True)
 class Motion:
-    """What hands do: (hands, 2) where they hold the cloth as (u, v), and where they are, (hands, k, 3) [m] from there."""
+    """Hands: (hands, 2) where they hold the cloth as (u, v), and where they are then, (hands, k, 3) [m] from there."""
 
     held: np.ndarray
     times: np.ndarray
@@ -77,9 +77,9 @@ def resampled(vertices: np.ndarray, cells: tuple[int, int]) -> np.ndarray:
     rows, columns = vertices.shape[-3:-1]
     v, u = np.meshgrid(np.linspace(0, rows - 1, cells[1] + 1), np.linspace(0, columns - 1, cells[0] + 1), indexing="ij")
     flat_ = vertices.reshape(-1, rows, columns, 3)
-    found = np.stack(
-        [np.stack([map_coordinates(f[..., k], [v.ravel(), u.ravel()], order=1) for k in range(3)], axis=-1) for f in flat_]
-    )
+    places = [v.ravel(), u.ravel()]
+    each = [[map_coordinates(f[..., k], places, order=1) for k in range(3)] for f in flat_]
+    found = np.moveaxis(np.array(each), 1, -1)
     return found.reshape(*vertices.shape[:-3], -1, 3)
 
 
@@ -94,9 +94,10 @@ def _nuno(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: floa
     world = nuno.World(device="cpu", substeps=45)
     world.add(nuno.box((1.2, 1.2, 0.04), position=(0, 0, TOP - 0.02)))
     towel = world.add(nuno.sheet(SIZE, cells, position=(0, 0, TOP + radius)))
-    world.attach(
-        towel, nuno.Cloth(area_density=0.32, bending_rigidity=2e-4, shear_stiffness=150.0, friction=0.4, thickness=2 * radius)
+    material = nuno.Cloth(
+        area_density=0.32, bending_rigidity=2e-4, shear_stiffness=150.0, friction=0.4, thickness=2 * radius
     )
+    world.attach(towel, material)
     start = flat(cells, radius).reshape(-1, 3)
     order = [int(np.argmin(np.linalg.norm(towel.vertices - p, axis=1))) for p in start]
     for k, way in zip(_held(hands, cells), hands.moves, strict=True):
@@ -122,8 +123,9 @@ def _mujoco(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: fl
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>
       <option timestep="{step}" integrator="discrete" solver="Newton" tolerance="1e-6"/>
       <worldbody><geom type="plane" size="2 2 .1" pos="0 0 {TOP}" friction="0.4"/>{bodies}
-        <flexcomp name="c" type="grid" dim="2" count="{n[0]} {n[1]} 1" mass="{0.25 * SIZE[0] * SIZE[1]}" radius="{radius}"
-          spacing="{SIZE[0] / cells[0]} {SIZE[1] / cells[1]} 0.1" pos="0 0 {TOP + radius}">
+        <flexcomp name="c" type="grid" dim="2" count="{n[0]} {n[1]} 1" radius="{radius}"
+          mass="{0.25 * SIZE[0] * SIZE[1]}" pos="0 0 {TOP + radius}"
+          spacing="{SIZE[0] / cells[0]} {SIZE[1] / cells[1]} 0.1">
           <contact selfcollide="auto" friction="0.4"/>
           <elasticity young="1e6" poisson="0.2" thickness="1e-3" damping="0.002" elastic2d="both"/>
         </flexcomp></worldbody><equality>{ties}</equality></mujoco>""")

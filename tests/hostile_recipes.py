@@ -73,6 +73,11 @@ class Scene:
         return nuno.SweepResult({"x": np.arange(2.0)}, trials)
 
     @cached_property
+    def follower(self):
+        """One of the towel."""
+        return nuno.follow(self.world, self.towel, self.camera)
+
+    @cached_property
     def viewer(self):
         """Nobody looks at it."""
         return nuno.Viewer(self.world)
@@ -270,6 +275,7 @@ CALLS = {
     "fixed_joint": RIGID_JOINT,
     "garment": {"name": "sock", "cell": 0.04},
     "imagine_holds": {"garment": lambda s: s.sock, "candidates": [0, 1], "device": "cpu", "progress": False},
+    "follow": {"world": lambda s: s.world, "body": lambda s: s.towel, "camera": lambda s: s.camera},
     "hinge": {**RIGID_JOINT, "point": POINT, "axis": (1, 0, 0)},
     "image_quality": {"image": IMAGE},
     "improve_fold": {"motion": None, "cloth": lambda s: s.still},
@@ -373,6 +379,8 @@ CALLS = {
     "Garment.body": {}, "Garment.distances": {"vertex": 0}, "Garment.nearest": {"place": (0.0, 0.0)},
     "HoldResult.distance": {"vertex": 0}, "HoldResult.figure": {}, "HoldResult.positions": {"rank": 0},
     "HoldResult.save": {"folder": "out"}, "HoldResult.to_dict": {},
+    "Film.save": {"path": "out.html"}, "Follower.update": {"time": 0.0, "seen": np.ones((48, 64), bool)},
+    "Follower.through": {"frames": lambda s: [(0.0,)]}, "Grip.release": {},
     "HandPath.at": {"time": 0.5}, "HandPath.holds_at": {"time": 0.5},
     "JointTrajectory.of": {"names": ("head_1_joint",)},
     "Layers.over": {"u": 0.5, "v": 0.5},
@@ -451,6 +459,8 @@ OWNERS = {
     ),
     "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
     "Garment": lambda s: s.sock, "HoldResult": lambda s: s.hold,
+    "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Follower": lambda s: s.follower,
+    "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
     "HandPath": lambda s: s.hand, "JointTrajectory": lambda r: r.trajectory, "Layers": lambda s: s.layers,
     "Knots": lambda s: nuno.Knots([0.0, 0.0, 0.0], [POINT], 1.0),
     "Path": lambda s: s.path, "Recording": lambda s: s.recording, "Snapshot": lambda s: s.snapshot,
@@ -488,6 +498,8 @@ UNCALLED = {
         "FoldCase",
         "FoldResult",
         "Garment",
+        "Followed",
+        "Follower",
         "Grip",
         "HandTrack",
         "HoldResult",

@@ -149,8 +149,9 @@ if TYPE_CHECKING:
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
     from nuno.viewer.compare_engines import EngineComparison, compare_engines
+    from nuno.tracking.follow import follow
     from nuno.tracking.followed import Followed
-    from nuno.tracking.follower import Follower, follow
+    from nuno.tracking.follower import Follower
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -445,8 +446,9 @@ _LAZY = {
         "nuno.tasks.play_fold": "PlayedFold play_fold",
         "nuno.tasks.taught_fold": "TaughtFold",
         "nuno.viewer.compare_engines": "EngineComparison compare_engines",
+        "nuno.tracking.follow": "follow",
         "nuno.tracking.followed": "Followed",
-        "nuno.tracking.follower": "Follower follow",
+        "nuno.tracking.follower": "Follower",
         "nuno.viewer.film": "Film",
         "nuno.viewer.viewer": "Viewer",
         "nuno.world.contact_points": "ContactPoints",

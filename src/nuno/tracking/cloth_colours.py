@@ -1,4 +1,4 @@
-"""Where a cloth is in a colour image, by the colours that it had in the first one."""
+"""The place of a cloth in a colour image, by the colours that it had in the first one."""
 
 from __future__ import annotations
 

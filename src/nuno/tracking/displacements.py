@@ -26,9 +26,7 @@ class DisplacementField:
         link = coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count))
         link = link + link.T
         laplacian = diags(np.asarray(link.sum(axis=1)).ravel()) - link
-        self._smooth: csr_matrix = csr_matrix(
-            kron(COHERENCE * laplacian + REST * identity(count), identity(3))
-        )
+        self._smooth: csr_matrix = csr_matrix(kron(COHERENCE * laplacian + REST * identity(count), identity(3)))
 
     def solve(self, information: np.ndarray, residuals: np.ndarray) -> np.ndarray:
         """Return displacements (n, 3) [m].

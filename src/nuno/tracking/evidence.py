@@ -1,4 +1,4 @@
-"""What an image says of a cloth's vertices: the expectation step of Schulman, Lee, Ho and Abbeel.
+"""The evidence of an image on a cloth's vertices: the expectation step of Schulman, Lee, Ho and Abbeel.
 
 "Tracking deformable objects with point clouds", ICRA 2013: every observed point belongs to the visible vertices near it
 by a Gaussian, or to none (an outlier). The sum of a vertex's residuals, weighted by that, is what pulls it.
@@ -44,7 +44,7 @@ INDEPENDENT = 20.0
 
 @dataclass(eq=False)
 class Evidence:
-    """What images say of a cloth's vertices, summed up over cameras.
+    """The evidence of images on a cloth's vertices, summed up over cameras.
 
     Attributes:
         residuals: (n, 3) [m], each vertex's information times its expected residual.
@@ -83,8 +83,8 @@ class Evidence:
 
 
 def weigh(
-    seen: Observation, image: ClothImage, vertices: np.ndarray, normals: np.ndarray, inwards: np.ndarray, faces: np.ndarray,
-    spacing: float, reach: float, evidence: Evidence,
+    seen: Observation, image: ClothImage, vertices: np.ndarray, normals: np.ndarray, inwards: np.ndarray,
+    faces: np.ndarray, spacing: float, reach: float, evidence: Evidence,
 ) -> None:  # fmt: skip
     """Add what one camera says to the evidence.
 

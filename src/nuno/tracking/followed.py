@@ -1,4 +1,4 @@
-"""What a follower tells of one image."""
+"""The result of following a cloth through one image."""
 
 from __future__ import annotations
 

@@ -142,9 +142,9 @@ def _same_body(a: BodyRecord, b: BodyRecord) -> bool:
     if (a.dynamics is None) != (b.dynamics is None):
         return False
     if a.dynamics is None or b.dynamics is None:
-        if (a.deformed is None) != (b.deformed is None):
-            return False
-        return a.deformed is None or np.array_equal(a.deformed, b.deformed)
+        if a.deformed is None or b.deformed is None:
+            return a.deformed is b.deformed
+        return np.array_equal(a.deformed, b.deformed)
     own, other = a.dynamics, b.dynamics
     return (
         own.material.same_as(other.material)

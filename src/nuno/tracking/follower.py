@@ -18,14 +18,23 @@ from nuno.tracking.displacements import DisplacementField, rim_directions, verte
 from nuno.tracking.evidence import Evidence, weigh
 from nuno.tracking.followed import Followed
 from nuno.tracking.followed_futures import FollowedFutures
-from nuno.tracking.observation import Observation, check_depth, check_picture, is_picture, observe
+from nuno.tracking.observation import (
+    Observation,
+    check_depth,
+    check_picture,
+    checked_cameras,
+    is_picture,
+    observe,
+)
 from nuno.tracking.pixel_grid import PixelGrid
 from nuno.tracking.pulling import LEAK, STEADIEST, STEADY, STUCK, gain, limited, phases
-from nuno.validation import checked, count, flag, number
+from nuno.validation import flag, number
 from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
 
+ARGUMENTS = ("time", "seen", "depth", "hidden", "camera")
+"""Of an image of a stream."""
 SOON = 1e-6
 """[s] Instants so near to each other are one."""
 LONGEST = 0.2
@@ -96,21 +105,23 @@ class Follower:
         Raises:
             InvalidInputError: what is neither; and as ``update``.
         """
-        from nuno.world.progress import with_bar
-
-        if not isinstance(frames, Iterable) or isinstance(frames, str | bytes | Mapping):
+        if not isinstance(frames, Iterable) or isinstance(frames, str | bytes | Mapping | np.ndarray | set | type):
             raise InvalidInputError(f"frames must be a stream of images, got {type(frames).__name__}")
         if progress is not None:
             flag("progress", progress)
+        if isinstance(frames, Sequence):
+            if not len(frames):
+                raise InvalidInputError("frames must be at least one image")
+            for frame in frames:
+                _check_frame(frame)
+        return self._through(frames, progress)
+
+    def _through(self, frames: Iterable[Any], progress: bool | None) -> Iterator[Followed]:
+        from nuno.world.progress import with_bar
+
         for frame in with_bar(frames, "following", progress) if isinstance(frames, Sequence) else frames:
-            if isinstance(frame, Mapping) and "time" in frame and all(isinstance(name, str) for name in frame):
-                yield self.update(**frame)
-            elif isinstance(frame, tuple | list) and 1 <= len(frame) <= 4:
-                yield self.update(*frame)
-            else:
-                raise InvalidInputError(
-                    f"an image of a stream is (time, seen, depth, hidden) or a mapping of these, got {frame!r:.100}"
-                )
+            _check_frame(frame)
+            yield self.update(**frame) if isinstance(frame, Mapping) else self.update(*frame)
 
     def update(
         self, time: float, seen: Any = None, depth: Any = None, hidden: Any = None, *, camera: Any = None
@@ -143,7 +154,8 @@ class Follower:
             )
         self._check_state()
         grids = self._grids if camera is None else self._moved(camera)
-        given = [self._of_cameras(name, value) for name, value in (("seen", seen), ("depth", depth), ("hidden", hidden))]
+        named = {"seen": seen, "depth": depth, "hidden": hidden}
+        given = [self._of_cameras(name, value) for name, value in named.items()]
         shown = [self._checked(grid, *parts) for grid, parts in zip(grids, zip(*given, strict=True), strict=True)]
         if when < self.world.time - SOON:
             self._tell("late", f"an image of {when:g} s came when the world was at {self.world.time:g} s already")
@@ -210,7 +222,7 @@ class Follower:
         if value is None or len(self._grids) == 1:
             return [value] * len(self._grids)
         if not isinstance(value, Sequence) or len(value) != len(self._grids):
-            raise ImageError(f"{name} must be a sequence of {len(self._grids)}, one a camera, got {type(value).__name__}")
+            raise ImageError(f"{name} must be a sequence of {len(self._grids)}, one a camera, got {value!r:.60}")
         return list(value)
 
     def _checked(self, grid: PixelGrid, seen: Any, depth: Any, hidden: Any) -> tuple[Any, Any, Any]:
@@ -343,62 +355,18 @@ class Follower:
         )  # fmt: skip
 
 
-def checked_cameras(camera: Any) -> tuple[Camera, ...]:
-    """Return one camera or several as a tuple.
+def _check_frame(frame: Any) -> None:
+    """Check one image of a stream.
 
     Raises:
-        InvalidInputError: no cameras.
+        InvalidInputError: neither a tuple nor a mapping of the arguments of ``Follower.update``.
     """
-    cameras = (camera,) if isinstance(camera, Camera) else camera
-    if not isinstance(cameras, Sequence) or not cameras or not all(isinstance(each, Camera) for each in cameras):
-        raise InvalidInputError(f"camera must be a Camera or a sequence of them, got {camera!r:.100}")
-    return tuple(cameras)
-
-
-@checked
-def follow(
-    world: World, body: Body | str, camera: Any, *, materials: Sequence[Cloth] = (), reach: float = 0.1,
-    iterations: int = 2, pixels: int = 1500, thorough: bool = True,
-) -> Follower:  # fmt: skip
-    """Begin to follow a cloth through images: its physics, and forces from what is seen.
-
-    The world's own physics moves the cloth from image to image, with all grips and contacts. Each image is compared
-    with what the camera would see of that: every observed point belongs, by a Gaussian, to the visible vertices near
-    it, or to none. The vertices' expected residuals become forces, and the time since the image before is gone through
-    again with them (Schulman, Lee, Ho and Abbeel, "Tracking deformable objects with point clouds", ICRA 2013). What is
-    hidden moves by physics and by what it hangs together with.
-
-    Args:
-        world: The world, a single one. Its bodies hide the cloth in images as they do in it.
-        body: An attached cloth, or its name, about where it is in the first image.
-        camera: The camera, or a sequence of several that see the cloth at once.
-        materials: Guesses at the cloth's material. Each is a future of its own in a batch that all images judge; the
-            world becomes the likeliest. Empty is the material that the cloth has.
-        reach: Distance [m] at which a point is as likely an outlier as one of the nearest vertex's.
-        iterations: Expectations and maximisations for each image.
-        pixels: How many pixels of each image show the cloth at most; more are more precise, and take longer.
-        thorough: As of ``World.imagine``.
-
-    Raises:
-        BodyStateError: the body is static, the world is a batch, or it runs in the background.
-        InvalidInputError: the body is no cloth, or a value that cannot be used.
-    """
-    cameras = checked_cameras(camera)
-    number("reach", reach, above=0.0)
-    count("iterations", iterations)
-    count("pixels", pixels)
-    if world.world_count != 1:
-        raise BodyStateError(f"one world is followed, and this is a batch of {world.world_count}; see materials")
-    own = world.find(body) if isinstance(body, str) else body
-    if own not in world.bodies:
-        raise BodyStateError(f"{own.name!r} is not in this world")
-    if not own.shape.is_cloth:
-        raise InvalidInputError(f"only cloth is followed; {own.name!r} is a {own.shape.kind}")
-    if not isinstance(own.material, Cloth):
-        raise BodyStateError(f"{own.name!r} is static; attach it before it is followed")
-    if world.is_running:
-        raise BodyStateError("the world runs in the background; stop it, as a follower lets time pass itself")
-    guesses = tuple(materials)
-    for guess in guesses:
-        guess.resolved(1, 1)
-    return Follower(world, own, cameras, guesses, max(1, len(guesses)), reach, iterations, pixels, thorough)
+    named = isinstance(frame, Mapping) and "time" in frame and set(frame) <= set(ARGUMENTS)
+    if not named and not (isinstance(frame, tuple | list) and 1 <= len(frame) <= 4):
+        raise InvalidInputError(
+            f"an image of a stream is (time, seen, depth, hidden) or a mapping of these, got {frame!r:.100}"
+        )
+    given = frame if named else dict(zip(ARGUMENTS, frame, strict=False))
+    number("time", given["time"], high=1e9)
+    if isinstance(given.get("seen"), int | float):
+        raise InvalidInputError(f"seen must be a mask or an image, got {given['seen']!r}")

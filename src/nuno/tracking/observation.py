@@ -1,7 +1,8 @@
-"""What one camera shows at one instant, on the pixels that a follower looks at."""
+"""The view of one camera at one instant, on the pixels that a follower looks at."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.image import check_image, check_mask
-from nuno.errors import ImageError
+from nuno.errors import ImageError, InvalidInputError
 from nuno.tracking.pixel_grid import PixelGrid
 from nuno.validation import as_array
 
@@ -54,7 +55,7 @@ def observe(grid: PixelGrid, mask: Any, depth: Any, hidden: Any) -> Observation:
 
     Args:
         grid: The pixels to look at.
-        mask: (height, width), where the cloth is seen, of the full camera; or of the grid already, bool.
+        mask: (height, width), where the cloth is seen.
         depth: (height, width) [m] along the optical axis, or None; NaN, infinite and 0 are not known.
         hidden: (height, width) bool, where nothing can be told, or None.
 
@@ -62,10 +63,7 @@ def observe(grid: PixelGrid, mask: Any, depth: Any, hidden: Any) -> Observation:
         ImageError: one does not fit the camera, or depths that are no metres.
     """
     reduced = (grid.camera.height, grid.camera.width)
-    if isinstance(mask, np.ndarray) and mask.shape == reduced and mask.dtype == bool and grid.step > 1:
-        cloth = mask
-    else:
-        cloth = grid.take(check_mask(mask, grid.full, "mask"))
+    cloth = grid.take(check_mask(mask, grid.full, "mask"))
     covered = np.zeros(reduced, dtype=bool)
     if hidden is not None:
         covered = grid.take(check_mask(hidden, grid.full, "hidden"))
@@ -92,3 +90,15 @@ def check_depth(depth: Any, camera: Camera) -> np.ndarray:
             f"{given.dtype} of shape {given.shape}"
         )
     return given
+
+
+def checked_cameras(camera: Any) -> tuple[Camera, ...]:
+    """Return one camera or several as a tuple.
+
+    Raises:
+        InvalidInputError: no cameras.
+    """
+    cameras = (camera,) if isinstance(camera, Camera) else camera
+    if not isinstance(cameras, Sequence) or not cameras or not all(isinstance(each, Camera) for each in cameras):
+        raise InvalidInputError(f"camera must be a Camera or a sequence of them, got {camera!r:.100}")
+    return tuple(cameras)
