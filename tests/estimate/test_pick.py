@@ -123,6 +123,17 @@ def test_a_lift_far_sideways_is_still_found():
     assert result.best == seen[1] and result.confidence > 0.8
 
 
+def test_a_path_that_was_seen_tells_where_it_began(seen):
+    """Coarse meshes do not tell neighbours apart; the path begins at the true point, 7 cm from its neighbours."""
+    way = np.array((0.04, -0.03, 0.4))
+    share = np.linspace(0.0, 1.0, 30)[:, None]
+    path = seen[0]["hand"] - way + (share**3 * (10.0 + share * (6.0 * share - 15.0))) * way
+    found = nuno.estimate_pick(None, None, **options(seen, hand_path=path))
+    assert found.best == seen[1]
+    with pytest.raises(InvalidInputError, match="hand_path must end where the hand is"):
+        nuno.estimate_pick(None, None, **options(seen, hand_path=path[:-5]))
+
+
 def test_the_picked_point_is_found(result, seen):
     """The best of 36 is the point that was picked, and the rest are ranked behind it."""
     assert result.best == seen[1]
@@ -280,7 +291,7 @@ def test_a_doubtful_answer_says_how_likely_it_is(small):
     scores = np.full(6, -50.0)
     scores[[4, 1, 3]] = np.log((0.6, 0.3, 0.1))
     order = np.argsort(-scores, kind="stable")
-    doubtful = replace(small, scores=scores, order=order, trusted=1.0)
+    doubtful = replace(small, scores=scores, order=order, trusted=1.0, seen_warnings=())
     assert doubtful.confidence == pytest.approx(0.6)
     (warning,) = doubtful.warnings
     assert (
@@ -292,7 +303,7 @@ def test_a_doubtful_answer_says_how_likely_it_is(small):
     assert replace(sure, trusted=0.7).confidence == pytest.approx(0.7, abs=1e-9)
     assert "low confidence" in replace(sure, trusted=0.7).warnings[-1]
     other = replace(
-        small, scores=np.array((0.9, 0.5, 0.5, 0.89, 0.1, 0.1)), score_name="iou", order=np.array([0, 3, 1, 2, 4, 5])
+        doubtful, scores=np.array((0.9, 0.5, 0.5, 0.89, 0.1, 0.1)), score_name="iou", order=np.array([0, 3, 1, 2, 4, 5])
     )
     assert "(1, 1)" in other.warnings[0] and "almost as well" in other.warnings[0]
 
