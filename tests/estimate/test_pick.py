@@ -131,7 +131,7 @@ def test_a_path_that_was_seen_tells_where_it_began(seen):
     found = nuno.estimate_pick(None, None, **options(seen, hand_path=path))
     assert found.best == seen[1]
     with pytest.raises(InvalidInputError, match="hand_path must end where the hand is"):
-        nuno.estimate_pick(None, None, **options(seen, hand_path=path[:-5]))
+        nuno.estimate_pick(None, None, **options(seen, hand_path=path[:-12]))
 
 
 def test_the_picked_point_is_found(result, seen):
