@@ -92,15 +92,15 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     if failed is not None:
         # A cloth that hangs over the table's near border may fill most of the border's pixels.
         with suppress(ClothNotFoundError):
-            return _beside_far_rim(small, rim, surface, xy, camera, pixel), surface
+            return _unlike_far_rim(small, rim, surface, xy, camera, pixel), surface
         raise ClothNotFoundError(f"{failed}; {_HELP}") from None
     return blob, surface
 
 
-def _beside_far_rim(
+def _unlike_far_rim(
     small: np.ndarray, rim: np.ndarray, surface: np.ndarray, xy: np.ndarray, camera: Camera, pixel: np.ndarray | None
 ) -> np.ndarray:
-    """What differs from the far half of the table's rim alone, (h, w) bool; the arguments are those of `first_look`."""
+    """A region (h, w) bool that differs from the far half of the table's rim; arguments as of `first_look`."""
     away = np.linalg.norm(xy - camera.camera_to_world[:2, 3], axis=-1)
     far = rim & (away > 0.5 * (away[rim].min() + away[rim].max()))
     if far.sum() < 30:

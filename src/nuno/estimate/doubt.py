@@ -1,4 +1,4 @@
-"""How far evidence may be trusted: a chance fit, a best future that fits badly, and warnings make an answer less sure.
+"""Doubt of evidence: a chance fit, a best future that fits badly, and warnings make an answer less sure.
 
 Evidence (`nuno.estimate.ranking`) takes it that one of the guesses is right up to chance. Where it is not, three things
 tell so. The answer may hang on a single future: so it is asked for again without the best guess of every candidate, and

@@ -1,4 +1,4 @@
-"""Where the hand may be instead of where it is told, and how likely: a measured hand is off by a centimetre or so.
+"""Errors of where the hand is told to be, and how likely they are: a measured hand is off by a centimetre or so.
 
 A cloth in a hand that is elsewhere is seen elsewhere, so a future is compared where it was imagined and where it is
 once it is moved along with the hand, across the view and up or down; along the line of sight little would change.
@@ -27,7 +27,7 @@ GROSS_SHARE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """How futures are moved before they are compared.
+    """Moves of futures before they are compared.
 
     Attributes:
         turns: (t,) float, about the hand's vertical [rad].

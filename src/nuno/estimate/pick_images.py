@@ -91,9 +91,9 @@ def find_cloth_before(
         if images.before is None:
             raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
         found = segment_before(images.before, camera, table, hint=hint, template=template)
-        images = replace(images, mask_before=found)
         if hint is None and template is None and rectangle is None:
             other = other_cloth(images.before, found, camera, table)
+        images = replace(images, mask_before=found)
     if rectangle is None:
         assert images.mask_before is not None
         over = border_warning(images.mask_before, camera, table)

@@ -106,7 +106,9 @@ def check_settings(
         raise InvalidInputError(f"discretisations must be a sequence of Discretisation, got {discretisations!r}")
     if not discretisations or discretisations[0].best is not None:
         raise InvalidInputError("discretisations must begin with one that looks at all candidates (best=None)")
-    angles = checked_turns(turns) if score in EVIDENCE else np.zeros(1)
+    angles = checked_turns(turns)
+    if score not in EVIDENCE:
+        angles = np.zeros(1)
     number("hand_std", hand_std, low=0.0, high=MAX_HAND_STD)
     path = None if hand_path is None else checked_path(hand_path, hand, hand_std)
     return PickSettings(

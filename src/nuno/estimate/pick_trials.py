@@ -128,8 +128,8 @@ def try_picks(
     batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
     odd = oddities(comparisons, best, settings.score, guess)
-    told = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
-    ranked = doubted(comparisons, settings.score, len(uv), prior, told)
+    reported = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
+    ranked = doubted(comparisons, settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted)
 

@@ -27,7 +27,7 @@ STILL = (0.0, 0.0, 0.0)
 
 
 class Pose(NamedTuple):
-    """How a future is moved before it is compared.
+    """A move of a future before it is compared.
 
     Attributes:
         angle: Of the turn about the hand's vertical [rad].
