@@ -375,7 +375,6 @@ CALLS = {
     "Coordinates.transform": {"other": lambda s: nuno.Coordinates()}, "Coordinates.translate": {"offset": POINT},
     "EngineComparison.differences": {}, "EngineComparison.film": {}, "EngineComparison.table": {"rows": 2},
     "EngineComparison.save": {"folder": "out"},
-    "Film.save": {"path": "out.html"}, "Grip.release": {},
     "Garment.body": {}, "Garment.distances": {"vertex": 0}, "Garment.nearest": {"place": (0.0, 0.0)},
     "HoldResult.distance": {"vertex": 0}, "HoldResult.figure": {}, "HoldResult.positions": {"rank": 0},
     "HoldResult.save": {"folder": "out"}, "HoldResult.to_dict": {},
@@ -457,7 +456,6 @@ OWNERS = {
     "EngineComparison": lambda s: nuno.EngineComparison(
         ("nuno", "mujoco"), {"nuno": s.recording, "mujoco": s.recording}, ("towel",), {"nuno": 0.0, "mujoco": 0.0}
     ),
-    "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,
     "Garment": lambda s: s.sock, "HoldResult": lambda s: s.hold,
     "Coordinates": lambda s: s.table, "Film": lambda s: s.film, "Follower": lambda s: s.follower,
     "Grip": lambda s: s.grip, "Joint": lambda s: s.hinge,

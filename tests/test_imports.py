@@ -13,8 +13,8 @@ DOOR = {"__init__", "__main__", "errors", "materials", "validation"}
 LAYERS = (
     "errors", "validation", "materials", "mesh", "numbers", "topology", "state", "constraints", "contact.self",
     "contact.particle", "shapes", "rigid", "coupled", "plans", "kernels", "files", "joints", "solvers", "tables",
-    "bodies", "engines", "camera", "world", "search", "envs", "estimate", "tracking", "robot", "viewer", "scenes", "tasks",
-    "__init__", "__main__",
+    "bodies", "engines", "camera", "world", "search", "envs", "estimate", "tracking", "robot", "viewer", "scenes",
+    "tasks", "__init__", "__main__",
 )  # fmt: skip
 # Words that the field has others for: (part of an identifier or file name, what it is called now).
 REPLACED = {

@@ -85,9 +85,9 @@ if TYPE_CHECKING:
     from nuno.camera.segmentation import segment_after, segment_before
     from nuno.camera.table import Table
     from nuno.camera.usb_camera import UsbCamera
+    from nuno.engines.engine_registry import engine_capabilities
     from nuno.estimate.capture_case import Capture, capture_case
     from nuno.estimate.capture_live import take_capture
-    from nuno.engines.engine_registry import engine_capabilities
     from nuno.estimate.case import PickCase, read_case
     from nuno.estimate.fit_material import MaterialFit, fit_material
     from nuno.estimate.fold import replay_fold
@@ -148,10 +148,10 @@ if TYPE_CHECKING:
     from nuno.tasks.pick_towel import TowelPicker
     from nuno.tasks.play_fold import PlayedFold, play_fold
     from nuno.tasks.taught_fold import TaughtFold
-    from nuno.viewer.compare_engines import EngineComparison, compare_engines
     from nuno.tracking.follow import follow
     from nuno.tracking.followed import Followed
     from nuno.tracking.follower import Follower
+    from nuno.viewer.compare_engines import EngineComparison, compare_engines
     from nuno.viewer.film import Film
     from nuno.viewer.viewer import Viewer
     from nuno.world.contact_points import ContactPoints
@@ -183,8 +183,8 @@ __all__ = [
     "Cylinder",
     "Drawing",
     "ElementState",
-    "EngineComparison",
     "EngineCapabilityError",
+    "EngineComparison",
     "EstimationError",
     "FileFormatError",
     "FileWriteError",
@@ -312,8 +312,8 @@ __all__ = [
     "draw",
     "each",
     "elements",
-    "estimate_hold",
     "engine_capabilities",
+    "estimate_hold",
     "estimate_pick",
     "export_body",
     "find_layers",
@@ -322,8 +322,8 @@ __all__ = [
     "fit_material",
     "fitted_tetrahedra",
     "fixed_joint",
-    "garment",
     "follow",
+    "garment",
     "hinge",
     "image_quality",
     "imagine_holds",

@@ -154,9 +154,7 @@ def estimate_pick(
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
-    images, rectangle = find_cloth_before(
-        images, rectangle, hint, settings, choice("shape", shape, SHAPES), template
-    )
+    images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES), template)
     settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(
         images.before, images.after, images.mask_before, images.mask_after, camera=settings.camera,

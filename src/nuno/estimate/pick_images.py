@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.flat import first_look
 from nuno.camera.image import check_image, check_mask, read_image
-from nuno.camera.rectangle import ClothRectangle
+from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.regions import grow
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
