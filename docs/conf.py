@@ -46,6 +46,7 @@ nitpick_ignore_regex = [
     # What a result holds for other functions to take
     ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
     ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
+    ("py:class", r"(.*\.)?(ContactRules|Simulation)"),
 ]
 
 
