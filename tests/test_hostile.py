@@ -31,7 +31,8 @@ EACH = 7
 """Of the calls, every so many is made where all would take long: all arguments and all values come up."""
 # Valid calls of which the recipe has no file, robot's sensor or the like
 WITHOUT = {"segment_before", "segment_after",
-           "read_case", "read_fold_case", "read_sweep", "load_scene", "Recording.load", "triangulate", "Viewer.remove_camera",
+           "read_case", "read_fold_case", "read_sweep", "load_scene",
+           "Recording.load", "triangulate", "Viewer.remove_camera",
            "Viewer.remove_plot", "RobotInterface.read_wrench"}  # fmt: skip
 
 
