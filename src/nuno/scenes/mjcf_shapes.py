@@ -158,7 +158,8 @@ def _shape(
         own = quat.rotate(pose[1], points) + pose[0]
         triangles = np.array(model.mesh_face[start : start + faces])
         a, b, c = triangles.T
-        shape = TriangleMesh(own, triangles[(a != b) & (b != c) & (c != a)])
+        used, renumbered = np.unique(triangles[(a != b) & (b != c) & (c != a)], return_inverse=True)
+        shape = TriangleMesh(own[used], renumbered.reshape(-1, 3))  # without points of no face
         return shape, (shape.centre, quat.IDENTITY)
     scene.note(f"a geom of type {kind} is left out", name)
     return None, pose

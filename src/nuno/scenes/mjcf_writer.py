@@ -27,6 +27,8 @@ from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 
 KEY = "nuno"
 """Name of the key frame and of the text."""
+FLAT = 1e-5
+"""Of a mesh's size, how far its vertices are from a plane at least if they have a hull."""
 MASK = 0x7FFFFFFF
 """MuJoCo's masks of contact groups are signed."""
 
@@ -40,6 +42,7 @@ class MjcfWriter:
     """Writes one scene."""
 
     def __init__(self, scene: SceneDescription) -> None:
+        free_names(scene)
         self.scene, self.tree = scene, joint_tree(scene)
         self.root = xml.Element("mujoco", model="nuno")
         xml.SubElement(self.root, "compiler", angle="radian", autolimits="true", boundmass="0", boundinertia="0")
@@ -129,6 +132,9 @@ class MjcfWriter:
         else:
             said |= {"type": "mesh", "mesh": name}
             vertices, faces = shape.mesh()
+            if is_flat(vertices):
+                self.scene.note("a flat mesh has a hull of some depth for MuJoCo", body.name)
+                vertices = np.vstack([vertices, out_of_plane(vertices)])
             xml.SubElement(
                 self.asset, "mesh", name=name, vertex=numbers(np.ravel(vertices)),
                 face=" ".join(map(str, np.ravel(faces))), inertia="exact" if shape.is_solid else "shell",
@@ -245,3 +251,32 @@ class MjcfWriter:
 
     def _rgba(self, body: SceneBody) -> str:
         return numbers([*rgb("gray" if body.color is None else body.color), 1.0])
+
+
+def free_names(scene: SceneDescription) -> None:
+    """Rename bodies whose names are MuJoCo's: "world", and those that it gives to a flex's vertices ("towel_1")."""
+    flexes = [body.name for body in scene.bodies if body.deforms and not is_rigid(body)]
+    taken = {body.name for body in scene.bodies}
+    for body in scene.bodies:
+        stem, _, number = body.name.rpartition("_")
+        of_vertex = stem in flexes and number.isdecimal() and body.name not in flexes
+        if body.name == "world" or of_vertex:
+            name = f"{body.name} body"
+            while name in taken:
+                name += "'"
+            taken.add(name)
+            scene.note("a name that MuJoCo gives itself is changed", f"{body.name} to {name}")
+            scene.rename(body.name, name)
+
+
+def is_flat(vertices: np.ndarray) -> bool:
+    """Return True if all vertices (n, 3) lie in a plane, of which MuJoCo makes no hull."""
+    spread = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
+    return bool(spread[2] < FLAT * spread[0])
+
+
+def out_of_plane(vertices: np.ndarray) -> np.ndarray:
+    """Return a point (3,) off the middle of vertices in a plane, which belongs to no face."""
+    middle = vertices.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(vertices - middle, full_matrices=False)
+    return np.asarray(middle + 1e-3 * sizes[0] * axes[2])

@@ -144,6 +144,20 @@ class SceneDescription:
         """Return the body of that name."""
         return next(body for body in self.bodies if body.name == name)
 
+    def rename(self, old: str, new: str) -> None:
+        """Give a body another name, wherever it is named."""
+        self.body(old).name = new
+        for joint in self.joints:
+            joint.body = new if joint.body == old else joint.body
+            joint.other = new if joint.other == old else joint.other
+        for grip in self.grips:
+            grip.body = new if grip.body == old else grip.body
+            grip.to = new if grip.to == old else grip.to
+        self.ignored = [(new if a == old else a, new if b == old else b) for a, b in self.ignored]
+        self.pair_friction = [
+            (new if a == old else a, new if b == old else b, mu) for a, b, mu in self.pair_friction
+        ]  # fmt: skip
+
     def note(self, what: str, name: str) -> None:
         """Remember that something was left out or approximated."""
         if name not in self.notes[what]:

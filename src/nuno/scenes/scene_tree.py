@@ -33,7 +33,8 @@ def joint_tree(scene: SceneDescription) -> JointTree:
     """Return the trees of a scene's rigid bodies, which begin at what is static or at the first body of each island."""
     tree = JointTree()
     moving = {body.name for body in scene.bodies if is_rigid(body)}
-    left = [joint for joint in scene.joints if joint.kind != "fixed"]
+    # ball joints last: those that close loops can be constraints, which hinges and sliders cannot
+    left = sorted((joint for joint in scene.joints if joint.kind != "fixed"), key=lambda joint: joint.kind == "ball")
     tree.loops = [joint for joint in scene.joints if joint.kind == "fixed"]
     reached: set[str] = set()
 
