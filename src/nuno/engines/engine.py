@@ -56,7 +56,7 @@ CAPABILITIES: dict[str, str] = {
     "air drag": "air_drag of a material",
     "batch": "imagine(n) with n above 1",
     "cuda": 'World(device="cuda")',
-    "robots": "simulated robots, whose links are moved by joints or paths",
+    "robots with dynamics": "SimulatedRobot(dynamics=True); others follow paths",
 }
 """What an engine may be able to do, and by what it is asked for."""
 

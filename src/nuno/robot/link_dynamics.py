@@ -95,10 +95,12 @@ class LinkDynamics:
         """Give the links dynamics from where they are, at rest; motors hold the joints.
 
         Raises:
+            EngineCapabilityError: the world's engine has no joints with motors for robots.
             BodyStateError: they have them, or have left their world.
         """
         if self.is_attached:
             raise BodyStateError(f"the links of {self.robot.name!r} are attached already")
+        self.world.engine.require("robots with dynamics")
         self.links.stop()
         world, model, bodies = self.world, self.robot.model, self.links.bodies
         angles = self.robot.angle_vector()

@@ -88,8 +88,8 @@ class SimulatedRobot(SimulatedBody):
             raise BodyStateError(f"another robot moves the links of {robot.name!r} already")
         MotionGuard.check_mode(collisions)
         self.pace = None if real_time_factor is None else number("real_time_factor", real_time_factor, above=0.0)
-        self.world = world
-        self._entered = links is None
+        world.engine.require(*(["robots with dynamics"] if dynamics else []))
+        self.world, self._entered = world, links is None
         meshes = "joints" if dynamics else "collision"
         self.links: Links = robot.copy().enter(world, meshes) if links is None else links
         self.actual = self.links.robot

@@ -30,8 +30,8 @@ from nuno.shapes.path import Path
 from nuno.world.rigid_layout import RigidLayout, RigidPlace
 from nuno.world.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
 
-FORMAT = 4
-READABLE = (1, 2, 3, FORMAT)  # 1 has no paths of bodies, 3 no clock of each world
+FORMAT = 5
+READABLE = (1, 2, 3, 4, FORMAT)  # 1 has no paths of bodies, 3 no clock of each world, 4 no engine
 ORIGIN = 3
 """The first format that says what the places of moving rigid bodies are relative to."""
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}

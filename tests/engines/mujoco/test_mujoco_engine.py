@@ -272,3 +272,78 @@ def test_a_run_that_fails_leaves_the_world_as_it_was():
         world.run(0.2)
     np.testing.assert_array_equal(cloth.vertices, before)
     assert world.time == time
+
+
+def test_a_robot_follows_its_paths_and_has_no_dynamics_there():
+    """Its links carry what lies on them as any moving shape does; dynamics are refused before it enters the world."""
+    pytest.importorskip("pinocchio")
+    world = nuno.World(device="cpu", engine="mujoco")
+    with pytest.raises(nuno.EngineCapabilityError, match="mujoco has no robots with dynamics; engines that have: nuno"):
+        nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
+    assert not world.bodies and not world.drivers
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    ball = world.attach(world.add(nuno.sphere(0.05, position=(2.0, 0.0, 1.0), name="ball")))
+    angles = robot.angle_vector()
+    angles[robot.actual.joint_names.index("arm_left_4_joint")] -= 0.3
+    robot.angle_vector(angles, 0.2)
+    world.run(0.2)
+    assert ball.position[2] == pytest.approx(1.0 - 0.5 * 9.81 * world.time * (world.time + 1.0 / 480.0), abs=1e-9)
+    np.testing.assert_allclose(robot.state().q[7:], angles, atol=1e-2)
+
+
+def test_a_static_mesh_that_is_not_convex_is_met_as_it_is():
+    """A ball falls through a torus's hole onto the floor, where a convex hull would bear it."""
+    trimesh = pytest.importorskip("trimesh")
+    world = nuno.World(device="cpu", engine="mujoco")
+    world.add(nuno.plane())
+    world.add(nuno.mesh(trimesh.creation.torus(0.2, 0.05), position=(0.0, 0.0, 0.05), name="torus"))
+    inner = world.attach(world.add(nuno.sphere(0.1, position=(0.0, 0.0, 0.3), name="inner")))
+    outer = world.attach(world.add(nuno.sphere(0.1, position=(1.0, 0.0, 0.3), name="outer")))
+    world.run(0.5)
+    assert inner.position[2] == pytest.approx(0.1, abs=1e-3)
+    assert outer.position[2] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_materials_by_warp_weft_and_element_are_taken():
+    """A strip that is stiff across hangs down, one that is stiff along itself stands out as one stiff in both does."""
+    drops = []
+    for rigidity in ((1e-5, 1e-2), (1e-2, 1e-4), np.full(30, 1e-2)):
+        world = nuno.World(device="cpu", engine="mujoco")
+        strip = world.add(nuno.sheet((0.2, 0.06), cells=(10, 3), position=(0.0, 0.0, 1.0)))
+        world.attach(strip, nuno.Cloth(bending_rigidity=rigidity, air_drag=10.0))
+        held = np.flatnonzero(strip.vertices[:, 0] < -0.07)
+        world.grip(strip, held, to=strip.vertices[held].mean(axis=0))
+        world.run(1.0)
+        drops.append(1.0 - strip.vertices[strip.vertices[:, 0].argmax(), 2])
+    # the stiff ones drop by w L^4 / (8 B) with L = 0.19 m from between the two columns that are held
+    expected = 0.2 * 9.81 * 0.19**4 / (8.0 * 1e-2)
+    assert drops[0] > 0.1
+    assert drops[1] == pytest.approx(expected, rel=0.15)
+    assert drops[2] == pytest.approx(expected, rel=0.15)
+
+
+def test_contacts_are_told_of_a_table_on_a_path_after_a_change():
+    """A model that is compiled anew between two steps has the table where its path is: it bears the block's weight."""
+    world = nuno.World(device="cpu", engine="mujoco")
+    table = world.add(nuno.box((0.5, 0.5, 0.02), position=(0.0, 0.0, 0.99), name="table"))
+    block = world.attach(world.add(nuno.box((0.05, 0.05, 0.05), position=(0.0, 0.0, 1.025), name="block")))
+    world.move(table, nuno.Path([0.0, 1.0], [(0.0, 0.0, 0.99), (0.1, 0.0, 0.99)], None, "linear"))
+    world.run(0.3)
+    world.add(nuno.sphere(0.05, position=(2.0, 0.0, 1.0)))
+    found = world.contacts(block)
+    assert set(found.others) == {"table"}
+    assert found.forces.sum(axis=0)[2] == pytest.approx(9.81 * block.mass, rel=0.05)
+
+
+def test_substeps_and_gravity_may_change_between_runs():
+    """The next step has them: a fall by semi-implicit steps says how long they are, and how strong gravity is."""
+    world = nuno.World(device="cpu", engine="mujoco", substeps=4)
+    ball = world.attach(world.add(nuno.sphere(0.05, position=(0.0, 0.0, 1.0))))
+    world.run(0.1)
+    # z = 1 - g t (t + h) / 2, with h = 1/240 s
+    assert ball.position[2] == pytest.approx(1.0 - 0.5 * 9.81 * 0.1 * (0.1 + 1.0 / 240.0), abs=1e-9)
+    start = ball.position[2]
+    world.set_velocity(ball)
+    world.substeps, world.gravity = 2, (0.0, 0.0, -1.0)
+    world.run(0.1)
+    assert ball.position[2] == pytest.approx(start - 0.5 * 0.1 * (0.1 + 1.0 / 120.0), abs=1e-9)

@@ -19,17 +19,18 @@ BEND = 17
 """Numbers of an edge in ``flex_bending``: a symmetric matrix (4, 4) of its four vertices, and one for curved rests."""
 CELLS = 16
 """Cells along both sides of the patch."""
-ROUNDS = 6
-"""Corrections, each of which leaves about a tenth of the error."""
+ROUNDS = 12
+"""Corrections, each of which leaves a tenth to a third of the error."""
 
 
 @lru_cache(maxsize=64)
-def bending_factors(length: float, width: float) -> tuple[float, float]:
+def bending_factors(length: float, width: float, ratio: float = 1.0) -> tuple[float, float]:
     """Return by what the bending along warp and weft is multiplied in a sheet of cells of some sides [m].
 
     Args:
         length: Of a cell along warp.
         width: Along weft.
+        ratio: The bending rigidity along weft over that along warp.
     """
     elements, _ = sheet_triangles(CELLS, CELLS)
     scale = 1.0 / np.sqrt(length * width)
@@ -40,10 +41,10 @@ def bending_factors(length: float, width: float) -> tuple[float, float]:
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     factors = np.ones(2)
     for _ in range(ROUNDS):
-        warp, weft = np.sqrt(factors)
+        warp, weft = np.sqrt(factors * (1.0, ratio))
         rigidity = (warp * unit[:, 1] ** 2 + weft * unit[:, 0] ** 2) ** 2
         felt = [_felt(places, ends, flaps, rows * rigidity[:, None], axis) for axis in (0, 1)]
-        factors = factors / np.array(felt)
+        factors = factors / (np.array(felt) / (1.0, ratio))
     return float(factors[0]), float(factors[1])
 
 

@@ -26,7 +26,7 @@ BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
     "self-contact of soft bodies", "restitution", "sliding grips", "compliant grips", "limited grips", "sliders",
-    "joint drives", "effort", "impulses", "cuda", "robots",
+    "joint drives", "effort", "impulses", "cuda", "robots with dynamics",
 }  # fmt: skip
 
 
@@ -41,6 +41,7 @@ class MujocoEngine(Engine):
         mujoco_package()
         self._scene: Any = None
         self._is_current = False
+        self._settings: tuple[Any, ...] = ()
 
     # Dynamics
 
@@ -76,9 +77,10 @@ class MujocoEngine(Engine):
             from nuno.engines.mujoco.mujoco_scene import MujocoScene
 
             self._scene = MujocoScene(self.world)
-        if not self._is_current:
+        settings = (self.world.gravity, self.world.frame_rate, self.world.substeps, self.world.world_count)
+        if not self._is_current or settings != self._settings:
             self._scene.bring(self.substep)
-            self._is_current = True
+            self._is_current, self._settings = True, settings
         return self._scene
 
     @property
@@ -144,6 +146,12 @@ class MujocoEngine(Engine):
             if own.role == "static":
                 k = int(scene.model.body_mocapid[own.id])
                 batch.bind("mocap_pos")[:, k], batch.bind("mocap_quat")[:, k] = body.pose()
+            elif own.role == "moving":  # where it is now; a step sends it on
+                at, to = int(own.qpos[0]), int(own.dof[0])
+                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = body.pose()
+                velocity, spin = self.velocity_at(body, qpos[:, at : at + 3].copy())
+                qvel[:, to : to + 3] = velocity
+                qvel[:, to + 3 : to + 6] = quat.rotate(quat.inverse(qpos[:, at + 3 : at + 7]), spin)
             if dynamics is None:
                 continue
             values = dynamics.values

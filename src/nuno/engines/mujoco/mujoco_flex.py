@@ -65,7 +65,8 @@ class FlexMesh:
             self.elements, self.owner = sheet_triangles(*shape.cells)
             self.axes = np.broadcast_to(np.eye(3)[:2], (len(self.elements), 2, 3))
             length, width = (size / cells for size, cells in zip(shape.size, shape.cells, strict=True))
-            self.factors = bending_factors(1.0, round(width / length, 6))
+            warp, weft = _first_bending(dynamics)
+            self.factors = bending_factors(1.0, round(width / length, 6), float(f"{weft / warp:.2g}"))
             return
         assert isinstance(shape, ClothMesh)
         rest: Any = shape.rest
@@ -77,6 +78,13 @@ class FlexMesh:
         self.axes = np.stack(
             [np.einsum("mc,mcx->mx", triangles.extra[name][order], corners) for name in ("u", "v")], axis=1
         )
+
+
+def _first_bending(dynamics: ArrayParticles) -> tuple[float, float]:
+    """Return the mean rigidities along warp and weft in the first world [N m], their ratio 1,000 at most."""
+    values = dynamics.material.resolved(dynamics.world_count, element_count(dynamics.shape))
+    warp, weft = (max(float(values[f"bending_rigidity_{way}"][0].mean()), 1e-12) for way in ("warp", "weft"))
+    return max(warp, 1e-3 * weft), max(weft, 1e-3 * warp)
 
 
 def add_flex(spec: Any, name: str, mesh: FlexMesh, dynamics: ArrayParticles) -> tuple[Any, list[Any]]:
