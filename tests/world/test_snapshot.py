@@ -139,8 +139,10 @@ def test_files_that_cannot_be_read(tmp_path):
         changed = {**arrays, "header": np.array(json.dumps({**header, **changes}))}
         np.savez(tmp_path / name, **changed)
 
-    variant("newer.npz", format=5)
+    variant("newer.npz", format=6)
     variant("strange.npz", world={"type": "Path", "fields": {}})
+    fields = header["world"]["fields"]
+    variant("engine.npz", world={"type": "Snapshot", "fields": {**fields, "engine": "odd"}})
     variant("missing.npz", world={"type": "Snapshot", "fields": {"time": 0.0}})
     variant("swapped.npz", meshes=dict.fromkeys(header["meshes"], "0"))
     np.savez(tmp_path / "pickle.npz", header=np.array({"format": 1}, dtype=object))
@@ -148,7 +150,7 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "text.npz").write_text("no zip")
     (tmp_path / "cut.npz").write_bytes(data[: len(data) // 2])
     before = everything(world)
-    for name in ("newer", "strange", "missing", "swapped", "pickle", "other", "text", "cut", "absent"):
+    for name in ("newer", "engine", "strange", "missing", "swapped", "pickle", "other", "text", "cut", "absent"):
         with pytest.raises(FileFormatError):
             world.restore(tmp_path / f"{name}.npz")
     assert_same(everything(world), before)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from nuno.bodies.dynamics import Push
+from nuno.engines.engine_registry import ENGINES
 from nuno.errors import FileFormatError, NunoError
 from nuno.files.whole_file import replacing
 from nuno.joints.grip import GripSpec
@@ -95,6 +96,8 @@ def read_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         meshes = header["meshes"]
         if not isinstance(snapshot, Snapshot):
             raise TypeError("the header holds no world")
+        if snapshot.engine not in ENGINES:
+            raise TypeError(f"its states are of an engine {snapshot.engine!r} that is not known")
         moving = [body.name for body in snapshot.bodies if body.dynamics and isinstance(body.dynamics.material, Rigid)]
         if version < ORIGIN and moving:
             raise FileFormatError(
