@@ -47,6 +47,7 @@ class NewtonEngine(Engine):
         quiet_warp()
         self._made: NewtonModel | None = None
         self._substeps: NewtonSubsteps | None = None
+        self._gravity: tuple[float, ...] = ()
 
     def attach(self, body: Body, material: Any) -> Dynamics:
         """Return dynamics for a static body in the shape that it has now, at rest."""
@@ -81,12 +82,13 @@ class NewtonEngine(Engine):
 
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s]."""
-        if self._made is None or any(own.grips_changed for own in attached(self.world)):
+        gravity = tuple(float(part) for part in self.world.gravity)
+        if self._made is None or gravity != self._gravity or any(own.grips_changed for own in attached(self.world)):
             from nuno.engines.newton.newton_model import build_model
 
             for each in attached(self.world):
                 each.grips_changed = False
-            self._made, self._substeps = build_model(self.world), None
+            self._made, self._substeps, self._gravity = build_model(self.world), None, gravity
         if self._substeps is None:
             from nuno.engines.newton.newton_substeps import NewtonSubsteps
 
