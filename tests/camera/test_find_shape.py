@@ -162,6 +162,7 @@ def test_bad_input():
         ({"outline": TOWEL}, nuno.InvalidInputError, "below the 20 px"),
         ({"outline": 100 * TOWEL, "scales": ()}, nuno.InvalidInputError, "scales"),
         ({"outline": 100 * TOWEL, "scales": (0.0,)}, nuno.InvalidInputError, "positive"),
+        ({"outline": 100 * TOWEL, "scales": (0.01,)}, nuno.InvalidInputError, "at the scale 0.01"),
         ({"outline": TOWEL, "stretch": (1.1, 0.9), **seen}, nuno.InvalidInputError, "stretch"),
         ({"outline": TOWEL, "max_count": 0, **seen}, nuno.InvalidInputError, "max_count"),
     ):

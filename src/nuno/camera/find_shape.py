@@ -31,11 +31,13 @@ FORM = 1.0
 STRETCH = (0.6, 1.1)
 """Lengths between vertices, of the outline's: cloth is pushed together, but hardly stretched."""
 _CELLS = 11.0  # cells of the coarse grid along the square root of the shape's area
+_LONGEST = 14.0  # cells along a side of the coarse polygon at most
 _CELL_PIXELS = 8  # of the plane's picture, along a cell
 _LOCATIONS = 4000  # of the grid at most
 _COARSE, _DETAILED = 10, 20  # vertices
 _CANDIDATES = 12
 _BORDER = 0.008  # [m] of a table's top along its border that counts as not seen
+_SMALLEST = 16  # [px] across, of the picture that is searched
 _SAME = 0.3  # of two instances that share more of their area the better one is kept
 
 
@@ -229,9 +231,13 @@ def _at_scale(
     in_pixels = outline / view.resolution
     coarse = triangulate_polygon(with_vertices(in_pixels, _COARSE))
     area = scale * float(np.sqrt(signed_area(in_pixels)))
+    if area < _SMALLEST:
+        raise InvalidInputError(f"at the scale {scale:g} the outline measures {area:.1f} px, {_SMALLEST} are needed")
     rows, columns = view.seen.shape
-    spacing = max(area / _CELLS, float(np.sqrt(rows * columns / _LOCATIONS)), 2.0)
-    spacing = int(np.ceil(spacing)) if spacing > area / _CELLS else max(2, round(spacing))
+    longest = scale * float(np.linalg.norm(coarse.points - np.roll(coarse.points, 1, axis=0), axis=1).max())
+    cell = max(area / _CELLS, longest / _LONGEST)
+    spacing = max(cell, float(np.sqrt(rows * columns / _LOCATIONS)), 2.0)
+    spacing = int(np.ceil(spacing)) if spacing > cell else max(2, round(spacing))
     edges = edge_field(np.log(view.colours + 8.0) * 40.0, view.seen)
     weights = Weights(FORM, scale, stretch)
     search = TemplateSearch(coarse, edges.widened(round(0.5 * spacing)), spacing, weights)

@@ -52,11 +52,12 @@ class _Steps:
     """The steps (k, 2) [cells] that an edge may make, and the number of each."""
 
     def __init__(self, length: float, stretch: tuple[float, float]) -> None:
-        reach = int(np.ceil(stretch[1] * length))
+        reach = int(np.ceil(stretch[1] * length)) + 1
         grid = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2, indexing="xy"), axis=-1).reshape(-1, 2)
         away = np.hypot(grid[:, 0], grid[:, 1])
-        # a step's rounding is half a cell each way
-        self.all = grid[(away >= stretch[0] * length - 0.5) & (away <= stretch[1] * length + 0.5) & (away > 0)]
+        # a step's rounding is half a cell each way; the shortest step is one cell, also of a shorter edge
+        furthest = max(stretch[1] * length + 0.5, 1.0)
+        self.all = grid[(away >= min(stretch[0] * length - 0.5, furthest)) & (away <= furthest) & (away > 0)]
         self.reach = reach
         self._number = np.full((2 * reach + 1, 2 * reach + 1), -1)
         self._number[self.all[:, 1] + reach, self.all[:, 0] + reach] = np.arange(len(self.all))
