@@ -67,7 +67,7 @@ def test_bad_paths(arguments):
 
 
 def test_at_its_ends_a_turn_keeps_the_bits():
-    """Slerp at 0 and at 1 as a number, which needs no sines, is that of arrays of such: also of equal, opposite."""
+    """Slerp at 0 and at 1 as a number, which needs no sines, is that of an array of such numbers."""
     random = np.random.default_rng(0)
     a, b = (part / np.linalg.norm(part, axis=1, keepdims=True) for part in random.normal(size=(2, 300, 4)))
     b[:30], b[30:60] = a[:30], -a[30:60]
