@@ -70,6 +70,22 @@ def test_what_shows_nothing_leaves_the_cloth_to_physics(what, caplog):
     assert len(said) == (1 if what == "empty" else 0)
 
 
+def test_what_drew_the_cloth_ends_where_nothing_is_seen():
+    """Hidden from one image on, the cloth moves from then on by physics' bits, whatever drew it before."""
+    world, towel = room()
+    shown, there = room()
+    shown.set_vertices(there, there.vertices + np.array([0.02, 0.0, 0.0]))
+    mask, depth = look(shown, there)
+    follower = nuno.follow(world, towel, CAMERA)
+    for k in range(1, 4):  # friction holds it, so that a steady force builds up
+        assert follower.update(0.1 * k, mask, depth).forces.any()
+    alone = world.imagine(1)
+    alone.run(0.1)
+    hidden = np.ones_like(mask)
+    assert not follower.update(0.4, mask, depth, hidden).forces.any()
+    np.testing.assert_array_equal(towel.vertices, alone.find("towel").vertices)
+
+
 def test_a_cloth_elsewhere_is_caught_up_with_across_its_plane():
     """Without weight, a sheet 3 cm nearer to the camera is met within 3 mm in ten images of a tenth of a second."""
     world, towel = room(0.2, gravity=(0, 0, 0), table=False)

@@ -143,6 +143,7 @@ class Follower:
         Raises:
             InvalidInputError: an earlier time than that of the image before, or one that is no time.
             ImageError: something that does not fit its camera.
+            ClothNotFoundError: the first colour image shows too little of the cloth, or of all else, to learn from.
             BodyStateError: the cloth was detached or taken out of its world, or the world runs in the background.
             SimulationDiverged: a state stopped being finite; the world is what it was before.
         """
@@ -190,8 +191,10 @@ class Follower:
         forces = self._steady.copy()
         if reason is None and span > SOON:
             forces, evidence = self._draw(anchor, span, views, others, evidence)
-        elif reason is not None:
-            self._steady[:] = 0.0
+        elif reason is not None and self._steady.any():  # nothing was seen: what drew the cloth before ends
+            self._steady[:] = forces[:] = 0.0
+            worlds.restore(anchor)
+            worlds.run(span, progress=False)
         self._judge(span, evidence if reason in (None, "lost") else None)
         self._futures.adopt(self._adopted)
         self._last = when
@@ -302,7 +305,7 @@ class Follower:
         parts = phases(span, 1.0 / worlds.frame_rate)
         masses = self._futures.masses
         wanted = np.zeros((self._futures.count, masses.shape[1], 3))
-        mean = steady = self._steady.copy()
+        mean = steady = np.where(np.stack([each.visible for each in evidence])[..., None], self._steady, 0.0)
         for _ in range(self._iterations):
             step = np.stack([self._displacements(each) for each in evidence])
             if not step.any():
@@ -339,7 +342,9 @@ class Follower:
         best = int(np.argmax(self._log))
         if self._log[best] > self._log[self._adopted] + SURER:
             self._adopted = best
-        self._futures.follow(np.flatnonzero(self._log < -HOPELESS), best)
+        lost = np.flatnonzero(self._log < -HOPELESS)
+        self._futures.follow(lost, best)
+        self._steady[lost], self._log[lost] = self._steady[best], -0.5 * HOPELESS
 
     def _result(
         self, time: float, used: bool, reason: str | None, evidence: list[Evidence], forces: np.ndarray
