@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from nuno.engines.driven_motion import kinematic_velocity
 from nuno.engines.engine_needs import needs_of_dynamics, needs_of_grip
-from nuno.engines.led import led_velocity
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import EngineCapabilityError
 
@@ -171,7 +171,7 @@ class Engine(ABC):
     def step(self, start: float, end: float) -> None:
         """Advance all dynamic bodies from ``start`` to ``end`` [s], a frame or a part of one.
 
-        Kinematic bodies are where `schedule` says, grips lead where `nuno.engines.led` says, and a body is
+        Kinematic bodies are where `schedule` says, grips lead where `nuno.engines.driven_motion` says, and a body is
         pushed by ``Dynamics.pushing(start)`` throughout.
         """
 
@@ -203,7 +203,7 @@ class Engine(ABC):
             motion = dynamics.motion(body)
             spin = motion.angular_velocity
             return motion.velocity + np.cross(spin, point - motion.centre), spin
-        return led_velocity(self.world, body, point)
+        return kinematic_velocity(self.world, body, point)
 
     def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
         """Return the force [N] and torque [N m], (worlds, 3) each, that a grip or joint bears; see ``Grip.wrench``."""

@@ -17,7 +17,7 @@ from nuno.shapes.shape import Shape, Sphere
 
 BARE = 0.01
 """[m] Radius of what stands for a body without a shape; it touches nothing."""
-LEAST = 1e-9
+MIN_MOMENT = 1e-9
 """[kg m2] Moments of inertia below this are those of a point, which no solver turns."""
 
 
@@ -52,7 +52,7 @@ def possible(inertia: np.ndarray, mass: float) -> np.ndarray:
     """Return the inertia (3, 3) [kg m2] nearest to a given one that a mass [kg] can have."""
     symmetric = 0.5 * (inertia + inertia.T)
     moments, axes = np.linalg.eigh(symmetric)
-    raised = np.maximum(moments, max(LEAST, 1e-8 * mass))
+    raised = np.maximum(moments, max(MIN_MOMENT, 1e-8 * mass))
     raised[2] = min(raised[2], raised[0] + raised[1])
     return symmetric if np.array_equal(raised, moments) else axes @ np.diag(raised) @ axes.T
 
@@ -65,9 +65,9 @@ def split_off(body: SceneBody, name: str, position: np.ndarray) -> SceneBody:
     """Return a small body that stands between two joints of a body, whose mass it takes a share of."""
     material: Any = body.material
     mass, inertia = float(material.mass), np.asarray(material.inertia)
-    largest = float(np.linalg.eigvalsh(inertia)[2])
+    greatest = float(np.linalg.eigvalsh(inertia)[2])
     body.material = replace(material, mass=(1.0 - SHARE) * mass, inertia=(1.0 - SHARE) * inertia)
-    return bare_body(name, position, SHARE * mass, SHARE * largest)
+    return bare_body(name, position, SHARE * mass, SHARE * greatest)
 
 
 def bare_body(name: str, position: np.ndarray, mass: float, moment: float) -> SceneBody:
@@ -79,5 +79,5 @@ def bare_body(name: str, position: np.ndarray, mass: float, moment: float) -> Sc
         mass: [kg].
         moment: Of inertia, about every axis [kg m2].
     """
-    material = Rigid(mass=mass, inertia=max(moment, LEAST) * np.eye(3), centre_of_mass=np.zeros(3))
+    material = Rigid(mass=mass, inertia=max(moment, MIN_MOMENT) * np.eye(3), centre_of_mass=np.zeros(3))
     return SceneBody(name, Sphere(BARE), position, quat.IDENTITY.copy(), material, group=0, collides_with=0)

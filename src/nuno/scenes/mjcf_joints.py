@@ -89,11 +89,11 @@ class MjcfJoints:
             if damping is None:
                 self.scene.note("a motor that keeps its velocity exactly has a gain for MuJoCo", joint.name)
                 damping = STIFF
-            gain, bias, told = float(damping), [0.0, 0.0, -float(damping)], float(motor.velocity)
+            gain, bias, control = float(damping), [0.0, 0.0, -float(damping)], float(motor.velocity)
         else:
             damping = 0.0 if damping is None else float(damping)
             bias = [damping * float(motor.velocity), -stiffness, -damping]
-            gain, told = stiffness, float(motor.position)
+            gain, control = stiffness, float(motor.position)
         limit = float(motor.max_effort)
         said: dict[str, Any] = {
             "name": f"{joint.name}/motor", "joint": joint.name, "gaintype": "fixed", "biastype": "affine",
@@ -102,7 +102,7 @@ class MjcfJoints:
         if np.isfinite(limit):
             said["forcerange"] = numbers([-limit, limit])
         self._motors.append(said)
-        self.controls.append(told)
+        self.controls.append(control)
 
     def _state(
         self, joint: SceneJoint, axis: np.ndarray, body: SceneBody, bodies: dict[str, SceneBody]

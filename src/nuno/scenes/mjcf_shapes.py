@@ -44,7 +44,7 @@ def moving_body(scene: SceneDescription, compiled: CompiledMjcf, root: int) -> S
     model = compiled.model
     placed = [geom for body in compiled.members[root] for geom in _geoms(scene, compiled, body, root)]
     name, pose = _free_name(scene, compiled.body_name(root)), compiled.pose(root)
-    parts = _seen_or_touched(scene, compiled, name, placed)
+    parts = _drawn_or_solid(scene, compiled, name, placed)
     mass = _mass(compiled, root)
     for body in compiled.members[root]:
         if model.body_gravcomp[body]:
@@ -60,14 +60,14 @@ def _grouped(scene: SceneDescription, compiled: CompiledMjcf, body: int, placed:
     others = [geom for geom in placed if not isinstance(geom[1], Plane)]
     if not others:
         return planes
-    return [_seen_or_touched(scene, compiled, compiled.body_name(body), others), *planes]
+    return [_drawn_or_solid(scene, compiled, compiled.body_name(body), others), *planes]
 
 
 def _touches(compiled: CompiledMjcf, geom: int) -> bool:
     return bool(compiled.model.geom_contype[geom] or compiled.model.geom_conaffinity[geom])
 
 
-def _seen_or_touched(scene: SceneDescription, compiled: CompiledMjcf, name: str, placed: list[Placed]) -> list[Placed]:
+def _drawn_or_solid(scene: SceneDescription, compiled: CompiledMjcf, name: str, placed: list[Placed]) -> list[Placed]:
     """Return the geoms that touch, or where none does those that are seen."""
     touching = [geom for geom in placed if _touches(compiled, geom[0])]
     if touching and len(touching) < len(placed):

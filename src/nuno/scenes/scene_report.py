@@ -43,7 +43,7 @@ class SceneReport:
 
     def __str__(self) -> str:
         lines = [f"{self.path.name}: {_counted(self.bodies, 'bodies')}; {_counted(self.joints, 'joints')}"]
-        return "\n".join(lines + [f"  {what}: {_listed(names)}" for what, names in self.notes.items()])
+        return "\n".join(lines + [f"  {what}: {_in_short(names)}" for what, names in self.notes.items()])
 
 
 def report_of(scene: SceneDescription, path: Path, verb: str) -> SceneReport:
@@ -53,7 +53,7 @@ def report_of(scene: SceneDescription, path: Path, verb: str) -> SceneReport:
     joints = Counter(joint.kind for joint in scene.joints)
     report = SceneReport(path, dict(bodies), dict(joints), {what: tuple(names) for what, names in scene.notes.items()})
     if report.notes:
-        notes = "; ".join(f"{what}: {_listed(names)}" for what, names in report.notes.items())
+        notes = "; ".join(f"{what}: {_in_short(names)}" for what, names in report.notes.items())
         logger.warning("%s is not %s as it is: %s", path.name, verb, notes)
     return report
 
@@ -62,6 +62,6 @@ def _counted(numbers: Mapping[str, int], none: str) -> str:
     return ", ".join(f"{number} {kind}" for kind, number in numbers.items()) or f"no {none}"
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _in_short(names: tuple[str, ...]) -> str:
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more

@@ -12,7 +12,7 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, compose
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere, TriangleMesh
 
-KNOWN = ("Cube", "Sphere", "Cylinder", "Cylinder_1", "Capsule", "Capsule_1", "Cone", "Plane", "Mesh")
+READABLE = ("Cube", "Sphere", "Cylinder", "Cylinder_1", "Capsule", "Capsule_1", "Cone", "Plane", "Mesh")
 AXES = {
     "X": np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0]), "Y": np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]),
     "Z": quat.IDENTITY,
@@ -30,7 +30,7 @@ def usd_shape(scene: SceneDescription, stage: UsdStage, prim: Any, name: str, mo
         InvalidInputError: a size that is none.
     """
     kind = str(prim.GetTypeName())
-    if kind not in KNOWN:
+    if kind not in READABLE:
         scene.note(f"geometry of type {kind} is left out", name)
         return None
     pose, scale, sheared = stage.frame(prim)

@@ -16,7 +16,7 @@ from nuno.shapes.coordinates import Pose
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 SHEARED = 1e-4
 """How far from right angles axes may be."""
-LEAST_UNIT, LARGEST_UNIT = 1e-9, 1e6
+MIN_UNIT, MAX_UNIT = 1e-9, 1e6
 
 
 class UsdStage:
@@ -43,7 +43,7 @@ class UsdStage:
         self.unit = float(usd.UsdGeom.GetStageMetersPerUnit(self.stage))
         self.mass_unit = float(usd.UsdPhysics.GetStageKilogramsPerUnit(self.stage))
         for name, unit in (("metersPerUnit", self.unit), ("kilogramsPerUnit", self.mass_unit)):
-            if not LEAST_UNIT <= unit <= LARGEST_UNIT:
+            if not MIN_UNIT <= unit <= MAX_UNIT:
                 raise FileFormatError(f"{name} of {str(path)!r} must be from 1e-9 to 1e6, got {unit}")
         axis = str(usd.UsdGeom.GetStageUpAxis(self.stage))
         if axis not in ("Y", "Z"):

@@ -10,7 +10,7 @@ BINS = (8, 24, 24)
 """Of lightness, which shadows change most, and of the two axes of colour, in CIE Lab."""
 SMOOTH = 1.0
 """Pixels that every bin has beforehand, of cloth and of all else."""
-LEAST = 30
+MIN_PIXELS = 30
 """Pixels of cloth, and of all else, of which colours can be learnt."""
 
 
@@ -27,10 +27,10 @@ class ClothColours:
     """
 
     def __init__(self, image: np.ndarray, cloth: np.ndarray, other: np.ndarray) -> None:
-        if min(int(cloth.sum()), int(other.sum())) < LEAST:
+        if min(int(cloth.sum()), int(other.sum())) < MIN_PIXELS:
             raise ClothNotFoundError(
                 f"the first image has {int(cloth.sum())} pixels where the world has the cloth, and {int(other.sum())} "
-                f"of all else; {LEAST} of both are needed to learn colours: give masks, or look at the cloth"
+                f"of all else; {MIN_PIXELS} of both are needed to learn colours: give masks, or look at the cloth"
             )
         index = self._index(image)
         counts = [np.bincount(index[where], minlength=int(np.prod(BINS))) + SMOOTH for where in (cloth, other)]

@@ -26,9 +26,9 @@ from nuno.tracking.pixel_grid import PixelGrid
 
 NEIGHBOURS = 6
 """Visible vertices that a point may belong to: the corners of its cell, and some."""
-SPREAD = 0.6
+WIDTH = 0.6
 """Standard deviation of a point from the vertex it belongs to, in edge lengths: at half a cell two have even shares."""
-LEAST_SUPPORT = 2.0
+MIN_SUPPORT = 2.0
 """Points below which a vertex is pulled by less than their mean residual says."""
 IN_FRONT = 0.03
 """[m] What is seen so far before where the cloth should be hides it; less far it is noise of the depth."""
@@ -122,7 +122,7 @@ def weigh(
     evidence.cost += float(off.sum()) + WORST * int((either & ~common).sum())
 
     own = np.flatnonzero(visible)
-    near = _Near(vertices, own, SPREAD * spacing, reach)
+    near = _Near(vertices, own, WIDTH * spacing, reach)
     observed, expected = grid.points(cloth, lifted), grid.points(model, depth)
     pull, support = near.sums(observed)
     own_pull, own_support = near.sums(expected)
@@ -134,20 +134,20 @@ def weigh(
         distance, index = cKDTree(observed).query(points)
         within = distance < reach
         pull += near.shares(points[within], observed[index[within]] - points[within])
-    mean = pull / np.maximum(total, LEAST_SUPPORT)[:, None]
+    mean = pull / np.maximum(total, MIN_SUPPORT)[:, None]
     rim, whole = _rims(image, grid, vertices, inwards, near, spacing, seen.depth is None)
     # pixels beyond a rim, or missing before it, are as many as it is off: it has those of half a cell within
-    share = np.maximum((support - own_support) / np.maximum(whole, LEAST_SUPPORT), -1.0)
+    share = np.maximum((support - own_support) / np.maximum(whole, MIN_SUPPORT), -1.0)
     mean -= 0.5 * spacing * share[:, None] * rim
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     mean *= np.minimum(1.0, reach / np.maximum(length, 1e-12))
 
-    weight = np.minimum(total / LEAST_SUPPORT, 1.0)
+    weight = np.minimum(total / MIN_SUPPORT, 1.0)
     across = rim / np.maximum(np.linalg.norm(rim, axis=1, keepdims=True), 1e-9)
-    known_along = across[:, :, None] * rim[:, None, :]
+    measured = across[:, :, None] * rim[:, None, :]
     if seen.depth is not None:
-        known_along += normals[:, :, None] * normals[:, None, :]
-    information = weight[:, None, None] * known_along
+        measured += normals[:, :, None] * normals[:, None, :]
+    information = weight[:, None, None] * measured
     evidence.information += information
     evidence.residuals += np.einsum("nij,nj->ni", information, mean)
 
@@ -170,7 +170,7 @@ def _rims(
     drawn = image.faces >= 0
     pull, support = near.sums(grid.points(drawn, image.depth))
     # points on one side only, of half a cell, are a quarter of a cell away in the mean; half of that is taken for noise
-    offset = np.einsum("ni,ni->n", pull, inwards) / np.maximum(support, LEAST_SUPPORT)
+    offset = np.einsum("ni,ni->n", pull, inwards) / np.maximum(support, MIN_SUPPORT)
     strength = np.clip(8.0 * offset / spacing - 1.0, 0.0, 1.0)
     if outer:
         inside = distance_transform_edt(np.pad(drawn, 1))[1:-1, 1:-1]
@@ -199,14 +199,14 @@ class _Near:
     """Shares of points in the visible vertices near them."""
 
     def __init__(self, vertices: np.ndarray, own: np.ndarray, spread: float, reach: float) -> None:
-        self._vertices, self._own, self._spread = vertices, own, spread
+        self._vertices, self._own, self._width = vertices, own, spread
         self._outlier = -0.5 * (reach / spread) ** 2
         self._tree = cKDTree(vertices[own])
         self._count = list(range(1, min(NEIGHBOURS, len(own)) + 1))
 
     def _weights(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         distance, index = self._tree.query(points, k=self._count)
-        log_weight = -0.5 * (distance / self._spread) ** 2
+        log_weight = -0.5 * (distance / self._width) ** 2
         top = np.maximum(log_weight.max(axis=1, keepdims=True), self._outlier)
         weight = np.exp(log_weight - top)
         return self._own[index], weight / (weight.sum(axis=1, keepdims=True) + np.exp(self._outlier - top))

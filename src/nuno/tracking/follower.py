@@ -78,7 +78,7 @@ class Follower:
         self._adopted = 0
         self._wider = 1.0  # how much farther than ``reach`` points are looked for
         self._last = -np.inf
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
 
     def __repr__(self) -> str:
         return f"<follower of {self.body.name!r} at t = {self.world.time:.3f} s, {self._futures.count} futures>"
@@ -291,8 +291,8 @@ class Follower:
         return None
 
     def _tell(self, what: str, text: str) -> None:
-        if what not in self._told:
-            self._told.add(what)
+        if what not in self._warned:
+            self._warned.add(what)
             logger.warning("%r: %s; physics alone moves it meanwhile (said once)", self.body.name, text)
 
     # What comes of it

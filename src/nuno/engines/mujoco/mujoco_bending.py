@@ -19,7 +19,7 @@ BEND = 17
 """Numbers of an edge in ``flex_bending``: a symmetric matrix (4, 4) of its four vertices, and one for curved rests."""
 CELLS = 16
 """Cells along both sides of the patch."""
-ROUNDS = 12
+ITERATIONS = 12
 """Corrections, each of which leaves a tenth to a third of the error."""
 
 
@@ -40,7 +40,7 @@ def bending_factors(length: float, width: float, ratio: float = 1.0) -> tuple[fl
     unit = places[ends[:, 1]] - places[ends[:, 0]]
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     factors = np.ones(2)
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         warp, weft = np.sqrt(factors * (1.0, ratio))
         rigidity = (warp * unit[:, 1] ** 2 + weft * unit[:, 0] ** 2) ** 2
         felt = [_felt(places, ends, flaps, rows * rigidity[:, None], axis) for axis in (0, 1)]

@@ -9,8 +9,8 @@ import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
-from nuno.engines.led import led_poses
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
 from nuno.materials import Material, Rigid
@@ -103,7 +103,7 @@ class MujocoEngine(Engine):
         self.write(start)
         times = start + step * np.arange(count + 1)
         moving = [
-            (own, led_poses(self.world, bodies[key], start, end, times))
+            (own, kinematic_poses(self.world, bodies[key], start, end, times))
             for key, own in scene.placed.items()
             if own.role == "moving"
         ]
@@ -114,14 +114,14 @@ class MujocoEngine(Engine):
             if not moving and not targets:
                 batch.step(nstep=count)
             else:
-                self._step_led(count, step, moving, targets)
+                self._step_driven(count, step, moving, targets)
         self._read()
         diverged = (batch.warning[:, bad] != before).reshape(len(before), -1).any(axis=1)
         for dynamics in attached(self.world) if diverged.any() else ():
             for values in dynamics.values.values():
                 values[diverged] = np.nan
 
-    def _step_led(self, count: int, step: float, moving: Any, targets: Any) -> None:
+    def _step_driven(self, count: int, step: float, moving: Any, targets: Any) -> None:
         """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
         from nuno.engines.mujoco.mujoco_grips import send
 

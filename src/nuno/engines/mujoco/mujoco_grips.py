@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.engines.led import led_hold, led_points
+from nuno.engines.driven_motion import driven_hold, driven_points
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.world_view import attached
 from nuno.joints.grip import Grip, GripSpec
@@ -72,7 +72,7 @@ class Holds:
         self._made = 0
 
     @property
-    def is_led(self) -> bool:
+    def is_driven(self) -> bool:
         """Return True if any target must be written as time goes on."""
         return any(isinstance(own.grip.spec, GripSpec) or own.leader is not None for own in self._held)
 
@@ -225,18 +225,18 @@ class Holds:
                         data[world, rows[point], 0] = -own.rest[point]
 
     def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
-        """Return of each led grip where it leads at ``times`` (k + 1,) [s], from ``start`` to ``end``; see `write`."""
+        """Return where each driven grip leads at ``times`` (k + 1,) [s] from ``start`` to ``end``."""
         frame = 1.0 / self._world.frame_rate
         found: list[tuple[Held, Any]] = []
         for own in self._held:
             if isinstance(own.grip.spec, GripSpec):
-                found.append((own, led_points(own.grip, start, frame, times)))
+                found.append((own, driven_points(own.grip, start, frame, times)))
             elif own.leader is not None:
-                found.append((own, led_hold(own.grip, start, end, times, self._world.world_count)))
+                found.append((own, driven_hold(own.grip, start, end, times, self._world.world_count)))
         return found
 
     def present(self, time: float, step: float) -> list[tuple[Held, Any]]:
-        """Return of each led grip where it leads at a time [s] and a ``step`` [s] on; nothing is noted as led."""
+        """Return of each driven grip where it leads at a time [s] and a ``step`` [s] on; nothing is noted."""
         found: list[tuple[Held, Any]] = []
         for own in self._held:
             spec, target = own.grip.spec, own.grip.target
@@ -253,16 +253,16 @@ class Holds:
         return found
 
     def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float) -> None:
-        """Write where led grips lead in substep ``k``, which takes ``step`` [s]."""
-        for own, led in targets:
+        """Write where driven grips lead in substep ``k``, which takes ``step`` [s]."""
+        for own, goals in targets:
             if own.leader is not None:
-                place, turn = (part[:, k : k + 2] for part in led)
+                place, turn = (part[:, k : k + 2] for part in goals)
                 send(batch, own.address, place, turn, step)
                 continue
             data = batch.expand("eq_data")
-            velocity = (led[:, :, k + 1] - led[:, :, k]) / step
+            velocity = (goals[:, :, k + 1] - goals[:, :, k]) / step
             # the spring and damper of an equality lag behind a moving target by as much
-            goal = led[:, :, k + 1] + 2.0 * STIFF[0] * CLOSING * step * velocity
+            goal = goals[:, :, k + 1] + 2.0 * STIFF[0] * CLOSING * step * velocity
             assert own.point is not None and own.rest is not None
             world, point = np.nonzero(own.point >= 0)
             which = own.point[world, point]

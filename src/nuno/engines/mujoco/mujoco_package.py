@@ -12,7 +12,7 @@ from typing import Any
 from nuno.errors import MissingPackageError
 
 log = logging.getLogger(__name__)
-_told: set[str] = set()
+_warned: set[str] = set()
 
 
 def mujoco_package() -> ModuleType:
@@ -47,6 +47,6 @@ def warnings_logged() -> Iterator[None]:
 
 def _tell(message: str) -> None:
     kind = message.partition(":")[0].partition(" at DOF")[0]
-    if kind not in _told:
-        _told.add(kind)
+    if kind not in _warned:
+        _warned.add(kind)
         log.warning("mujoco: %s", message)

@@ -104,13 +104,13 @@ class MujocoScene:
         """Edit the spec to what the world is now, and compile it, for substeps so long [s]."""
         world = self._world
         wanted = {key: (body, *_role_and_signature(world, body)) for key, body in bodies_by_key(world).items()}
-        gone = [key for key, own in self.placed.items() if key not in wanted or own.signature != wanted[key][2]]
+        dropped = [key for key, own in self.placed.items() if key not in wanted or own.signature != wanted[key][2]]
         # to delete a flex's bodies one by one takes longer than to begin anew: 9 s of a cloth of 30 x 30 cells
-        if self._settings != (world.gravity, world.world_count) or any(self.placed[k].role == "flex" for k in gone):
+        if self._settings != (world.gravity, world.world_count) or any(self.placed[k].role == "flex" for k in dropped):
             self._begin()
         else:
             self.holds.clear()
-            for key in gone:
+            for key in dropped:
                 self._delete(key)
         for key, (body, role, signature) in wanted.items():
             if key not in self.placed:

@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 BITS = 31
 """Bits of a mask that tell bodies apart."""
-_told: set[frozenset[str]] = set()
+_warned: set[frozenset[str]] = set()
 
 
 def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
@@ -139,8 +139,8 @@ def _tell(a: Body, b: Body, mu: np.ndarray, real: np.ndarray) -> None:
     """Warn once of a pair whose friction MuJoCo cannot have."""
     pair = frozenset((a.key, b.key))
     worst = int(np.argmax(np.abs(mu - real)))
-    if abs(mu[worst] - real[worst]) > 1e-6 and pair not in _told:
-        _told.add(pair)
+    if abs(mu[worst] - real[worst]) > 1e-6 and pair not in _warned:
+        _warned.add(pair)
         log.warning(
             "on mujoco %r and %r have the friction %.4g in place of %.4g: it has one coefficient a shape where flexes "
             "touch. Equal coefficients of all bodies mend that", a.name, b.name, real[worst], mu[worst],

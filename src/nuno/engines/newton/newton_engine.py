@@ -9,8 +9,8 @@ import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.driven_motion import driven_hold, driven_points, kinematic_poses
 from nuno.engines.engine import Engine
-from nuno.engines.led import led_hold, led_points, led_poses
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
@@ -105,18 +105,18 @@ class NewtonEngine(Engine):
                 if substeps.held(body):
                     from nuno.engines.newton.newton_model import held_vertices
 
-                    led = [(grip, v, led_points(grip, start, span, times)) for grip, v in held_vertices(body)]
-                    substeps.lead_particles(body, [(v, places) for _, v, places in led])
+                    driven = [(grip, v, driven_points(grip, start, span, times)) for grip, v in held_vertices(body)]
+                    substeps.lead_particles(body, [(v, places) for _, v, places in driven])
             else:
                 substeps.put_body(body, dynamics.values)
-                if body.key in self._made.led_bodies:
+                if body.key in self._made.driven_bodies:
                     holds = [grip for grip in dynamics.grips if isinstance(grip.spec, HoldSpec)]
                     ends = np.concatenate([[start], times])
-                    substeps.lead_body(body, *led_hold(holds[-1], start, end, ends, worlds), span / count)
+                    substeps.lead_body(body, *driven_hold(holds[-1], start, end, ends, worlds), span / count)
         for body in self.world.bodies:
-            if not body.is_dynamic and body.key in self._made.led_bodies:
+            if not body.is_dynamic and body.key in self._made.driven_bodies:
                 ends = np.concatenate([[start], times])
-                substeps.lead_body(body, *led_poses(self.world, body, start, end, ends), span / count)
+                substeps.lead_body(body, *kinematic_poses(self.world, body, start, end, ends), span / count)
         for body in self._moving():
             for push in dynamics_of(body).pushing(start):
                 substeps.push(body, push.force)

@@ -30,7 +30,7 @@ PARTICLE_STIFFNESS, SHAPE_STIFFNESS = 5e3, 2e4
 A napkin's vertex of 0.1 g sinks in by 0.1 um, a box of 1 kg on four corners by 0.1 mm."""
 SHAPE_DAMPING = 100.0
 """[N s/m] of contacts of shapes, near the critical damping of a box of half a kilogram: what falls does not bounce."""
-MOST_POISSON = 0.3
+MAX_POISSON = 0.3
 """The membrane's largest Poisson ratio: Newton's is isotropic, and a softer shear than this leaves is not met."""
 
 
@@ -43,7 +43,7 @@ class NewtonModel:
         origin: (3,) [m], where its own coordinates begin.
         particles: By body's key, the first particle of each world (worlds,) int.
         bodies: By body's key, the index of its rigid body in each world (worlds,) int.
-        led_bodies: The keys of rigid bodies that paths or grips move.
+        driven_bodies: The keys of rigid bodies that paths or grips move.
         touching: The distance [m] at which layers of cloth touch, or None where nothing touches itself.
     """
 
@@ -51,7 +51,7 @@ class NewtonModel:
     origin: np.ndarray
     particles: dict[str, np.ndarray] = field(default_factory=dict)
     bodies: dict[str, np.ndarray] = field(default_factory=dict)
-    led_bodies: list[str] = field(default_factory=list)
+    driven_bodies: list[str] = field(default_factory=list)
     touching: float | None = None
 
 
@@ -59,11 +59,11 @@ def membrane(material: dict[str, np.ndarray]) -> tuple[float, float]:
     """Return the Lame parameters (mu, lambda) [N/m] of a plane membrane as stiff as a cloth.
 
     Its stretch stiffness 4 mu (lambda + mu) / (lambda + 2 mu) is the cloth's. Its shear stiffness mu is too, where that
-    leaves a Poisson ratio from 0 to `MOST_POISSON`.
+    leaves a Poisson ratio from 0 to `MAX_POISSON`.
     """
     stretch = float(np.sqrt(material["stretch_stiffness_warp"] * material["stretch_stiffness_weft"]).flat[0])
     shear = float(material["shear_stiffness"].flat[0])
-    poisson = min(max(stretch / (2.0 * shear) - 1.0, 0.0), MOST_POISSON)
+    poisson = min(max(stretch / (2.0 * shear) - 1.0, 0.0), MAX_POISSON)
     mu = stretch / (2.0 * (1.0 + poisson))
     return mu, stretch * poisson / (1.0 - poisson**2)
 
@@ -199,8 +199,8 @@ def _add_shapes(
                                 is_kinematic=kinematic, **options)  # fmt: skip
         scene.add_articulation([scene.add_joint_free(child=number)])
         made.bodies.setdefault(body.key, np.zeros(worlds, int))[index] = number
-        if kinematic and body.key not in made.led_bodies:
-            made.led_bodies.append(body.key)
+        if kinematic and body.key not in made.driven_bodies:
+            made.driven_bodies.append(body.key)
     else:
         place, turn = where[0] - made.origin, where[1]
     friction = np.broadcast_to(body.friction if dynamics is None else dynamics.friction, worlds)[index]

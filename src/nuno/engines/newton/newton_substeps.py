@@ -95,11 +95,11 @@ class NewtonSubsteps:
         self.speeds[rows, :3], self.speeds[rows, 3:] = values["velocity"], values["spin"]
 
     def held(self, body: Body) -> bool:
-        """Return True if a body may have led vertices."""
+        """Return True if a body may have driven vertices."""
         return bool(dynamics_of(body).grips)
 
     def lead_particles(self, body: Body, grips: list[tuple[np.ndarray, np.ndarray]]) -> None:
-        """Take where grips' vertices (worlds, k) are led at each substep's end, (worlds, k, substeps, 3) [m]."""
+        """Take where grips' vertices (worlds, k) are driven to at each substep's end, (worlds, k, substeps, 3) [m]."""
         first = self.made.particles[body.key][:, None]
         indices, places = [], []
         for vertices, where in grips:
@@ -109,7 +109,7 @@ class NewtonSubsteps:
         self.leads[body.key] = (np.concatenate(indices), np.concatenate(places, axis=1))
 
     def lead_body(self, body: Body, place: np.ndarray, turn: np.ndarray, dt: float) -> None:
-        """Take where a body is led at the frame's start and each substep's end: (worlds, substeps + 1, 3) and 4."""
+        """Take where a body is driven at the start and at each substep's end: (worlds, substeps + 1, 3) and (.., 4)."""
         rows = self.made.bodies[body.key]
         poses = np.concatenate([place - self.made.origin, turn[..., [1, 2, 3, 0]]], axis=-1)
         spin = quat.multiply(turn[:, 1:], turn[:, :-1] * np.array([1.0, -1.0, -1.0, -1.0]))

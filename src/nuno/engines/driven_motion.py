@@ -1,4 +1,4 @@
-"""Led motion: where kinematic bodies are, and where grips lead, at instants of a step."""
+"""Driven motion: where kinematic bodies are, and where grips take what they hold, at instants of a step."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 
-def led_poses(world: Simulation, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
+def kinematic_poses(world: Simulation, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
     """Return where a static body is at ``times`` (k,) [s] of a step: (worlds, k, 3) [m] and (worlds, k, 4)."""
     shape = (world.world_count, len(times))
     schedule = schedule_of(world)
@@ -26,7 +26,7 @@ def led_poses(world: Simulation, body: Body, start: float, end: float, times: np
     return _between(*schedule.in_frame(body.key, 0), (times - start) / (end - start), shape)
 
 
-def led_velocity(world: Simulation, body: Body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def kinematic_velocity(world: Simulation, body: Body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the velocity [m/s] of a static body's point in the last step, and its spin [rad/s], (worlds, 3) each."""
     schedule, still = schedule_of(world), np.zeros_like(point)
     if schedule is None or body.key not in schedule.poses or schedule.times[-1] < world.time - 1e-9:
@@ -41,7 +41,7 @@ def led_velocity(world: Simulation, body: Body, point: np.ndarray) -> tuple[np.n
     return (end[0] - start[0]) / duration + np.cross(spin, point - end[0]), spin
 
 
-def led_points(grip: Grip, start: float, frame: float, times: np.ndarray) -> np.ndarray:
+def driven_points(grip: Grip, start: float, frame: float, times: np.ndarray) -> np.ndarray:
     """Return where a grip of points leads them at ``times`` (k,) [s]: (worlds, points, k, 3) [m].
 
     It must be asked once a step, as a leading body's last place is where the next step begins.
@@ -51,7 +51,7 @@ def led_points(grip: Grip, start: float, frame: float, times: np.ndarray) -> np.
     return spec.at(times)
 
 
-def led_hold(grip: Grip, start: float, end: float, times: np.ndarray, worlds: int) -> Pose:
+def driven_hold(grip: Grip, start: float, end: float, times: np.ndarray, worlds: int) -> Pose:
     """Return where a grip leads a rigid body's frame at ``times`` (k,) [s]: (worlds, k, 3) [m] and (worlds, k, 4)."""
     if grip.target is None or grip.offsets is None:
         found = [grip.spec.at(float(time)) for time in times]
