@@ -6,6 +6,7 @@ import pytest
 from nuno.estimate.doubt import (
     BAD_SHARE,
     BADLY,
+    POORLY,
     WARNED_SHARE,
     WELL,
     doubted,
@@ -64,6 +65,19 @@ def test_a_bad_fit_is_doubted():
     assert doubt.likely[0] < good.likely[0] - 0.1
     assert "looks little like the image" in oddities([bad], 0, "evidence", Hypothesis(1e-4))[0]
     assert oddities([bad], 0, "iou", Hypothesis(1e-4)) == ()
+
+
+def test_a_fair_fit_asks_for_no_more_guesses():
+    """Between a good fit and a poor one only the answer is doubted, not whether to go on; a poor one is both."""
+    fair = comparison([[8.0, 80.0]] * 3)  # 5 ln 9 = 11.0
+    assert WELL < misfit([fair], 0) < POORLY
+    between = doubted([fair], "evidence", 2, None)
+    np.testing.assert_allclose(between.likely, rank([fair], "evidence", 2).probabilities, rtol=1e-9)
+    assert doubted([fair], "evidence", 2, None, 0).likely[0] < between.likely[0]
+    poor = comparison([[12.0, 120.0]] * 3)  # 5 ln 13 = 12.8
+    assert misfit([poor], 0) > POORLY
+    likely = [doubted([poor], "evidence", 2, None, warnings).likely for warnings in (None, 0)]
+    np.testing.assert_array_equal(*likely)
 
 
 def test_warnings_lower_the_confidence():

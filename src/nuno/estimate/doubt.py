@@ -81,7 +81,7 @@ def share_of_doubt(misfit: float, warnings: int) -> float:
 
 def doubted(
     comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None,
-    warnings: int = 0,
+    warnings: int | None = None,
 ) -> Ranked:  # fmt: skip
     """Rank the candidates, and tell how likely each is as far as the evidence may be trusted.
 
@@ -90,14 +90,16 @@ def doubted(
         score: What ranks.
         count: Number of candidates.
         log_prior_of_candidates: (count,) float, or None.
-        warnings: How many tell that the images or the cloth are odd.
+        warnings: How many tell that the images or the cloth are odd; None while more guesses may follow. A misfit
+            short of `POORLY` then counts for nothing, as another guess would hardly mend it.
     """
     ranked = rank(comparisons, score, count, log_prior_of_candidates)
     if score not in EVIDENCE or not np.isfinite(ranked.scores).any():
         return ranked
     without = rank(comparisons, score, count, log_prior_of_candidates, without_best=True)
     logs = np.logaddexp(_log_shares(ranked.scores), _log_shares(without.scores)) - np.log(2.0)
-    share = share_of_doubt(misfit(comparisons, int(ranked.order[0])), warnings)
+    found = misfit(comparisons, int(ranked.order[0]))
+    share = 0.0 if warnings is None and found < POORLY else share_of_doubt(found, warnings or 0)
     if share > 0.0:
         logs = np.logaddexp(np.log1p(-share) + logs, np.log(share) + _log_shares(ranked.scores / BREADTH))
     return replace(ranked, likely=np.exp(logs))
