@@ -453,6 +453,7 @@ CALLS = {
 # The object whose method is called
 OWNERS = {
     "Body": lambda s: s.towel, "Camera": lambda s: s.camera, "Cloth": lambda s: nuno.Cloth(),
+    "CalibrationBoard": lambda s: nuno.CalibrationBoard(),
     "EngineComparison": lambda s: nuno.EngineComparison(
         ("nuno", "mujoco"), {"nuno": s.recording, "mujoco": s.recording}, ("towel",), {"nuno": 0.0, "mujoco": 0.0}
     ),

@@ -71,14 +71,14 @@ def picture(cloths, boxes=(), camera=CAMERA):
     return nuno.take_picture(world, camera, lamp=lamp, samples=2, noise=3.0, seed=1).color.numpy()
 
 
-def found(image, camera=CAMERA, hint=None):
-    """The rectangle that is found in an image before."""
+def found(image, camera=CAMERA, hint=None, shape="rectangle"):
+    """The rectangle, or the outline, that is found in an image before."""
     settings = check_settings(
         table=TABLE, camera=camera, hand=(0.1, 0.0, 1.1), candidates=(6, 6), rest_height=0.0025, hand_radius=0.014,
         lift_seconds=1.5, discretisations=nuno.estimate.hypotheses.DISCRETISATIONS, sure=0.98, turns=(0.0,),
         learned=True, sideways=0.5, score="evidence", device="cpu", progress=False,
     )  # fmt: skip
-    return find_cloth_before(PickImages(image, image, None, None, None), None, hint, settings)[1]
+    return find_cloth_before(PickImages(image, image, None, None, None), None, hint, settings, shape)[1]
 
 
 def worst_corner(rectangle, centre, yaw, size=SIZE):
@@ -106,10 +106,13 @@ def test_a_cloth_over_the_tables_edge_is_told(centre, right):
 
 
 def test_a_cloth_over_the_near_edge_is_told():
-    """Too little of its outline is left for a rectangle: the error says where it goes on."""
+    """Too little of its outline is left for a rectangle: the error says where it goes on, or a warning of its outline."""
     vertices, faces = lying((-0.18, 0.0), 0.3)
+    image = picture([((hanging_over(vertices), faces), BLUE)])
     with pytest.raises(nuno.EstimationError, match="lies on the table's border"):
-        found(picture([((hanging_over(vertices), faces), BLUE)]))
+        found(image)
+    warnings = found(image, shape="auto").warnings
+    assert "taken by its outline" in warnings[0] and "lies on the table's border" in warnings[-1]
 
 
 def test_a_folded_corner_is_told_or_does_no_harm():
@@ -118,8 +121,11 @@ def test_a_folded_corner_is_told_or_does_no_harm():
     small = found(picture([(lying(centre, 0.3, ((1, 1), 0.2)), BLUE)]))
     assert worst_corner(small, centre, 0.3) < NEAR_A_PIXEL
     assert any("not quite a rectangle" in warning for warning in small.warnings)
+    image = picture([(lying(centre, 0.3, ((0.42, 0.6), 0.0)), BLUE)])
     with pytest.raises(nuno.EstimationError, match="may be folded"):
-        found(picture([(lying(centre, 0.3, ((0.42, 0.6), 0.0)), BLUE)]))
+        found(image)
+    (warning,) = found(image, shape="auto").warnings
+    assert "taken by its outline" in warning and "may be folded" in warning
 
 
 def test_a_cloth_out_of_the_image_is_told():
@@ -130,8 +136,11 @@ def test_a_cloth_out_of_the_image_is_told():
 
 def test_a_cloth_behind_a_thing_is_told():
     """A box before one corner hides most of two sides."""
+    image = picture([(lying((0.12, 0.0), 0.3), BLUE)], [((0.1, 0.25, 0.2), (-0.2, 0.05, 0.82))])
     with pytest.raises(nuno.EstimationError, match="behind a thing"):
-        found(picture([(lying((0.12, 0.0), 0.3), BLUE)], [((0.1, 0.25, 0.2), (-0.2, 0.05, 0.82))]))
+        found(image)
+    (warning,) = found(image, shape="auto").warnings
+    assert "taken by its outline" in warning and "behind a thing" in warning
 
 
 @pytest.mark.parametrize("color", [BLUE, RED])

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
+from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.flat import first_look
 from nuno.camera.image import check_image, check_mask, read_image
 from nuno.camera.rectangle import ClothRectangle, fit_rectangle
@@ -102,6 +103,10 @@ def find_cloth_before(
             rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
         except EstimationError as error:
             raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
+        if shape == "auto" and isinstance(rectangle, ClothOutline) and over is None:
+            taken, *others = rectangle.warnings
+            taken = f"{taken}; if it is one, {why_no_rectangle(images.mask_before)}"
+            rectangle = replace(rectangle, warnings=(taken, *others))
         odd = tuple(warning for warning in (over, other) if warning is not None)
         rectangle = replace(rectangle, warnings=(*rectangle.warnings, *odd))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
@@ -130,7 +135,7 @@ def why_no_rectangle(mask: np.ndarray) -> str:
     """Return what may be the matter with a cloth whose mask (h, w) is no rectangle, and what helps."""
     rim = np.concatenate([mask[:2].ravel(), mask[-2:].ravel(), mask[:, :2].ravel(), mask[:, -2:].ravel()])
     if rim.any():
-        return "the cloth goes on beyond the image's border: rectangle= takes its true corners"
+        return "it goes on beyond the image's border: rectangle= takes its true corners"
     return "it may be folded, or lie behind a thing on the table: rectangle= takes the corners of the cloth laid flat"
 
 
