@@ -37,7 +37,7 @@ LONG = {
     "fit_material", "improve_fold", "lift_soft_cube", "minimise", "plan_walk", "plan_walk_footsteps",
     "plan_walk_velocity", "play_fold", "replay_fold", "sweep", "continue_walk", "stop_walk", "soft_sphere",
     "soft_cylinder", "soft_capsule", "SoftSphere", "SoftCylinder", "SoftCapsule", "RobotServer", "WireRobot",
-    "Ros1Driver", "Ros2Server", "describe_robot",
+    "Ros1Driver", "Ros2Server", "describe_robot", "compare_engines",
     "take_picture", "track_hands", "track_hands_in_stereo", "locate_marker", "World.save", "Body.export",
     "export_body", "Film.save", "Recording.save", "Recording.export", "SweepResult.save_csv", "SimulatedRobot",
     "HoldResult.save", "HoldResult.figure", "estimate_hold", "garment", "imagine_holds",

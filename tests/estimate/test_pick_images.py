@@ -106,7 +106,7 @@ def test_a_cloth_over_the_tables_edge_is_told(centre, right):
 
 
 def test_a_cloth_over_the_near_edge_is_told():
-    """Too little of its outline is left for a rectangle: the error says where it goes on, or a warning of its outline."""
+    """Too little of its outline is left for a rectangle: an error or a warning says where it goes on."""
     vertices, faces = lying((-0.18, 0.0), 0.3)
     image = picture([((hanging_over(vertices), faces), BLUE)])
     with pytest.raises(nuno.EstimationError, match="lies on the table's border"):

@@ -100,7 +100,10 @@ class Garment:
         """
         from scipy.sparse.csgraph import dijkstra
 
-        of = np.asarray(vertex)
+        try:
+            of = np.asarray(vertex)
+        except ValueError:  # lists of different lengths
+            raise InvalidInputError("vertex must be numbers of vertices, got lists of different lengths") from None
         if of.dtype.kind not in "iu" or of.ndim > 1 or of.size == 0 or of.min() < 0 or of.max() >= len(self.vertices):
             raise InvalidInputError(f"vertex must be numbers from 0 to {len(self.vertices) - 1}, got {vertex!r}")
         return np.asarray(dijkstra(self._graph, directed=False, indices=of))

@@ -21,7 +21,7 @@ from nuno.camera.marker_pose import find_marker
 from nuno.errors import ImageError, InvalidInputError
 from nuno.estimate.capture_preview import preview
 from nuno.estimate.case_file import THICKNESS
-from nuno.files.whole_file import made_folder, write_whole
+from nuno.files.whole_file import file_path, made_folder, write_whole
 from nuno.validation import checked, finite_array, number
 
 TABLE_HEIGHT = 0.72
@@ -98,6 +98,9 @@ def capture_case(
         FileWriteError: the folder cannot be written.
     """
     own = CalibrationBoard() if board is None else board
+    is_stack = isinstance(board_images, np.ndarray) and board_images.ndim == 4
+    if not is_stack and (isinstance(board_images, str | bytes) or not isinstance(board_images, Sequence)):
+        raise InvalidInputError(f"board_images must be a sequence of images, got {type(board_images).__name__}")
     if (camera is None) == (len(board_images) == 0):
         raise InvalidInputError("the lens comes from board_images, or from camera: give one of the two")
     if (hand is None) == (marker is None) or (marker is None) != (marker_size is None):
@@ -160,7 +163,7 @@ def capture_case(
 
 def _read(image: str | os.PathLike[str] | np.ndarray, name: str) -> np.ndarray:
     if not isinstance(image, np.ndarray):
-        return read_image(FilePath(image))
+        return read_image(file_path(image, name))
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
         raise ImageError(f"the image {name} must be RGB uint8 (h, w, 3), got {image.dtype} of shape {image.shape}")
     return image

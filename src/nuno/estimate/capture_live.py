@@ -11,7 +11,7 @@ import numpy as np
 
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.image_quality import check_quality
-from nuno.errors import ImageError
+from nuno.errors import ImageError, InvalidInputError
 from nuno.estimate.capture_case import Capture, capture_case
 from nuno.files.whole_file import made_folder, write_whole
 from nuno.validation import checked, count
@@ -56,6 +56,8 @@ def take_capture(
     """
     wanted = count("views", views, low=6, high=200)
     own = CalibrationBoard() if board is None else board
+    if isinstance(source, np.ndarray) or not callable(getattr(source, "take", None)):
+        raise InvalidInputError(f"source must have a method take, as UsbCamera, got {type(source).__name__}")
     raw = made_folder(made_folder(folder) / "raw")
 
     def take(name: str, what: str, *, with_board: bool) -> np.ndarray:

@@ -100,7 +100,7 @@ def _seen(image: Any, camera: Camera, background: Any, hidden: Any, hand: np.nda
     if depth <= 0.0:
         raise InvalidInputError(f"the hand at {hand.tolist()} m is {-depth:.3f} m behind a camera")
     if background is None:
-        if np.ndim(image) == 3:
+        if isinstance(image, np.ndarray) and image.ndim == 3:
             raise InvalidInputError("an RGB image needs backgrounds, the same scene without the garment; masks do not")
         mask = check_mask(image, camera, "images")
     else:

@@ -85,6 +85,8 @@ def check_settings(
         InvalidInputError: as `nuno.estimate_pick`.
         UnknownNameError, MissingPackageError, EngineCapabilityError: of the engine, likewise.
     """
+    if not isinstance(engine, str):
+        raise InvalidInputError(f"engine must be a name, got {type(engine).__name__}")
     if engine != "nuno":
         # what is imagined there is a batch of cloths that are gripped
         World(device="cpu" if device == "auto" else device, engine=engine).engine.require(
