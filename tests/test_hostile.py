@@ -34,7 +34,7 @@ WITHOUT = {"segment_before", "segment_after",
            "read_case", "read_fold_case", "read_sweep", "load_scene", "Recording.load", "triangulate",
            "Viewer.remove_camera", "Viewer.remove_plot", "RobotInterface.read_wrench",
            "CalibrationBoard.find", "calibrate_camera", "camera_above_table", "capture_case", "take_capture",
-           "UsbCamera"}  # fmt: skip
+           "UsbCamera", "find_marker"}  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
