@@ -41,10 +41,10 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(np|numpy|warp|collections|concurrent|contextlib|os|pathlib|matplotlib|trimesh|PIL|pinocchio)\..*"),
     ("py:class", r"(.*\.Self|ArrayLike|Figure|Executor)"),  # others' types, which are imported for type checkers only
-    ("py:class", r"(Arms|Color|FileName|Mode|Pace)"),  # names for a union of types
+    ("py:class", r"(Arms|Color|FileName|Mode|RealTimeFactor)"),  # names for a union of types
     ("py:class", r"DeviceArray"),  # Warp's arrays, under a name for type checkers
     # What a result holds for other functions to take
-    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
+    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|HoldView|ImageSource|RigidLayout)"),
     ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
     ("py:class", r"(.*\.)?(ContactRules|Simulation)"),
 ]
