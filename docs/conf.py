@@ -44,7 +44,8 @@ nitpick_ignore_regex = [
     ("py:class", r"(Arms|Color|FileName|Mode|RealTimeFactor)"),  # names for a union of types
     ("py:class", r"DeviceArray"),  # Warp's arrays, under a name for type checkers
     # What a result holds for other functions to take
-    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|HoldView|ImageSource|RigidLayout)"),
+    ("py:class", r"(.*\.)?(ArmPlan|BodyRecord|CarryPlan|FoldComparison|Futures|GripRecord|RigidLayout)"),
+    ("py:class", r"(.*\.)?(HoldView|ImageSource)"),
     ("py:class", r"(.*\.)?(GripSpec|ImageReading|ImaginedRobot|Scene|Schedule|SoftTopology|States|WalkPlanner)"),
     ("py:class", r"(.*\.)?(ContactRules|Simulation)"),
 ]
