@@ -1,6 +1,5 @@
 """The outline of a flat cloth: its shape and place from a mask that a camera sees."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -8,23 +7,13 @@ import nuno
 from nuno import ClothNotFoundError, EstimationError
 from nuno.camera.cloth_outline import ClothOutline, cloth_colours, fit_outline
 from nuno.camera.rectangle import fit_rectangle
-
-HEIGHT = 0.7  # [m]
-L = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.2), (0.2, 0.2), (0.2, 0.5), (0.0, 0.5)]) - 0.2  # 0.16 m2
+from outline_masks import BOX, HEIGHT, L, mask_of
 
 
 @pytest.fixture(scope="module")
 def camera():
     """Looking down at 45 degrees."""
     return nuno.Camera.look_at((-0.9, 0.1, HEIGHT + 0.9), (0.05, 0.0, HEIGHT), fov=0.9)
-
-
-def mask_of(polygon, camera):
-    """A pixel is of the mask where its middle is in the polygon's image, by OpenCV's fill at 1/16 px."""
-    pixels = camera.project(np.column_stack([polygon, np.full(len(polygon), HEIGHT)]))
-    mask = np.zeros((camera.height, camera.width), np.uint8)
-    cv2.fillPoly(mask, [np.round(pixels * 16).astype(np.int32)], 1, lineType=cv2.LINE_8, shift=4)
-    return mask.astype(bool)
 
 
 def test_an_l_is_measured(camera):
@@ -43,8 +32,7 @@ def test_an_l_is_measured(camera):
 
 def test_a_rectangle_has_the_corners_of_a_rectangle(camera):
     """Taken by its outline, its smallest rectangle is what is fitted to it as one, within a pixel's 3 mm."""
-    box = np.array([(-0.25, -0.15), (0.25, -0.15), (0.25, 0.15), (-0.25, 0.15)])
-    mask = mask_of(box, camera)
+    mask = mask_of(BOX, camera)
     as_outline, as_rectangle = fit_outline(mask, camera, HEIGHT), fit_rectangle(mask, None, camera, HEIGHT)
     np.testing.assert_allclose(as_outline.corners, as_rectangle.corners, atol=5e-3)
 
@@ -70,6 +58,5 @@ def test_colours_around_an_outline_are_the_cloths(camera):
     image = np.where(mask[..., None], np.uint8(200), np.uint8(30)).repeat(3, axis=2)
     filled = cloth_colours(image, mask, fit_outline(mask, camera, HEIGHT))
     assert (filled == 200).all()
-    box = np.array([(-0.25, -0.15), (0.25, -0.15), (0.25, 0.15), (-0.25, 0.15)])
-    rectangle = fit_rectangle(mask_of(box, camera), None, camera, HEIGHT)
+    rectangle = fit_rectangle(mask_of(BOX, camera), None, camera, HEIGHT)
     assert cloth_colours(image, mask, rectangle) is image

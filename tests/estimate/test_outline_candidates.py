@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -21,24 +20,13 @@ from nuno.estimate.outline_candidates import (
 from nuno.estimate.outline_or_rectangle import fit_cloth
 from nuno.estimate.pick_settings import check_settings, check_table
 from nuno.mesh.polygon import contains, distance_to_outline
-
-HEIGHT = 0.7  # [m]
-L = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.2), (0.2, 0.2), (0.2, 0.5), (0.0, 0.5)]) - 0.2  # 0.16 m2
-BOX = np.array([(-0.25, -0.15), (0.25, -0.15), (0.25, 0.15), (-0.25, 0.15)])
+from outline_masks import BOX, HEIGHT, L, mask_of
 
 
 @pytest.fixture(scope="module")
 def camera():
     """Looking down at 45 degrees."""
     return nuno.Camera.look_at((-0.9, 0.1, HEIGHT + 0.9), (0.05, 0.0, HEIGHT), fov=0.9)
-
-
-def mask_of(polygon, camera):
-    """The polygon's image, by OpenCV."""
-    pixels = camera.project(np.column_stack([polygon, np.full(len(polygon), HEIGHT)]))
-    mask = np.zeros((camera.height, camera.width), np.uint8)
-    cv2.fillPoly(mask, [np.round(pixels * 16).astype(np.int32)], 1, lineType=cv2.LINE_8, shift=4)
-    return mask.astype(bool)
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.errors import BoardNotFoundError, ImageError, InvalidInputError
+from nuno.camera.image import check_any_size
+from nuno.errors import BoardNotFoundError, InvalidInputError
 from nuno.files.whole_file import file_path, replacing, write_whole
-from nuno.validation import as_array, check_fields, checked, choice, count, number
+from nuno.validation import check_fields, checked, choice, count, number
 
 DICTIONARIES = ("4X4_50", "4X4_100", "5X5_50", "5X5_100", "6X6_50", "6X6_100")
 """OpenCV's dictionaries of markers, by name without DICT_."""
@@ -145,14 +146,7 @@ class CalibrationBoard:
             ImageError: not an image.
             BoardNotFoundError: it shows fewer than `FEWEST_CORNERS` of its corners.
         """
-        array = as_array("image", image, ImageError)
-        if (
-            array.dtype != np.uint8
-            or array.ndim not in (2, 3)
-            or (array.ndim == 3 and array.shape[2] != 3)
-            or not array.size
-        ):
-            raise ImageError(f"{name} must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
+        array = check_any_size(image, name)
         grey = cv2.cvtColor(array, cv2.COLOR_RGB2GRAY) if array.ndim == 3 else np.ascontiguousarray(array)
         detector = cv2.aruco.CharucoDetector(self._made())
         corners, numbers, _, markers = detector.detectBoard(grey)

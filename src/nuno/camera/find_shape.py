@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
 from nuno.camera.edge_field import EdgeField, edge_field
-from nuno.camera.image import check_image
+from nuno.camera.image import check_any_size, check_image
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.camera.template_refinement import energy_of, refine_candidate
 from nuno.camera.template_search import Candidate, TemplateSearch, Weights
@@ -21,8 +21,8 @@ from nuno.camera.triangulated_polygon import (
     triangulate_polygon,
     with_vertices,
 )
-from nuno.errors import ImageError, InvalidInputError
-from nuno.validation import as_array, checked, count, finite_array, flag, number
+from nuno.errors import InvalidInputError
+from nuno.validation import checked, count, finite_array, flag, number
 
 FOUND = 0.57
 """Score from which a shape is taken to be there; docs/reports/accuracy.md has how often that is wrong."""
@@ -169,14 +169,7 @@ def _look(
     if camera is None:
         if table is not None or plane_height is not None:
             raise InvalidInputError("a table or plane_height needs the camera that saw it")
-        array = as_array("image", image, ImageError)
-        if (
-            array.dtype != np.uint8
-            or array.ndim not in (2, 3)
-            or (array.ndim == 3 and array.shape[2] != 3)
-            or not array.size
-        ):
-            raise ImageError(f"image must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
+        array = check_any_size(image)
         if size < 20.0:
             raise InvalidInputError(f"the outline measures {size:.1f} px across, below the 20 px that can be told")
         rows, columns = array.shape[:2]

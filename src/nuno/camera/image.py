@@ -63,6 +63,23 @@ def check_image(image: ArrayLike, camera: Camera, name: str = "image") -> np.nda
     return array
 
 
+def check_any_size(image: ArrayLike, name: str = "image") -> np.ndarray:
+    """Return the image as an array if it is RGB or grey, uint8 and not empty, of whatever size.
+
+    Args:
+        image: (h, w, 3) uint8 RGB, or (h, w) uint8.
+        name: What to call it in a message.
+
+    Raises:
+        ImageError: it is not.
+    """
+    array = as_array("image", image, ImageError)
+    has_channels = array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)
+    if array.dtype != np.uint8 or not has_channels or not array.size:
+        raise ImageError(f"{name} must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
+    return array
+
+
 def check_mask(mask: ArrayLike, camera: Camera, name: str = "mask") -> np.ndarray:
     """Return the mask as bool (h, w) if it is of the camera's size.
 

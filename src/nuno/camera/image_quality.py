@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nuno.camera.image import check_any_size
 from nuno.errors import ImageError, ImageQualityError
 from nuno.validation import as_array, checked
 
@@ -51,14 +52,7 @@ def image_quality(image: ArrayLike, region: ArrayLike | None = None) -> ImageQua
     Raises:
         ImageError: no such image, or a region of another size.
     """
-    array = as_array("image", image, ImageError)
-    if (
-        array.dtype != np.uint8
-        or array.ndim not in (2, 3)
-        or (array.ndim == 3 and array.shape[2] != 3)
-        or not array.size
-    ):
-        raise ImageError(f"an image must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
+    array = check_any_size(image, "an image")
     where = (
         np.ones(array.shape[:2], dtype=bool) if region is None else as_array("region", region, ImageError).astype(bool)
     )
