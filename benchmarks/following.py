@@ -4,7 +4,7 @@ The truth is made by engines (``moving_cloths.py``) and seen as depth and masks 
 The follower begins 4 mm and 0.7 degrees off, with another material, mesh and substep, and knows the hands' paths with
 an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
 
-Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--json FILE] [--strip FILE]
+Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--device cuda:0] [--strip FILE]
 Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd"
 (coherent point drift, Myronenko and Song 2010, by the package pycpd: pip install pycpd), from frame to frame.
 """
@@ -111,12 +111,12 @@ def add_hands(world: Any, name: str, radius: float, error: np.ndarray, follow: b
     return balls, starts
 
 
-def own_world(name: str, radius: float, blind: bool = False) -> tuple[nuno.World, nuno.Body]:
+def own_world(name: str, radius: float, blind: bool = False, device: str = "cpu") -> tuple[nuno.World, nuno.Body]:
     """Return the world that a follower has: the table, the hands on their paths, and the cloth about where it is.
 
     A blind one knows of no hands.
     """
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
     towel = world.add(nuno.sheet(SIZE, OWN_CELLS, name="towel", position=(*OFFSET, TOP + 0.002)))
     towel.rotate(TURN, "z", wrt="world")
@@ -131,24 +131,30 @@ def own_world(name: str, radius: float, blind: bool = False) -> tuple[nuno.World
     return world, towel
 
 
-def track(tracker: str, case: dict[str, Any], blind: bool = False, **options: Any) -> tuple[np.ndarray, float]:
-    """Return the vertices (k, n, 3) [m] that a tracker tells at the images' times, and its CPU seconds an image."""
+def track(
+    tracker: str, case: dict[str, Any], blind: bool = False, device: str = "cpu", **options: Any
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """Return the vertices (k, n, 3) [m] that a tracker tells at the images' times, and its seconds an image.
+
+    Seconds are the CPU's, or by the clock where another device works.
+    """
     if tracker == "cpd":
         return _drift(case)
-    world, towel = own_world(case["motion"], RADIUS[case["engine"]], blind)
+    world, towel = own_world(case["motion"], RADIUS[case["engine"]], blind, device)
     if tracker == "futures":
         options = {"materials": GUESSES, "iterations": 1, **options}
     follower = nuno.follow(world, towel, CAMERA, **options)
     found, spent = [], []
+    seconds = clock.process_time if device == "cpu" else clock.perf_counter
     for time, mask, depth, board in zip(case["times"], case["masks"], case["depths"], case["board_mask"], strict=True):
-        begin = clock.process_time()
+        begin = seconds()
         if tracker == "open loop":
             follower.update(time)
         elif tracker == "masks":
             follower.update(time, mask, hidden=board)
         else:
             follower.update(time, mask, depth)
-        spent.append(clock.process_time() - begin)
+        spent.append(seconds() - begin)
         found.append(towel.vertices)
     return np.array(found), float(np.mean(spent[1:]))
 
@@ -225,6 +231,7 @@ def main() -> None:
     parser.add_argument("--motions", nargs="+", default=list(MOTIONS), choices=MOTIONS)
     parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
     parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
+    parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--strip", type=Path, help="a picture: truth, follower and open loop, of the first sequence")
     options = parser.parse_args()
@@ -238,7 +245,7 @@ def main() -> None:
                 towel = own_world(name, RADIUS[engine])[1]
                 shapes = {}
                 for tracker in options.trackers:
-                    found, spent = track(tracker, case, options.blind)
+                    found, spent = track(tracker, case, options.blind, options.device)
                     shapes[tracker] = found
                     off = 1000.0 * errors(found, case, towel)
                     covered = float(off[case["covered"]].mean()) if hidden else float("nan")

@@ -1,4 +1,4 @@
-"""Cost of robots in imagined worlds: ``python benchmarks/imagined_robots.py [--dynamics] [--cells 30] [--json FILE]``.
+"""Cost of robots in imagined worlds: ``python benchmarks/imagined_robots.py [--dynamics] [--device cuda:0]``.
 
 Talos stands before a table with a towel of 0.6 m; its arms go to postures of their own in every world for 1 s, and
 two corners of the towel are led. By turns with and without the robot, the same worlds otherwise; CPU seconds of all
@@ -23,9 +23,9 @@ import nuno
 ARMS = ("arm_left_2_joint", "arm_left_4_joint", "arm_right_2_joint", "arm_right_4_joint")
 
 
-def room(with_robot: bool, dynamics: bool, cells: int) -> nuno.World:
+def room(with_robot: bool, dynamics: bool, cells: int, device: str) -> nuno.World:
     """The room, at rest."""
-    world = nuno.World(device="cpu")
+    world = nuno.World(device=device)
     world.add(nuno.plane(name="floor"))
     world.add(nuno.box((0.7, 1.2, 0.02), name="table", position=(0.85, 0, 0.71)))
     towel = world.add(nuno.sheet((0.6, 0.6), (cells, cells), name="towel", position=(0.85, 0, 0.722)))
@@ -53,9 +53,11 @@ def begin(world: nuno.World, worlds: int, cells: int) -> nuno.World:
     return futures
 
 
-def measure(worlds: int, dynamics: bool, cells: int, repeats: int, seconds: float) -> dict[str, Any]:
+def measure(
+    worlds: int, dynamics: bool, cells: int, repeats: int, seconds: float, device: str
+) -> dict[str, Any]:  # fmt: skip
     """CPU and wall seconds of a simulated second, with and without robots."""
-    rooms = {True: room(True, dynamics, cells), False: room(False, dynamics, cells)}
+    rooms = {own: room(own, dynamics, cells, device) for own in (True, False)}
     cpu: dict[bool, list[float]] = {True: [], False: []}
     wall: dict[bool, list[float]] = {True: [], False: []}
     for _ in range(repeats):
@@ -66,7 +68,7 @@ def measure(worlds: int, dynamics: bool, cells: int, repeats: int, seconds: floa
             futures.run(seconds, progress=False)
             cpu[with_robot].append((time.process_time() - core) / seconds)
             wall[with_robot].append((time.perf_counter() - clock) / seconds)
-    row: dict[str, Any] = {"worlds": worlds, "dynamics": dynamics, "cells": cells}
+    row: dict[str, Any] = {"worlds": worlds, "dynamics": dynamics, "cells": cells, "device": device}
     for name, with_robot in (("with", True), ("without", False)):
         row[f"cpu_s_{name}"], row[f"wall_s_{name}"] = (statistics.median(own[with_robot]) for own in (cpu, wall))
     ratios = [a / b - 1.0 for a, b in zip(cpu[True], cpu[False], strict=True)]
@@ -78,6 +80,7 @@ def main() -> None:
     options.add_argument("--worlds", nargs="+", type=int)
     options.add_argument("--dynamics", action="store_true", help="robots with weight")
     options.add_argument("--cells", type=int, default=20)
+    options.add_argument("--device", default="cpu")
     options.add_argument("--repeats", type=int, default=3)
     options.add_argument("--seconds", type=float, default=1.0, help="simulated, of a measurement")
     options.add_argument("--json", type=Path)
@@ -87,7 +90,7 @@ def main() -> None:
     print("| worlds | CPU s a simulated s, with robots | without | more by | wall s with | all worlds over real time |")
     print("|---|---|---|---|---|---|")
     for worlds in asked.worlds or ([8, 64] if asked.dynamics else [36]):
-        row = measure(worlds, asked.dynamics, asked.cells, asked.repeats, asked.seconds)
+        row = measure(worlds, asked.dynamics, asked.cells, asked.repeats, asked.seconds, asked.device)
         rows.append(row)
         print(
             f"| {worlds} | {row['cpu_s_with']:.2f} | {row['cpu_s_without']:.2f} | {row['robots_share']:.0%} | "
