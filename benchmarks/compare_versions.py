@@ -130,7 +130,8 @@ def main() -> None:
     for scene, times in tqdm([(scene, spent[scene]) for _ in range(options.rounds) for scene in options.scenes]):
         for source, own in zip((options.other, HERE), times, strict=True):
             command = [sys.executable, __file__, str(options.other), "--one", "--scenes", scene]
-            environment = os.environ | {"PYTHONPATH": str(source.resolve())}
+            paths = [str(source.resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
+            environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
             done = subprocess.run(
                 [*command, "--device", options.device], env=environment, capture_output=True, text=True
             )  # fmt: skip
