@@ -5,6 +5,8 @@ Lists of what is near are none of the state: they are forgotten and made anew in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 
@@ -20,16 +22,38 @@ PAIRS = (*ENTRY, *POINT, *REPORTED, "normal_now", "tangent_now")
 Copied = dict[str, np.ndarray]  # (worlds, ...) each
 
 
+class KeptParticles:
+    """All that a run changes of a cloth or soft body and that outlasts it, on the device until it is asked for.
+
+    Args:
+        solver: Whose state, as it is now.
+    """
+
+    def __init__(self, solver: ParticleSolver) -> None:
+        self._solver = solver
+        self._arrays = {name: wp.clone(getattr(solver.state, name)) for name in _columns(solver)}
+        self._doubles = [wp.clone(array) for array in solver.doubles.arrays] if solver.doubles.count else []
+        self._given = {} if solver.sums is None else dict(solver.sums.given())
+        self._last_dt = np.full(solver.world_count, solver.last_dt)
+        self._values: Copied | None = None
+
+    @property
+    def values(self) -> Copied:
+        """The same on the host."""
+        if self._values is None:
+            solver = self._solver
+            counts = _columns(solver)
+            self._values = {name: solver.download(array, counts[name]) for name, array in self._arrays.items()}
+            if self._doubles:
+                self._values |= {f"double_{name}": array for name, array in _downloaded(solver, self._doubles).items()}
+            self._values |= {f"given_{key}": impulse for key, impulse in self._given.items()}
+            self._values["last_dt"] = self._last_dt
+        return self._values
+
+
 def copy_particles(solver: ParticleSolver) -> Copied:
     """Return all that a run changes of a cloth or soft body and that outlasts it."""
-    copied = {
-        name: solver.download(getattr(solver.state, name), count).copy() for name, count in _columns(solver).items()
-    }
-    if solver.doubles.count:
-        copied |= {f"double_{name}": array.copy() for name, array in _doubles(solver).items()}
-    if solver.sums is not None:
-        copied |= {f"given_{key}": impulse for key, impulse in solver.sums.given().items()}
-    return copied | {"last_dt": np.full(solver.world_count, solver.last_dt)}
+    return {name: array.copy() for name, array in KeptParticles(solver).values.items()}
 
 
 def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) -> None:
@@ -85,9 +109,12 @@ def _mix_doubles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]]) 
 
 def _doubles(solver: ParticleSolver) -> Copied:
     """The coordinates that count, as doubles."""
-    count = solver.particle_count
-    arrays = zip(("x", "y", "z"), solver.doubles.arrays, strict=True)
-    return {name: solver.download(array, count).astype(np.float64) for name, array in arrays}
+    return _downloaded(solver, solver.doubles.arrays)
+
+
+def _downloaded(solver: ParticleSolver, arrays: Sequence[wp.array]) -> Copied:
+    count, named = solver.particle_count, zip("xyz", arrays, strict=True)
+    return {name: solver.download(array, count).astype(np.float64) for name, array in named}
 
 
 def _columns(solver: ParticleSolver) -> dict[str, int]:

@@ -134,6 +134,18 @@ class ParticleState:
         arrays = [getattr(self.state, name) for name in KEPT] if kept is None else kept[1]
         return tuple(self.download(arrays[KEPT.index(name)], self.particle_count) for name in ("vx", "vy", "vz"))
 
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """(worlds, 3) float64 each, the lowest and the highest coordinates of all particles [m]."""
+        own = [self.download(array, self.particle_count) for array in self.doubles.arrays]
+        low, high = (np.stack([find(each, axis=1) for each in own], axis=-1) for find in (np.min, np.max))
+        return low + self.origin, high + self.origin
+
+    def speeds(self) -> tuple[np.ndarray, np.ndarray]:
+        """(worlds,) float32, of the fastest particle [m/s], and (worlds, 3), how far velocities are apart by axis."""
+        own = self.velocities_apart()
+        fastest = np.sqrt((own[0] * own[0] + own[1] * own[1] + own[2] * own[2]).max(axis=1))
+        return fastest, np.stack([np.ptp(each, axis=1) for each in own], axis=-1)
+
     def set_state(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set positions [m] and velocities [m/s], (worlds, n, 3) each."""
         self.load_state(state_from(positions, velocities))

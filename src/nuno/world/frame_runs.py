@@ -1,4 +1,7 @@
-"""A frame that some bodies go through more than once, with other substeps, of which each world keeps its own run."""
+"""A frame that some bodies go through more than once, with other substeps, of which each world keeps its own run.
+
+Most frames are gone through once. So what comes of a run of particles is left where it is until there is another.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +26,26 @@ class FrameRuns:
         self._rigid: list[Body] = []
         self._start: dict[Any, Any] = {}
         self._kept: dict[Any, list[tuple[Any, np.ndarray]]] = {}
+        self._latest: dict[Body, np.ndarray] = {}  # (worlds,) bool, in which the state as it is now is kept
         if not bodies:
             return
-        from nuno.solvers.mixing import copy_particles, copy_rigid
+        from nuno.solvers.mixing import KeptParticles, copy_rigid
 
         self._scene = world._rigid
         for body in bodies:
             if body._dynamics.is_rigid:  # type: ignore[union-attr]
                 self._rigid.append(body)
             else:
-                self._start[body] = copy_particles(body._dynamics.solver)  # type: ignore[union-attr]
+                self._start[body] = KeptParticles(body._dynamics.solver)  # type: ignore[union-attr]
         if self._rigid and self._scene is not None:
             self._start[None] = copy_rigid(self._scene.solver)
 
     def begin(self, kept: dict[Body, np.ndarray]) -> None:
         """Put bodies that ran before back to where the frame began; ``kept`` are the next run's, see `end`."""
-        for body in [body for body in kept if body in self._start and body in self._kept]:
-            self._mix(body, [(self._start[body], np.ones_like(kept[body]))])
+        for body in kept:
+            self._copy_latest(body)
+            if body in self._kept:
+                self._mix(body, [(self._start[body].values, np.ones_like(kept[body]))])
         again = [body for body in kept if body in self._rigid]
         if again and None in self._kept:
             self._mix(None, [(self._start[None], self._rows({body: np.ones_like(kept[body]) for body in again}))])
@@ -48,12 +54,9 @@ class FrameRuns:
         """Keep what came of bodies in the worlds (worlds,) bool that are given for each."""
         if not self._start:
             return
-        from nuno.solvers.mixing import copy_particles, copy_rigid
+        from nuno.solvers.mixing import copy_rigid
 
-        for body, worlds in kept.items():
-            if body in self._start:
-                made = copy_particles(body._dynamics.solver)  # type: ignore[union-attr]
-                self._kept.setdefault(body, []).append((made, worlds))
+        self._latest |= {body: worlds for body, worlds in kept.items() if body in self._start}
         own = {body: kept[body] for body in self._rigid if body in kept}
         if own:
             assert self._scene is not None
@@ -61,8 +64,19 @@ class FrameRuns:
 
     def settle(self) -> None:
         """Give each world what it kept."""
-        for body, made in self._kept.items():
-            self._mix(body, made)
+        for body, worlds in list(self._latest.items()):
+            if body in self._kept or not worlds.all():
+                self._copy_latest(body)
+        for key, made in self._kept.items():
+            self._mix(key, made)
+
+    def _copy_latest(self, body: Body) -> None:
+        """Keep a copy of what came of the last run, in place of the state itself."""
+        from nuno.solvers.mixing import KeptParticles
+
+        if body in self._latest:
+            made = KeptParticles(body._dynamics.solver).values  # type: ignore[union-attr]
+            self._kept.setdefault(body, []).append((made, self._latest.pop(body)))
 
     def _mix(self, body: Body | None, made: list[tuple[Any, np.ndarray]]) -> None:
         from nuno.solvers.mixing import mix_particles, mix_rigid

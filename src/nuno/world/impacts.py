@@ -23,6 +23,7 @@ import math
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON, Dynamics
@@ -79,18 +80,17 @@ class Impacts:
         self._thorough = np.zeros_like(self.substeps, dtype=bool)  # where it has gone with more passes
         self._guarded: dict[int, np.ndarray] = {}  # (worlds,) bool, where a cloth was taken apart not long ago
         self._crossed: dict[Body, list[int]] = {}  # worlds in which a cloth passes through itself in the end
-        self._start: dict[int, np.ndarray] = {}  # of each cloth that touches itself, where it begins
+        self._start: dict[int, list[wp.array]] = {}  # of each cloth that touches itself, where it begins
         for k, body in enumerate(moving):
             if collides_with_itself(body._dynamics):
                 solver: Any = body._dynamics.solver  # type: ignore[union-attr]
                 forget_extremes(solver)
                 self._guarded[k] = solver.guarded > 0
-                self._start[k] = solver.positions()
-                velocities = solver.velocities()
-                # of two points that meet each does half of what they differ by at most
-                apart = 0.5 * np.linalg.norm(np.ptp(velocities, axis=1), axis=-1)
-                # nor more than the fastest goes: what is not fast alone is not here, beside a world that is
-                apart = np.minimum(apart, np.linalg.norm(velocities, axis=-1).max(axis=1))
+                self._start[k] = [wp.clone(array) for array in solver.doubles.arrays]
+                fastest, differing = solver.speeds()
+                # of two points that meet each does half of what they differ by at most, nor more than the fastest goes:
+                # what is not fast alone is not here, beside a world that is
+                apart = np.minimum(0.5 * np.linalg.norm(differing, axis=-1), fastest)
                 asked = np.nan_to_num(apart * frame / (WAY * _thickness(solver)), posinf=0.0)
                 self.substeps[k] = [_doubled(int(own[k]), float(least)) for least in asked]
         if self._guarded and all(own.all() for own in self._guarded.values()):
@@ -128,7 +128,8 @@ class Impacts:
                 if not np.isfinite(now[world]).all() or not len(crossing_faces(now[world], faces)):
                     continue
                 joined = islands.first[:, world] == islands.first[k, world]
-                before = len(crossing_faces(start[world], faces)) > 0
+                was = np.stack([solver.download(array, solver.particle_count)[world] for array in start], axis=-1)
+                before = len(crossing_faces(was.astype(float), faces)) > 0
                 if before or islands.substeps[k, world] >= MOST:
                     self._crossed.setdefault(body, []).append(int(world))
                     continue

@@ -51,9 +51,11 @@ def find_islands(world: Simulation, moving: list[Body], duration: float, substep
         duration: [s].
         substeps: (bodies, worlds) int, how many of a frame each needs; None takes the bodies' own.
     """
-    low, high = (np.stack(corner) for corner in zip(*(_box(world, body, duration) for body in moving), strict=True))
-    near = np.asarray((low[:, None] <= high[None]).all(axis=-1) & (low[None] <= high[:, None]).all(axis=-1))
-    joined = np.zeros_like(near)  # (bodies, bodies, worlds)
+    joined = np.zeros((len(moving), len(moving), world.world_count), dtype=bool)
+    near = joined
+    if len(moving) > 1:
+        low, high = (np.stack(corner) for corner in zip(*(_box(world, body, duration) for body in moving), strict=True))
+        near = np.asarray((low[:, None] <= high[None]).all(axis=-1) & (low[None] <= high[:, None]).all(axis=-1))
     for a, b in np.argwhere(np.triu(near.any(axis=-1), 1)):
         if world._rules.touch(moving[a], moving[b]):
             joined[a, b] = near[a, b]
@@ -106,8 +108,8 @@ def _box(world: Simulation, body: Body, duration: float) -> tuple[np.ndarray, np
         speed = np.linalg.norm(velocity, axis=-1) + np.linalg.norm(spin, axis=-1) * radius
         grow = (radius + GROWTH * speed * duration + fall + SLACK)[:, None]
         return middle - grow, middle + grow
-    positions = dynamics.solver.positions()
-    speed = np.linalg.norm(dynamics.solver.velocities(), axis=-1).max(axis=-1)
+    low, high = dynamics.solver.bounds()
+    speed, _ = dynamics.solver.speeds()
     thickness = np.asarray(getattr(dynamics.material, "thickness", 0.0), dtype=float)
     grow = (GROWTH * speed * duration + fall + SLACK + thickness)[:, None]
-    return positions.min(axis=1) - grow, positions.max(axis=1) + grow
+    return low - grow, high + grow
