@@ -121,6 +121,13 @@ class Engine(ABC):
         """
         self.require(*needs_of_dynamics(body, material, self.world))
 
+    def allow_contacts(self) -> None:  # noqa: B027, most tell any pairs apart
+        """Refuse rules of which pairs touch that the engine lacks, before a run.
+
+        Raises:
+            InvalidInputError: it cannot tell so many kinds of bodies apart.
+        """
+
     def allow_grip(self, spec: Any, on_moving: bool) -> None:
         """Refuse a grip, weld or joint that the engine lacks, before anything changes.
 

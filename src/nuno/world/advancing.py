@@ -30,6 +30,7 @@ class Advancing(Simulation):
         """
         start = self._time
         finish = start + duration if end is None else end
+        self._engine.allow_contacts()
         for driver in self.drivers:
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}

@@ -15,6 +15,7 @@ from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.mujoco.joint_tree import is_of_tree
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
+from nuno.engines.mujoco.mujoco_touch import touch_classes
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
 from nuno.materials import Material, Rigid
 from nuno.shapes import quaternion as quat
@@ -46,6 +47,13 @@ class MujocoEngine(Engine):
         self._is_current = False
         self._settings: tuple[Any, ...] = ()
         self._sums: Any = None
+
+    # What it can do
+
+    def allow_contacts(self) -> None:
+        """Refuse more classes of bodies that touch different others than MuJoCo's masks have bits."""
+        if not self._is_current:
+            touch_classes(self.world, self.world.bodies)
 
     # Dynamics
 
