@@ -1,8 +1,8 @@
 """The tree of bodies that hinges and sliders make in MuJoCo, and the bodies' states as coordinates of its joints.
 
 Each body hangs on the other one of its first hinge or slider by a joint of MuJoCo's own, which cannot give way. A
-joint that would close a loop, or whose body air slows down, has a light helper in its place, which is welded to the
-body.
+joint that would close a loop, or whose body air slows down, has a helper in its place, which is welded to the body and
+takes a share of its mass.
 """
 
 from __future__ import annotations

@@ -31,8 +31,6 @@ STRONGEST = 1e9
 """[N m, N] Of a motor without a limit."""
 FLYWHEEL = 1e6
 """[kg]"""
-LIGHT = 1e-3
-"""Mass and inertia of a helper, over those of the body that it is welded to."""
 
 
 @dataclass(eq=False)
@@ -43,7 +41,7 @@ class Jointed:
         joint: The joint.
         depth: Of its body in the tree; -1 where a helper stands for it.
         name: Of MuJoCo's joint, site, actuator and sensors.
-        helper: The helper, or None.
+        helper: The helper, or None: a copy of the body, which takes a share of its mass.
         clutch: Whether it has one.
     """
 
@@ -123,19 +121,15 @@ class Joints:
 
     def _add_helper(self, joint: Joint, placed: dict[str, Any]) -> Jointed:
         self._made += 1
-        spec, joined = joint.spec, placed[joint.body.key]
+        joined = placed[joint.body.key]
         parent = self._spec.worldbody if joint.target is None else placed[joint.target.key].bodies[0]
-        body = joined.bodies[0]
-        inertia = LIGHT * float(np.mean([body.fullinertia[k] for k in range(3)]))
-        helper = parent.add_body(
-            name=f"j{self._made}", pos=spec.other_place[0], quat=spec.other_turn[0], mass=LIGHT * float(body.mass),
-            inertia=[inertia] * 3, explicitinertial=True, gravcomp=1.0,
-        )  # fmt: skip
-        _add_joint(helper, helper.name, joint, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        helper = parent.add_body(name=f"j{self._made}")
+        joined.helpers.append(helper)
+        hang(helper, helper.name, joint)
         mujoco = mujoco_package()
         weld = self._spec.add_equality(
             name=helper.name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=helper.name,
-            name2=body.name, solimp=STIFF,
+            name2=joined.bodies[0].name, solimp=STIFF,
         )  # fmt: skip
         self._elements += [helper, weld]
         return Jointed(joint, -1, helper.name, helper)
@@ -191,24 +185,28 @@ class Joints:
         if clutched:
             batch.expand("tendon_solref_fri")[:, self._clutch] = closing
         for own in joined:
-            self._set_frames(own, model, batch, closing)
+            self._set_frames(own, model, batch)
         self.states = JointStates(self._world, self.joints, [own.depth for own in joined])
 
-    def _set_frames(self, own: Jointed, model: Any, batch: Any, closing: tuple[float, float]) -> None:
-        """Write a joint's frames where they differ between worlds, and the weld of a helper."""
+    def _set_frames(self, own: Jointed, model: Any, batch: Any) -> None:
+        """Write a joint's frames where they differ between worlds."""
         spec, body, joint = own.joint.spec, model.body(own.name).id, model.joint(own.name).id
-        place, turn = rest_pose(spec) if own.helper is None else (spec.other_place, spec.other_turn)
+        place, turn = rest_pose(spec)
         if any(np.ptp(part, axis=0).any() for part in (place, turn, spec.place, spec.turn)):
             batch.expand("body_pos")[:, body], batch.expand("body_quat")[:, body] = place, turn
+            batch.expand("jnt_pos")[:, joint], batch.expand("jnt_axis")[:, joint] = spec.place, axis_of(spec)
+            batch.expand("site_pos")[:, model.site(own.name).id] = spec.place
+
+    def weld(self, model: Any, batch: Any, step: float) -> None:
+        """Write of each helper that it is where the body is; MuJoCo's constants are set by then, which would undo it."""
+        for own in self._joined:
             if own.helper is None:
-                batch.expand("jnt_pos")[:, joint], batch.expand("jnt_axis")[:, joint] = spec.place, axis_of(spec)
-                batch.expand("site_pos")[:, model.site(own.name).id] = spec.place
-        if own.helper is not None:
-            row, back = model.equality(own.name).id, quat.inverse(spec.turn)
-            batch.expand("eq_solref")[:, row] = closing
+                continue
+            row, place = model.equality(own.name).id, own.joint.spec.place
+            batch.expand("eq_solref")[:, row] = CLOSING * step, 1.0
             data = batch.expand("eq_data")
-            data[:, row, 0:3], data[:, row, 3:6] = spec.place, -quat.rotate(back, spec.place)
-            data[:, row, 6:10], data[:, row, 10] = back, 1.0
+            data[:, row, 0:3], data[:, row, 3:6] = place, place
+            data[:, row, 6:10], data[:, row, 10] = quat.IDENTITY, 1.0
 
     def drives_changed(self, joint: Joint) -> bool:
         """Be told that a joint's drives are others now; return whether the spec has what they need."""

@@ -48,6 +48,7 @@ class Placed:
         flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
+        helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
         carries: Whether bodies hang on it by joints.
         depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
@@ -62,6 +63,7 @@ class Placed:
     flexes: list[Any] = field(default_factory=list)
     mesh: FlexMesh | None = None
     friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    helpers: list[Any] = field(default_factory=list)
     carries: bool = False
     depth: int = 0
     id: int = -1
@@ -144,12 +146,15 @@ class MujocoScene:
                 self.placed[key].depth = depth
         carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
         for key, own in self.placed.items():
-            own.carries = key in carriers
+            own.carries, own.helpers = key in carriers, []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
         set_friction(self.spec, world, bodies)
         self.holds.add(self.spec, self.placed)
         self.joints.add(self.spec, self.placed, tree)
+        for body, own in bodies:
+            if own.role == "rigid":
+                _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
         self.spec.option.timestep, self.shortened = substep, False
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
@@ -163,6 +168,7 @@ class MujocoScene:
         self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
+        self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
 
     def _delete(self, key: str) -> None:
@@ -186,11 +192,6 @@ class MujocoScene:
             parent = spec.worldbody if other is None else self.placed[other.key].bodies[0]
             made = parent.add_body(name=name)
             if isinstance(dynamics, ArrayRigid):
-                inertia = dynamics.inertia[0]
-                made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]), dynamics.centre, True
-                made.fullinertia = [
-                    inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
-                ]  # fmt: skip
                 if joint is None:
                     made.add_freejoint(name=name)
                 else:
@@ -226,11 +227,14 @@ class MujocoScene:
         worlds = self._world.world_count
         moving: list[tuple[Any, Placed]] = [(dynamics_of(b), own) for b, own in bodies if dynamics_of(b) is not None]
         for dynamics, own in moving:
-            ids = own.id + np.arange(len(own.bodies))
-            batch.expand("body_mass")[:, ids] = dynamics.mass.reshape(worlds, -1)
-            if own.role == "rigid":
-                share = np.trace(dynamics.inertia, axis1=1, axis2=2)
-                batch.expand("body_inertia")[:, own.id] = model.body_inertia[own.id] * (share / share[0])[:, None]
+            if own.role == "flex":
+                ids = own.id + np.arange(len(own.bodies))
+                batch.expand("body_mass")[:, ids] = dynamics.mass
+                continue
+            share = np.trace(dynamics.inertia, axis1=1, axis2=2)
+            for each in (own.id, *(int(model.body(helper.name).id) for helper in own.helpers)):
+                batch.expand("body_mass")[:, each] = dynamics.mass / (1 + len(own.helpers))
+                batch.expand("body_inertia")[:, each] = model.body_inertia[each] * (share / share[0])[:, None]
         if moving:
             batch.set_const()  # of all worlds, so that one is the same in any batch
         for dynamics, own in moving:
@@ -257,6 +261,16 @@ class MujocoScene:
         for axis in range(3):
             damping[:, own.dof[0] + axis] = drag * dynamics.mass
             damping[:, own.dof[0] + 3 + axis] = drag * spin
+
+
+def _share_mass(dynamics: Any, bodies: list[Any]) -> None:
+    """Give a rigid body and its helpers equal shares of its mass and inertia."""
+    inertia = dynamics.inertia[0] / len(bodies)
+    for made in bodies:
+        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) / len(bodies), dynamics.centre, True
+        made.fullinertia = [
+            inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
+        ]  # fmt: skip
 
 
 def flex_id(model: Any, name: str) -> int:
