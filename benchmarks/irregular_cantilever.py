@@ -1,9 +1,9 @@
 """Bending of irregular triangle meshes on each engine: ``python benchmarks/irregular_cantilever.py``.
 
 A strip is clamped level at one end and hangs by its weight, G = w L^3 / B = 6. The drop of its tip over its reach tells
-which rigidity it has (the elastica, theta'' = -G (1 - s) cos(theta)); the table has that over the nominal one. Points of
-a mesh are a grid of 20 x 5 cells that was shaken, each by a share of a cell's side, or thrown at random with the same
-density; Delaunay's triangles join them. The grid itself, with all diagonals alike, is beside them.
+which rigidity it has (the elastica, theta'' = -G (1 - s) cos(theta)); the table has that over the nominal one. Points
+are a grid of 20 x 5 cells that was shaken, each by a share of a cell's side, or thrown at random with the same density;
+Delaunay's triangles join them. The grid itself, with all diagonals alike, is beside them.
 """
 
 from __future__ import annotations

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.bodies.dynamics import Dynamics

@@ -29,7 +29,7 @@ def inertia_of(rod):
 
 
 def test_a_slider_slides_down_its_slope():
-    """s = g sin(a) t (t + h) / 2 by semi-implicit steps h, and the slope bears m g cos(a) across: to rounding."""
+    """S = g sin(a) t (t + h) / 2 by semi-implicit steps h, and the slope bears m g cos(a) across: to rounding."""
     world, angle = world_of(), np.radians(30.0)
     block = world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 1.0))))
     slope = nuno.slider(block, None, axis=(np.cos(angle), 0.0, -np.sin(angle)))
@@ -43,7 +43,7 @@ def test_a_slider_slides_down_its_slope():
 
 
 def test_a_motor_with_a_limit_speeds_up_by_it_and_then_keeps_its_velocity():
-    """w = M t / I while it gives all; then its velocity, without effort: 1e-4 of what the dry friction leaves."""
+    """W = M t / I while it gives all; then its velocity, without effort: 1e-4 of what the dry friction leaves."""
     world = world_of(gravity=(0.0, 0.0, 0.0))
     rod, hinge = lever(world, (0.0, 0.0, 1.0), motor=nuno.Motor(3.0, max_effort=0.005))
     world.run(0.25)
@@ -55,7 +55,7 @@ def test_a_motor_with_a_limit_speeds_up_by_it_and_then_keeps_its_velocity():
 
 
 def test_gains_give_their_terminal_speed_and_place():
-    """d (v - w) = c w, and k (p - q) = m g r cos(q): of motors with gains, against a damping and a weight."""
+    """D (v - w) = c w, and k (p - q) = m g r cos(q): of motors with gains, against a damping and a weight."""
     world = world_of()
     rod, hinge = lever(world, (0.0, 0.0, 1.0), motor=nuno.Motor(2.0, damping=0.1), spring=nuno.Spring(0.0, damping=0.1))
     world.run(0.5)
@@ -98,7 +98,7 @@ def test_a_spring_swings_as_implicit_steps_have_it():
 
 
 def test_stops_hold():
-    """A lever falls on its stop and lies there; a slider is pushed on its own: within 0.1 mrad, 0.1 mm, and the load."""
+    """A lever falls on its stop and lies there; a slider is pushed on its own: to 0.1 mrad, 0.1 mm, and the load."""
     world = world_of()
     rod, hinge = lever(world, (0.0, 1.0, 0.0), limits=(-0.2, 0.3))
     block = world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=(1.0, 0.0, 1.0))))

@@ -11,7 +11,7 @@ FRAME = 1.0 / 60.0
 
 
 def test_impulses_are_what_momentum_lacks():
-    """A box that lands on two others: of each, in every frame, m dv - m g dt is what the others gave it, to 1e-6 N s."""
+    """A box lands on two others: of each, in every frame, m dv - m g dt is what the others gave it, to 1e-6 N s."""
     world = nuno.World(device="cpu", engine="mujoco")
     world.add(nuno.plane(name="floor"))
     low = [

@@ -12,10 +12,10 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
-from nuno.engines.mujoco.joint_tree import is_of_tree
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import touch_classes
+from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
 from nuno.materials import Material, Rigid
 from nuno.shapes import quaternion as quat

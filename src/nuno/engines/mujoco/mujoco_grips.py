@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
-from nuno.engines.mujoco.joint_tree import is_of_tree
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec

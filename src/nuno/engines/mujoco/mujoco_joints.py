@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.engines.mujoco.joint_tree import JointStates, axis_of, depth_of, hinges_and_sliders, rest_pose
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_tree import JointStates, axis_of, depth_of, hinges_and_sliders, rest_pose
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
@@ -198,7 +198,7 @@ class Joints:
             batch.expand("site_pos")[:, model.site(own.name).id] = spec.place
 
     def weld(self, model: Any, batch: Any, step: float) -> None:
-        """Write of each helper that it is where the body is; MuJoCo's constants are set by then, which would undo it."""
+        """Write of each helper that it is where the body is, after MuJoCo's constants are set, which would undo it."""
         for own in self._joined:
             if own.helper is None:
                 continue

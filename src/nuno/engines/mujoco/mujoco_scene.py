@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
-from nuno.engines.mujoco.joint_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
+from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Sums:
-    """What is summed up over the last frame, or the part of one that was advanced last.
+    """Sums over the last frame, or the part of one that was advanced last.
 
     Args:
         scene: The scene as it is compiled.
