@@ -29,7 +29,7 @@ from nuno.viewer.film import Film
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
-MOST_PICTURES = 100_000
+PICTURE_LIMIT = 100_000
 """Of a film; more are a slip of the keyboard."""
 
 
@@ -157,8 +157,8 @@ def compare_engines(
     for engine in engines:
         engine_class(engine)
     span, each = number("seconds", seconds, above=0.0), number("rate", rate, above=0.0)
-    if span * each > MOST_PICTURES:
-        raise InvalidInputError(f"{span:g} s at {each:g} pictures a second are too many: at most {MOST_PICTURES}")
+    if span * each > PICTURE_LIMIT:
+        raise InvalidInputError(f"{span:g} s at {each:g} pictures a second are too many: at most {PICTURE_LIMIT}")
     saved = scene
     if isinstance(saved, str | os.PathLike):
         from nuno.world.snapshot_file import read_snapshot
