@@ -77,7 +77,9 @@ def test_hinges_are_those_that_mujoco_compiles():
     from nuno.engines.mujoco.sheet_triangles import sheet_triangles
 
     elements, _ = sheet_triangles(3, 3)
-    places = np.stack([*(part.ravel() for part in np.meshgrid(1.3 * np.arange(4), 0.8 * np.arange(4))), np.zeros(16)], 1)
+    places = np.stack(
+        [*(part.ravel() for part in np.meshgrid(1.3 * np.arange(4), 0.8 * np.arange(4))), np.zeros(16)], 1
+    )
     places[:, :2] += np.random.default_rng(0).uniform(-0.1, 0.1, (16, 2))
     spec = mujoco.MjSpec()
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE

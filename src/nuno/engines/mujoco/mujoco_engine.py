@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -12,8 +13,8 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
+from nuno.engines.mujoco.mujoco_grips import push, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
-from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import touch_classes
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
@@ -47,6 +48,7 @@ class MujocoEngine(Engine):
         self._is_current = False
         self._settings: tuple[Any, ...] = ()
         self._sums: Any = None
+        self._later: Callable[[], None] | None = None
 
     # What it can do
 
@@ -77,7 +79,7 @@ class MujocoEngine(Engine):
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
         dynamics_of(body).load_state(state)
-        self._sums = None
+        self._sums = self._later = None
 
     def changed(self) -> None:
         """Let the spec be looked through before the next step."""
@@ -125,35 +127,34 @@ class MujocoEngine(Engine):
             if own.role == "moving"
         }
         self.write(start, {key: (place[:, 0], turn[:, 0]) for key, (place, turn) in paths.items()})
-        moving = [(scene.placed[key], path) for key, path in paths.items()]
-        targets = scene.holds.targets(start, end, times)
-        self._sums = Sums(scene, self.world.world_count) if scene.sums or len(scene.joints) else None
+        moving = [
+            (push if own.carries else send, (int(own.qpos[0]), int(own.dof[0])), paths[key])
+            for key, own in scene.placed.items()
+            if key in paths
+        ]
+        go = partial(_go, batch, scene.holds, count, step, moving, scene.holds.targets(start, end, times))
         bad = [int(getattr(mujoco_package().mjtWarning, name)) for name in BAD]
         before = batch.warning[:, bad].copy()
+        self._sums, self._later = scene.sums, None
+        if self._sums is not None:
+            self._sums.begin()
+        eager = len(scene.joints) > 0 or bool(self.rules.summed)
+        if self._sums is not None and not eager:
+            self._later = partial(_go_again, batch, batch.state.copy(), go, self._sums)
         with warnings_logged():
-            if not moving and not targets and self._sums is None:
-                batch.step(nstep=count)
-            else:
-                self._step_driven(count, step, moving, targets)
+            go(self._sums if eager else None)
         self._read()
         diverged = (batch.warning[:, bad] != before).reshape(len(before), -1).any(axis=1)
         for dynamics in attached(self.world) if diverged.any() else ():
             for values in dynamics.values.values():
                 values[diverged] = np.nan
 
-    def _step_driven(self, count: int, step: float, moving: Any, targets: Any) -> None:
-        """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
-        from nuno.engines.mujoco.mujoco_grips import push, send
-
-        batch, holds = self._scene.batch, self._scene.holds
-        for k in range(count):
-            for own, (place, turn) in moving:
-                lead = push if own.carries else send
-                lead(batch, (int(own.qpos[0]), int(own.dof[0])), place[:, k : k + 2], turn[:, k : k + 2], step)
-            holds.write(targets, batch, k, step)
-            batch.step()
-            if self._sums is not None:
-                self._sums.add(step)
+    def _summed(self) -> Any:
+        """Return the sums over the last frame, which is gone through once more where they were not expected."""
+        if self._later is not None:
+            go, self._later = self._later, None
+            go()
+        return self._sums
 
     def write(self, time: float, poses: Mapping[str, Any] | None = None) -> None:
         """Write all states and pushes into the batch; within a run bodies on paths are at other ``poses``, by key."""
@@ -261,10 +262,11 @@ class MujocoEngine(Engine):
 
     def impulses(self, bodies: Any) -> list[dict[str, np.ndarray]]:
         """Return what contacts gave bodies in the last frame."""
-        if self._sums is None:
+        sums = self._summed()
+        if sums is None:
             return [{} for _ in bodies]
         names = {key: body.name for key, body in bodies_by_key(self.world).items()}
-        given = [self._sums.impulses(body.key) for body in bodies]
+        given = [sums.impulses(body.key) for body in bodies]
         return [{names[key]: own for key, own in each.items() if key in names} for each in given]
 
     def contacts(self, body: Body, itself: bool) -> list[tuple[Any, ...]]:
@@ -272,3 +274,24 @@ class MujocoEngine(Engine):
         from nuno.engines.mujoco.mujoco_forces import contacts_of
 
         return contacts_of(self, body, itself)
+
+
+def _go(batch: Any, holds: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
+    """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
+    if not moving and not targets and sums is None:
+        batch.step(nstep=count)
+        return
+    for k in range(count):
+        for lead, address, (place, turn) in moving:
+            lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
+        holds.write(targets, batch, k, step)
+        batch.step()
+        if sums is not None:
+            sums.add(step)
+
+
+def _go_again(batch: Any, state: np.ndarray, go: Callable[[Any], None], sums: Any) -> None:
+    """Go through a frame from its state once more, which is the same to the bit, and sum up."""
+    batch.state[:] = state
+    with warnings_logged():
+        go(sums)

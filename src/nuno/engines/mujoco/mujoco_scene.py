@@ -17,6 +17,7 @@ from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
 from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
@@ -80,7 +81,7 @@ class MujocoScene:
         batch: The batch of as many simulations as there are worlds.
         holds: The grips, and what is held as grips are, as equality constraints.
         joints: The hinges and sliders.
-        sums: Whether each world's data are kept, so that the forces of its contacts can be summed up.
+        sums: What joints bear and contacts give over a frame; None of cloth and soft bodies that were not asked about.
         compilations: How often the model was compiled.
         shortened: Whether a substep was of another length than the model's.
 
@@ -97,7 +98,7 @@ class MujocoScene:
         self.joints: Joints
         self.model: Any = None
         self.batch: Any = None
-        self.sums = False
+        self.sums: Sums | None = None
         self.compilations = 0
         self.shortened = False  # whether the substep has been another than the model's
         self._settings: tuple[Any, ...] = ()
@@ -159,9 +160,9 @@ class MujocoScene:
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
-        # the forces of contacts are read from the data after each substep, of rigid bodies
-        self.sums = bool(world.engine.rules.summed) or any(own.role == "rigid" for own in self.placed.values())
-        self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1, self.sums)
+        # the forces of contacts are read from the data after each substep
+        kept = bool(world.engine.rules.summed) or any(own.role == "rigid" for own in self.placed.values())
+        self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1, kept)
         self.compilations += 1
         for own in self.placed.values():
             self._find(own)
@@ -170,6 +171,7 @@ class MujocoScene:
         write_friction(self.model, self.batch, bodies)
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
+        self.sums = Sums(self, world.world_count) if kept else None
 
     def _delete(self, key: str) -> None:
         own = self.placed.pop(key)

@@ -23,7 +23,7 @@ class Sums:
     """
 
     def __init__(self, scene: MujocoScene, worlds: int) -> None:
-        self._scene, self._worlds = scene, worlds
+        self._model, self._batch, self._of_joints, self._worlds = scene.model, scene.batch, scene.joints, worlds
         self._joints: dict[Any, int] = {joint: k for k, joint in enumerate(scene.joints.joints)}
         self._borne = np.zeros((worlds, len(self._joints), 6))
         self._along = np.zeros((worlds, len(self._joints)))
@@ -31,22 +31,23 @@ class Sums:
         self._keys = list(scene.placed)
         self._given = np.zeros((worlds, len(self._keys), len(self._keys), 3))
         self._data: Any = None
-        self._owner: Any = _owners(scene, self._keys) if scene.sums else None
+        self._owner = _owners(scene, self._keys)
+
+    def begin(self) -> None:
+        """Forget what was summed up."""
+        self._borne[:], self._along[:], self._given[:], self._duration = 0.0, 0.0, 0.0, 0.0
 
     def add(self, step: float) -> None:
         """Add what happened in the last substep, of ``step`` [s]."""
-        scene = self._scene
         self._duration += step
         if self._joints:
-            borne, along = scene.joints.loads(scene.batch)
+            borne, along = self._of_joints.loads(self._batch)
             self._borne += step * borne
             self._along += step * along
-        if not scene.sums:
-            return
         if self._data is None:
-            self._data = mujoco_package().MjData(scene.model)
+            self._data = mujoco_package().MjData(self._model)
         for world, given in enumerate(self._given):
-            data = scene.batch.get_data(world, self._data)
+            data = self._batch.get_data(world, self._data)
             if data.ncon:
                 self._add_contacts(data, step, given)
 
