@@ -103,9 +103,7 @@ def main() -> None:
             steps.append(row)
             print(f"| {row['base']} | {row['substep_ms']:.2f} | {row['apart_rad']:.4f} | {row['apart_of_range']:.2%} | "
                   f"{row['nuno_cpu']:.2f} | {row['mujoco_cpu']:.2f} |", flush=True)  # fmt: skip
-    print(
-        "\n| engine | soles bear [N] | fastest [rad/s; m/s] | joints off [rad] | walked of 0.2 m | CPU s/s |"
-    )
+    print("\n| engine | soles bear [N] | fastest [rad/s; m/s] | joints off [rad] | walked of 0.2 m | CPU s/s |")
     print("|---|---|---|---|---|---|")
     stands = []
     for engine in ENGINES:
