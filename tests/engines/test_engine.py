@@ -75,6 +75,7 @@ def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():
     assert box.position[0] > before[0]
 
 
+@pytest.mark.long
 def test_dynamics_of_a_robot_are_refused_before_it_enters_the_world():
     """Newton has no joints here; neither bodies nor a driver are left in the world."""
     pytest.importorskip("newton")
