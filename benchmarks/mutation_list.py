@@ -38,9 +38,9 @@ MUTATIONS = (
      "physics/test_friction.py"),
     ("contact", "contact/self/list_skin.py", "return wp.sqrt(dx * dx + dy * dy + dz * dz) - spare",
      "return wp.sqrt(dx * dx + dy * dy) - spare", "contact/self/test_list_skin.py"),
-    ("contact", "world/contact_points.py", "impulses.get(name, 0.0) + impulse", "impulse",
+    ("contact", "engines/builtin_contacts.py", "found[k].get(name, 0.0) + impulse", "impulse",
      "test_shape_impulses.py world/test_contact_points.py"),
-    ("contact", "world/contact_points.py", "np.linalg.norm(normals, axis=-1) > 0.0) & ~pressed",
+    ("contact", "engines/builtin_contacts.py", "np.linalg.norm(normals, axis=-1) > 0.0) & ~pressed",
      "np.linalg.norm(normals, axis=-1) > 0.0)",
      "world/test_contact_points.py coupled/test_loads_through_cloth.py"),
     # rigid

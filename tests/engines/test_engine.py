@@ -61,17 +61,30 @@ def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it():
 
 
 def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():
-    """A slider is none of MuJoCo's; the world that was to be imagined stays as it is."""
+    """A ball joint's cone is none of MuJoCo's; the world that was to be imagined stays as it is."""
     pytest.importorskip("mujoco", minversion="4.0")
     world = nuno.World(device="cpu")
     box = world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.5))))
-    nuno.slider(box, None, axis=(0.0, 0.0, 1.0))
+    nuno.ball_joint(box, None, point=(0.0, 0.0, 0.6), limit=0.5)
     before = np.array(box.position)
-    with pytest.raises(nuno.EngineCapabilityError, match="sliders"):
+    with pytest.raises(nuno.EngineCapabilityError, match="drives of ball joints"):
         world.imagine(2, engine="mujoco")
     np.testing.assert_array_equal(box.position, before)
+    world.set_velocity(box, (0.1, 0.0, 0.0))
     world.run(0.1)
-    assert box.position[2] < before[2]
+    assert box.position[0] > before[0]
+
+
+@pytest.mark.long
+def test_dynamics_of_a_robot_are_refused_before_it_enters_the_world():
+    """Newton has no joints here; neither bodies nor a driver are left in the world."""
+    pytest.importorskip("newton")
+    pytest.importorskip("pinocchio")
+    world = nuno.World(device="cpu", engine="newton")
+    match = "newton has no robots with dynamics; engines that have: nuno, mujoco"
+    with pytest.raises(nuno.EngineCapabilityError, match=match):
+        nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
+    assert not world.bodies and not world.drivers
 
 
 def test_a_device_that_an_engine_does_not_run_on_is_refused():

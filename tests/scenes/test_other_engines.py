@@ -74,3 +74,32 @@ def test_newton_reads_the_same_bodies_from_usd(tmp_path):
         assert masses[name] == pytest.approx(world.find(name).mass, rel=1e-5)
     assert len(builder.particle_q) == len(world.find("towel").vertices)
     assert sum(builder.particle_mass) == pytest.approx(world.find("towel").mass, rel=1e-3)
+
+
+@pytest.mark.long
+def test_a_written_strip_bends_in_mujoco_as_its_rigidity_says(tmp_path):
+    """A cantilever that hangs by its weight has the rigidity of the elastica that hangs as low, within 4 %."""
+    mujoco = pytest.importorskip("mujoco", minversion="4.0")
+    length, cells = 0.2, 12
+    step, rigidity = length / cells, 2e-3
+    world = nuno.World(device="cpu")
+    strip = world.add(nuno.sheet((length, 3 * step), cells=(cells, 3), name="strip", position=(0.5 * length, 0.0, 0.5)))
+    world.attach(strip, nuno.Cloth(bending_rigidity=rigidity, area_density=0.2, shear_stiffness=400.0))
+    world.ignore_contact(strip, strip)
+    start = strip.vertices
+    held = np.flatnonzero(start[:, 0] < 1.5 * step)
+    world.grip(strip, held, to=start[held].mean(axis=0))
+    nuno.save_scene(world, tmp_path / "strip.xml")
+    spec = mujoco.MjSpec.from_file(str(tmp_path / "strip.xml"))
+    spec.option.integrator, spec.option.timestep = mujoco.mjtIntegrator.mjINT_DISCRETE, 2e-3
+    model = spec.compile()
+    model.dof_damping[:] = 6.0 * model.body_mass[model.dof_bodyid]
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for _ in range(1500):
+        mujoco.mj_step(model, data)
+    tip = data.flexvert_xpos[start[:, 0] > length - 1e-6].mean(axis=0)
+    # two held columns clamp the strip halfway between them; theta'' = -G (1 - s) cos(theta), as in the engines' tests
+    ratio = (0.5 - tip[2]) / (tip[0] - 0.5 * step)
+    felt = np.exp(np.interp(np.log(ratio), np.log((0.58572, 0.78857, 1.06680)), np.log((5.0, 7.0, 10.0))))
+    assert 0.2 * 9.81 * (length - 0.5 * step) ** 3 / rigidity / felt == pytest.approx(1.0, abs=0.04)

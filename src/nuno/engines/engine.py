@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from nuno.engines.array_dynamics import motions_of
 from nuno.engines.driven_motion import kinematic_velocity
 from nuno.engines.engine_needs import needs_of_dynamics, needs_of_grip
 from nuno.engines.world_view import attached, dynamics_of
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from nuno.bodies.dynamics import Dynamics, State
     from nuno.joints.grip import Grip
     from nuno.materials import Material
+    from nuno.numbers.device_array import DeviceArray
     from nuno.tables.kinematic_motion import Schedule
     from nuno.world.simulation import Simulation
 
@@ -47,7 +49,8 @@ CAPABILITIES: dict[str, str] = {
     "sliders": "slider",
     "ball joints": "ball_joint",
     "fixed joints": "fixed_joint",
-    "joint drives": "motors, springs, friction and limits of joints",
+    "joint drives": "motors, springs, friction and limits of hinges and sliders",
+    "drives of ball joints": "springs, friction and cones of ball joints",
     "wrench": "what a grip or joint bears",
     "effort": "what a joint's drives do",
     "contacts": "World.contacts: points, normals, forces",
@@ -116,8 +119,14 @@ class Engine(ABC):
         Raises:
             EngineCapabilityError: it cannot move such a body, or not of such a material.
         """
-        if not self.is_builtin:
-            self.require(*needs_of_dynamics(body, material, self.world))
+        self.require(*needs_of_dynamics(body, material, self.world))
+
+    def allow_contacts(self) -> None:  # noqa: B027, most tell any pairs apart
+        """Refuse rules of which pairs touch that the engine lacks, before a run.
+
+        Raises:
+            InvalidInputError: it cannot tell so many kinds of bodies apart.
+        """
 
     def allow_grip(self, spec: Any, on_moving: bool) -> None:
         """Refuse a grip, weld or joint that the engine lacks, before anything changes.
@@ -129,8 +138,7 @@ class Engine(ABC):
         Raises:
             EngineCapabilityError: it cannot hold that.
         """
-        if not self.is_builtin:
-            self.require(*needs_of_grip(spec, on_moving))
+        self.require(*needs_of_grip(spec, on_moving))
 
     # Dynamics
 
@@ -165,6 +173,10 @@ class Engine(ABC):
     def changed(self) -> None:
         """Be told that bodies came, went or were moved, or that grips, rules or friction have changed."""
 
+    def drives_changed(self, joint: Grip) -> None:
+        """Be told that a joint's motor, spring, friction or stops are others now, and nothing else."""
+        self.changed()
+
     # Time
 
     @abstractmethod
@@ -175,20 +187,37 @@ class Engine(ABC):
         pushed by ``Dynamics.pushing(start)`` throughout.
         """
 
+    def prepare_run(self) -> None:  # noqa: B027, most have nothing to bring
+        """Bring what a run that fails goes back to, before it is kept."""
+
     def finite(self, body: Body) -> np.ndarray:
         """Return (worlds,) bool, whether all numbers of a dynamic body's state are finite."""
         return np.atleast_1d(dynamics_of(body).finite())
 
     def keep(self) -> Any:
-        """Return what `put_back` takes, all that a step changes."""
+        """Return what `put_back` takes, all that a run changes."""
         return [(dynamics, dynamics.state()) for dynamics in attached(self.world)]
 
     def put_back(self, kept: Any) -> None:
-        """Set all that a step changes to what it was at `keep`."""
+        """Set all that a run changes to what it was at `keep`."""
         for dynamics, state in kept:
             dynamics.load_state(state)
 
+    def keeps(self, dynamics: Dynamics) -> bool:
+        """Return True if a body's dynamics, of the right material, can be set to a state that is restored."""
+        return True
+
     # What it tells
+
+    def positions(self, body: Body) -> DeviceArray:
+        """Return the vertices of a cloth or soft body [m], a Warp array (worlds, n) of vec3 on the world's device."""
+        world: Any = self.world
+        positions: DeviceArray = world.state(body)["positions"]
+        return positions
+
+    def rigid_motions(self, bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return where dynamic rigid bodies are and how they move; see ``World.rigid_motion``."""
+        return motions_of(bodies)
 
     def velocity_at(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocity [m/s] of a point of a body that does not deform, and its spin [rad/s], (worlds, 3) each.
@@ -213,6 +242,24 @@ class Engine(ABC):
     def effort(self, joint: Grip) -> np.ndarray:
         """Return (worlds,), what a joint's drives do; see ``Joint.effort``."""
         self.require("effort")
+        raise NotImplementedError
+
+    def joint_loads(self, joints: Sequence[Grip]) -> tuple[np.ndarray, np.ndarray]:
+        """Return what joints bore and did in the last frame, as ``Joint.wrench`` and ``Joint.effort`` tell of each.
+
+        Returns:
+            Force [N] and torque [N m] of each body on the other, (worlds, n, 6), in the world's axes and about the
+            joint, and what motors, springs, friction and stops did, (worlds, n). Zeros before the first frame.
+        """
+        self.require("wrench", "effort")
+        raise NotImplementedError
+
+    def impulses(self, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
+        """Return what contacts gave bodies in the last frame, by the other body's name, (worlds, 3) [N s] each.
+
+        Of a cloth or soft body those with static ones are told where ``World.sum_impulses`` asks for them.
+        """
+        self.require("impulses")
         raise NotImplementedError
 
     def contacts(self, body: Body, itself: bool) -> Iterable[tuple[Any, ...]]:

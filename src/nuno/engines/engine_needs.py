@@ -52,7 +52,8 @@ def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
     needs: list[str] = []
     if isinstance(spec, JointSpec):
         kind = {"hinge": "hinges", "slider": "sliders", "ball": "ball joints", "fixed": "fixed joints"}[spec.kind]
-        return [kind, "joint drives"] if _is_driven(spec) else [kind]
+        drives = "drives of ball joints" if spec.kind == "ball" else "joint drives"
+        return [kind, drives] if _is_driven(spec) else [kind]
     if spec.compliance > 0.0:
         needs.append("compliant grips")
     if isinstance(spec, HoldSpec):

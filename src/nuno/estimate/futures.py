@@ -65,9 +65,7 @@ class Futures:
     @property
     def positions(self) -> wp.array:
         """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
-        if not self.world.engine.is_builtin:
-            return self.world.state(self.body)["positions"]
-        return solver_of(self.body).positions_on_device()
+        return self.world.engine.positions(self.body)
 
     def whole(self, world: int) -> tuple[Futures, int]:
         """The batch whose world is as these futures are, and the place in it of number ``world`` of these."""

@@ -205,7 +205,7 @@ class Joint(Grip):
             changed = replace(self.spec, drives=drives)
             world.engine.allow_grip(changed, self.target is not None and self.target.is_dynamic)
             self.spec = changed
-            world.engine.changed()
+            world.engine.drives_changed(self)
 
     def _poses(self) -> tuple[Any, Any]:
         """The joint's frame in the body and in the other, (worlds, 3) and (worlds, 4) each, in the world's frame."""
@@ -220,16 +220,7 @@ class Joint(Grip):
 
     def _motion(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] of a body's point and its angular velocity [rad/s], (worlds, 3) each."""
-        world = self._live()
-        if not world.engine.is_builtin:
-            return world.engine.velocity_at(body, point)
-        scene = world._rigid
-        slot = None if body is None or scene is None else scene.slot_of(world, body)
-        if slot is None or scene is None:
-            return np.zeros_like(point), np.zeros_like(point)
-        velocity, spin = scene.solver.velocity(slot)
-        middle, _ = scene.solver.pose(slot)
-        return velocity + np.cross(spin, point - middle), spin
+        return self._live().engine.velocity_at(body, point)
 
 
 def check_joined(body: Body, material: Any, world: Simulation) -> None:

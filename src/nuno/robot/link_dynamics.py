@@ -17,8 +17,6 @@ from nuno.materials import Rigid
 from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
 from nuno.robot.pinocchio import pin
 from nuno.shapes import quaternion as quat
-from nuno.world.contact_points import frame_impulses
-from nuno.world.joint_loads import joint_loads
 from nuno.world.make_joints import hinge, slider
 
 if TYPE_CHECKING:
@@ -229,9 +227,10 @@ class LinkDynamics:
             wrenches of `RobotState.joint_wrenches`; and the mean of what motors, friction and stops exert, (worlds, n)
             [N m; N].
         """
-        wrenches, efforts = joint_loads(self.world, self.joints)
+        engine = self.world.engine
+        wrenches, efforts = engine.joint_loads(self.joints)
         found: list[dict[str, dict[str, np.ndarray]]] = [{} for _ in range(self.world.world_count)]
-        for name, own in zip(self.links.names, frame_impulses(self.world, self.bodies), strict=True):
+        for name, own in zip(self.links.names, engine.impulses(self.bodies), strict=True):
             for other, impulse in own.items():
                 for contacts, given in zip(found, impulse, strict=True):
                     if given.any():

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_bending import sheet_plate
 from nuno.materials import Cloth, Rigid
 from nuno.mesh.tetrahedra import volumes
 from nuno.scenes.build_world import is_rigid
@@ -23,7 +24,7 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.color import rgb
 from nuno.shapes.compound import Compound
 from nuno.shapes.coordinates import compose, invert
-from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
+from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sheet, Sphere
 
 KEY = "nuno"
 """Name of the key frame and of the text."""
@@ -151,6 +152,9 @@ class MjcfWriter:
         rest, elements = placed_rest(body, pinned)
         if material is None:
             rest = body.vertices
+        stiffer = 1.0
+        if isinstance(material, Cloth) and isinstance(body.shape, Sheet):
+            elements, stiffer = sheet_plate(body.shape)
         flex = xml.SubElement(
             self.ground, "flexcomp", name=body.name, type="direct", dim=str(elements.shape[1] - 1),
             point=numbers(np.ravel(rest)), element=" ".join(map(str, np.ravel(elements))), rgba=self._rgba(body),
@@ -168,7 +172,7 @@ class MjcfWriter:
             xml.SubElement(flex, "contact", touching)
             return
         if isinstance(material, Cloth):
-            plate = plate_of(material)
+            plate = plate_of(material, stiffer)
             corners = rest[elements]
             area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
             mass, radius = 0.5 * area * mean_of(material.area_density), 0.5 * mean_of(material.thickness)

@@ -29,6 +29,9 @@ from nuno.viewer.film import Film
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
+PICTURE_LIMIT = 100_000
+"""Of a film; more are a slip of the keyboard."""
+
 
 @dataclass(frozen=True, eq=False)
 class EngineComparison:
@@ -146,7 +149,7 @@ def compare_engines(
     Raises:
         FileFormatError: the file cannot be read.
         UnknownNameError: there is no such engine.
-        InvalidInputError: fewer than two engines, a batch, nothing that moves, or no time.
+        InvalidInputError: fewer than two engines, a batch, nothing that moves, no time, or more than 100,000 pictures.
         EngineCapabilityError: fewer than two engines can run it; the reason of the first that cannot.
     """
     if isinstance(engines, str) or not isinstance(engines, Sequence) or len(set(engines)) < 2:
@@ -154,6 +157,8 @@ def compare_engines(
     for engine in engines:
         engine_class(engine)
     span, each = number("seconds", seconds, above=0.0), number("rate", rate, above=0.0)
+    if span * each > PICTURE_LIMIT:
+        raise InvalidInputError(f"{span:g} s at {each:g} pictures a second are too many: at most {PICTURE_LIMIT}")
     saved = scene
     if isinstance(saved, str | os.PathLike):
         from nuno.world.snapshot_file import read_snapshot

@@ -30,20 +30,18 @@ class Advancing(Simulation):
         """
         start = self._time
         finish = start + duration if end is None else end
+        self._engine.allow_contacts()
         for driver in self.drivers:
             driver.begin_frame(start, finish)
         moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
         self._rests = False
-        if self._engine.is_builtin and any(dynamics.is_rigid for dynamics in moving.values()):
-            # what a run goes back to has the static bodies that it met, and lists pairs as it did
-            self._bring_rigid()
+        self._engine.prepare_run()
         before = RunStart(self, moving)
         self._bring_colliders()
         try:
             self._reported = start
-            if not self._engine.is_builtin:
-                self._step_frames(finish, look, instants)
-            while self._engine.is_builtin and not self._go_through(moving, finish, look, instants, again is None):
+            go = self._go_through if self._engine.is_builtin else self._step_frames
+            while not go(moving, finish, look, instants, again is None):
                 before.go_back()
                 if again is not None:
                     self._reported = start
@@ -95,8 +93,15 @@ class Advancing(Simulation):
                 raise SimulationDiverged(body.name, start, tuple(np.flatnonzero(~finite).tolist()))
         return True
 
-    def _step_frames(self, finish: float, look: Callable[[float], None] | None, instants: np.ndarray | None) -> None:
-        """Advance by another engine than Nuno's own, in spans between frame ends, looks and the ends of pushes."""
+    def _step_frames(
+        self, moving: dict[Body, Dynamics], finish: float, look: Callable[[float], None] | None,
+        instants: np.ndarray | None, careful: bool,
+    ) -> bool:  # fmt: skip
+        """Advance by another engine than Nuno's own, in spans between frame ends, looks and the ends of pushes.
+
+        Returns:
+            True: nothing must be repeated, as there are no lists.
+        """
         start, frame = self._time, 1.0 / self.frame_rate
         ends = start + frame * np.arange(1, int((finish - start) / frame + 1e-6) + 1)
         asked = ends if instants is None else np.asarray(instants)
@@ -120,6 +125,7 @@ class Advancing(Simulation):
                 finally:
                     self._telling = False
                 self._reported = stop
+        return True
 
     def _must_repeat(self, moving: dict[Body, Dynamics]) -> bool:
         """Return True if the run is to be gone through again: a list was too short, or a cloth fast unexpectedly."""

@@ -106,8 +106,6 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
 def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
     """Refuse a snapshot of what the world's engine lacks; dynamics are looked at as they are made."""
     engine = world.engine
-    if engine.is_builtin:
-        return
     moving = {record.key for record in snapshot.bodies if record.dynamics is not None}
     for grip in snapshot.grips:
         engine.allow_grip(grip.spec, grip.target in moving)
@@ -190,7 +188,7 @@ def _dynamics_for(
 ) -> Dynamics:
     current: Any = body._dynamics
     if current is not None and same_settings and current.fits(own.material, world.world_count, own.friction):
-        if not current.is_rigid or not world.engine.is_builtin or current.scene is world._rigid:
+        if world.engine.keeps(current):
             return current
     as_recorded = Body(record.shape)
     as_recorded.key = body.key

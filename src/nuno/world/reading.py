@@ -9,7 +9,6 @@ import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import ParticleDynamics
-from nuno.engines.array_dynamics import motions_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.materials import Rigid
 from nuno.validation import flag
@@ -85,10 +84,7 @@ class Reading(Saving):
                     raise BodyStateError(f"{body.name!r} is static; its pose() and path say where it is")
                 if not isinstance(body.material, Rigid):
                     raise InvalidInputError(f"{body.name!r} deforms; state() tells its vertices")
-            if not self._engine.is_builtin:
-                return motions_of(own)
-            assert self._rigid is not None
-            return self._rigid.motions(own)
+            return self._engine.rigid_motions(own)
 
     def state(self, body: Body | str, copy: bool = True) -> dict[str, DeviceArray]:
         """Return "positions" [m] and "velocities" [m/s] of a dynamic body, Warp arrays (worlds, n) of vec3.

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from nuno.bodies.dynamics import Dynamics, ParticleDynamics
-
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.bodies.dynamics import Dynamics
     from nuno.world.simulation import Simulation
 
 
@@ -21,12 +20,7 @@ class RunStart:
 
     def __init__(self, world: Simulation, moving: dict[Body, Dynamics]) -> None:
         self._world, self._moving = world, moving
-        self._particles = [(d, d.keep()) for d in moving.values() if isinstance(d, ParticleDynamics)]
-        self._rigid = None if world._rigid is None else world._rigid.save()
-        self._other = None if world.engine.is_builtin else world.engine.keep()
-        # a rigid body's forces are among what is saved
-        rigid: list[Any] = [d for d in moving.values() if d.is_rigid and self._other is None]
-        self._pushed = [(d, d._pushing) for d in rigid]
+        self._kept = world.engine.keep()
         self._resting = world._resting
         # what a grip leads from is where it led last
         grips: list[Any] = [grip for d in moving.values() for grip in d.grips]
@@ -35,14 +29,7 @@ class RunStart:
     def go_back(self) -> None:
         """Set the state that it was."""
         world: Any = self._world
-        for dynamics, state in self._particles:
-            dynamics.put_back(state)
-        if self._rigid is not None and world._rigid is not None:
-            world._rigid.load(self._rigid)
-        if self._other is not None:
-            world.engine.put_back(self._other)
-        for dynamics, pushing in self._pushed:
-            dynamics._pushing = pushing
+        world.engine.put_back(self._kept)
         world._resting = self._resting
         for grip, spec, followed in self._followed:
             grip.spec, grip.followed = spec, followed

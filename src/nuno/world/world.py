@@ -378,3 +378,4 @@ class World(Setting):
             if flag("on", on):
                 self._engine.require("impulses")
             (self._rules.summed.add if on else self._rules.summed.discard)(own.key)
+            self._engine.changed()

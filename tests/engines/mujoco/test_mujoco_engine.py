@@ -1,5 +1,7 @@
 """MuJoCo as an engine: bodies that come and go, copies, batches, files, and grips, beside closed forms."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -274,13 +276,10 @@ def test_a_run_that_fails_leaves_the_world_as_it_was():
     assert world.time == time
 
 
-def test_a_robot_follows_its_paths_and_has_no_dynamics_there():
-    """Its links carry what lies on them as any moving shape does; dynamics are refused before it enters the world."""
+def test_a_robot_follows_its_paths():
+    """Without dynamics its links are moving shapes as any others."""
     pytest.importorskip("pinocchio")
     world = nuno.World(device="cpu", engine="mujoco")
-    with pytest.raises(nuno.EngineCapabilityError, match="mujoco has no robots with dynamics; engines that have: nuno"):
-        nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
-    assert not world.bodies and not world.drivers
     robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
     ball = world.attach(world.add(nuno.sphere(0.05, position=(2.0, 0.0, 1.0), name="ball")))
     angles = robot.angle_vector()
@@ -347,3 +346,20 @@ def test_substeps_and_gravity_may_change_between_runs():
     world.substeps, world.gravity = 2, (0.0, 0.0, -1.0)
     world.run(0.1)
     assert ball.position[2] == pytest.approx(start - 0.5 * 0.1 * (0.1 + 1.0 / 120.0), abs=1e-9)
+
+
+def test_more_classes_of_bodies_than_there_are_bits_are_refused_before_anything_moves():
+    """A chain of 34 bodies each of which passes through the next: no two touch the same others."""
+    world = nuno.World(device="cpu", engine="mujoco")
+    balls = [world.attach(world.add(nuno.sphere(0.05, position=(0.3 * k, 0.0, 1.0)))) for k in range(34)]
+    for one, other in itertools.pairwise(balls):
+        world.ignore_contact(one, other)
+    with pytest.raises(nuno.InvalidInputError, match="31 classes of bodies"):
+        world.run(0.1)
+    assert world.time == 0.0
+    for k, one in enumerate(balls):
+        np.testing.assert_array_equal(one.position, (0.3 * k, 0.0, 1.0))
+        for other in balls[:k]:
+            world.ignore_contact(one, other)
+    world.run(0.1)
+    assert balls[0].position[2] < 0.96

@@ -69,6 +69,41 @@ def test_the_calibration_of_bending_makes_up_for_what_the_mesh_lacks(aspect, exp
     assert warp == pytest.approx(expected, abs=0.01)
 
 
+def test_hinges_are_those_that_mujoco_compiles():
+    """Of an irregular patch of 18 triangles, each inner edge's matrix, to rounding."""
+    import mujoco
+
+    from nuno.engines.mujoco.mujoco_bending import BEND, _hinges
+    from nuno.engines.mujoco.sheet_triangles import sheet_triangles
+
+    elements, _ = sheet_triangles(3, 3)
+    places = np.stack(
+        [*(part.ravel() for part in np.meshgrid(1.3 * np.arange(4), 0.8 * np.arange(4))), np.zeros(16)], 1
+    )
+    places[:, :2] += np.random.default_rng(0).uniform(-0.1, 0.1, (16, 2))
+    spec = mujoco.MjSpec()
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    for k, place in enumerate(places):
+        body = spec.worldbody.add_body(name=f"v{k}", pos=place, mass=1.0, inertia=[1.0] * 3, explicitinertial=True)
+        for axis in np.eye(3):
+            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    flex = spec.add_flex(name="patch", dim=2, radius=0.001)
+    flex.vertbody, flex.elem = [f"v{k}" for k in range(16)], elements.ravel().tolist()
+    flex.young, flex.poisson, flex.thickness, flex.elastic2d = 12.0, 0.0, 1.0, 1  # 1 N m
+    model = spec.compile()
+    inner = model.flex_edgeflap[:, 1] >= 0
+    compiled = model.flex_bending.reshape(-1, BEND)[inner, :16].reshape(-1, 4, 4)
+
+    def whole(ends, flaps, rows):
+        found = np.zeros((16, 16))
+        for own, row in zip(np.concatenate([ends, flaps], axis=1), rows.reshape(-1, 4, 4), strict=True):
+            found[np.ix_(own, own)] += row
+        return found
+
+    expected = whole(model.flex_edge[inner], model.flex_edgeflap[inner], compiled)
+    np.testing.assert_allclose(whole(*_hinges(places, elements)), expected, atol=1e-12)
+
+
 def test_a_soft_cube_is_pressed_by_its_weight():
     """Its top comes down by rho g h^2 / (2 E), within 10 % on 3 cells, less its sideways hold on the floor."""
     world = flat_world()

@@ -8,12 +8,14 @@ shapes near it that store less: square cells bend as if B were 0.82 of what it i
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.sheet_triangles import sheet_triangles
+
+if TYPE_CHECKING:
+    from nuno.shapes.shape import Sheet
 
 BEND = 17
 """Numbers of an edge in ``flex_bending``: a symmetric matrix (4, 4) of its four vertices, and one for curved rests."""
@@ -48,23 +50,49 @@ def bending_factors(length: float, width: float, ratio: float = 1.0) -> tuple[fl
     return float(factors[0]), float(factors[1])
 
 
+def sheet_plate(shape: Sheet) -> tuple[np.ndarray, float]:
+    """Return triangles (m, 3) for a sheet as an isotropic plate, and by what its bending is to be multiplied.
+
+    It is the mean of both directions' factors: a plate has one rigidity.
+    """
+    length, width = (size / cells for size, cells in zip(shape.size, shape.cells, strict=True))
+    warp, weft = bending_factors(1.0, round(width / length, 6))
+    return sheet_triangles(*shape.cells)[0], float(np.sqrt(warp * weft))
+
+
 def _hinges(places: np.ndarray, elements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return ends (k, 2), opposite vertices (k, 2) and matrices (k, 16) of the inner edges, of a rigidity of 1 N m."""
-    mujoco = mujoco_package()
-    spec = mujoco.MjSpec()
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-    for k, place in enumerate(places):
-        body = spec.worldbody.add_body(name=f"v{k}", pos=place, mass=1.0, inertia=[1.0] * 3, explicitinertial=True)
-        for axis in np.eye(3):
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    flex = spec.add_flex(name="patch", dim=2, radius=0.001)
-    flex.vertbody, flex.elem = [f"v{k}" for k in range(len(places))], elements.ravel().tolist()
-    flex.young, flex.poisson, flex.thickness, flex.elastic2d = 12.0, 0.0, 1.0, 1
-    model: Any = spec.compile()
-    inner = model.flex_edgeflap[:, 1] >= 0
-    return (
-        model.flex_edge[inner], model.flex_edgeflap[inner], model.flex_bending.reshape(-1, BEND)[inner, :16].copy()
-    )  # fmt: skip
+    """Return ends (k, 2), opposite vertices (k, 2) and matrices (k, 16) of the inner edges, of a rigidity of 1 N m.
+
+    They are as MuJoCo compiles them: c c^T over the area of both triangles, with the cotangents c of Bergou et al., "A
+    Quadratic Bending Model for Inextensible Surfaces" (2006).
+    """
+    sides = elements[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    opposite = elements.ravel()
+    _, index, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(index.ravel(), kind="stable")
+    first = (np.cumsum(count) - count)[count == 2]
+    one, two = order[first], order[first + 1]
+    ends, flaps = np.sort(sides[one], axis=1), np.stack([opposite[one], opposite[two]], axis=1)
+    cotangents = np.stack(
+        [_cotangent(places, ends[:, at], ends[:, 1 - at], flaps[:, side]) for at in (0, 1) for side in (0, 1)], axis=1
+    )
+    at_first, at_second = cotangents[:, :2], cotangents[:, 2:]
+    own = np.stack(
+        [at_second.sum(axis=1), at_first.sum(axis=1), *(-cotangents[:, [0, 1]] - cotangents[:, [2, 3]]).T], 1
+    )
+    area = 0.5 * sum(
+        np.linalg.norm(
+            np.cross(places[ends[:, 1]] - places[ends[:, 0]], places[flaps[:, side]] - places[ends[:, 0]]), axis=1
+        )
+        for side in (0, 1)
+    )
+    return ends, flaps, np.einsum("ki,kj->kij", own, own).reshape(-1, 16) / area[:, None]
+
+
+def _cotangent(places: np.ndarray, corner: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the cotangent (k,) of the angle at a corner between two other vertices."""
+    a, b = places[one] - places[corner], places[other] - places[corner]
+    return np.asarray(np.einsum("kx,kx->k", a, b) / np.linalg.norm(np.cross(a, b), axis=1))
 
 
 def _felt(places: np.ndarray, ends: np.ndarray, flaps: np.ndarray, rows: np.ndarray, axis: int) -> float:

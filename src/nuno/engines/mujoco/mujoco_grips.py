@@ -1,8 +1,9 @@
-"""Grips and joints in MuJoCo, as equality constraints whose targets are written before each substep.
+"""Grips, ball and fixed joints in MuJoCo, as equality constraints whose targets are written before each substep.
 
 A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
 weighted sum, by fixed tendons. A rigid body is welded to what leads it: another body, or a heavy one without a shape
-that is sent along the path. Hinges are two connected points of the axis, ball joints one, fixed joints welds.
+that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are joints of
+MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec
@@ -28,8 +30,6 @@ STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """``solimp`` of all equalities."""
 CLOSING = 2.0
 """Time constant of all equalities, in substeps."""
-REACH = 0.1
-"""[m] Half the distance of the two points of an axis by which a hinge is held."""
 LEADER = 1e6
 """[kg] and [kg m2] Of the body that leads a rigid one along a path."""
 
@@ -89,6 +89,8 @@ class Holds:
         self._spec = spec
         for dynamics in attached(self._world):
             for grip in dynamics.grips:
+                if is_of_tree(grip):
+                    continue
                 own = Held(grip)
                 self._held.append(own)
                 if isinstance(grip.spec, GripSpec | TieSpec):
@@ -178,8 +180,7 @@ class Holds:
         if grip.spec.kind == "fixed":
             self._equality(own, "WELD", other, mine, "BODY")
             return
-        for _ in range(2 if grip.spec.kind == "hinge" else 1):
-            self._equality(own, "CONNECT", other, mine, "BODY")
+        self._equality(own, "CONNECT", other, mine, "BODY")
 
     # The model
 
@@ -189,9 +190,9 @@ class Holds:
             return
         worlds = self._world.world_count
         data, active = batch.expand("eq_data"), batch.bind("eq_active")
-        batch.expand("eq_solref")[:] = (CLOSING * step, 1.0)
         for own in self._held:
             own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
+            batch.expand("eq_solref")[:, own.rows] = (CLOSING * step, 1.0)
             spec = own.grip.spec
             if own.leader is not None:
                 body = model.body(own.leader.name).id
@@ -273,6 +274,16 @@ class Holds:
         return next((own.rows for own in self._held if own.grip is grip), None)
 
 
+def push(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:
+    """Send a heavy body on as `send` does, by a force, so that what hangs on it by joints feels how it speeds up."""
+    qvel, applied = batch.bind("qvel"), batch.bind("qfrc_applied")
+    to = address[1]
+    before = qvel[:, to : to + 6].copy()
+    send(batch, address, place, turn, step)
+    applied[:, to : to + 6] = LEADER * (qvel[:, to : to + 6] - before) / step
+    qvel[:, to : to + 6] = before
+
+
 def send(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:
     """Put a heavy body where it is at the start of a substep, with the velocity that brings it to its end.
 
@@ -306,8 +317,4 @@ def _joint(data: np.ndarray, rows: np.ndarray, spec: JointSpec) -> None:
         place = spec.other_place - quat.rotate(turn, spec.place)
         _weld(data, int(rows[0]), place, turn)
         return
-    shifts = (-REACH, REACH) if spec.kind == "hinge" else (0.0,)
-    for row, shift in zip(rows, shifts, strict=True):
-        along = np.broadcast_to((0.0, 0.0, shift), spec.place.shape)
-        data[:, row, 0:3] = spec.other_place + quat.rotate(spec.other_turn, along)
-        data[:, row, 3:6] = spec.place + quat.rotate(spec.turn, along)
+    data[:, rows[0], 0:3], data[:, rows[0], 3:6] = spec.other_place, spec.place

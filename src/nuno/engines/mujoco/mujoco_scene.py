@@ -15,13 +15,17 @@ from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
+from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
+from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.joints.joint import Joint
     from nuno.world.simulation import Simulation
 
 HEAVY = 1e6
@@ -45,6 +49,9 @@ class Placed:
         flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
+        helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
+        carries: Whether bodies hang on it by joints.
+        depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
         qpos, dof: Addresses (n,) of each body's coordinates and velocities; empty of a static one.
     """
@@ -57,6 +64,9 @@ class Placed:
     flexes: list[Any] = field(default_factory=list)
     mesh: FlexMesh | None = None
     friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    helpers: list[Any] = field(default_factory=list)
+    carries: bool = False
+    depth: int = 0
     id: int = -1
     qpos: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     dof: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
@@ -69,7 +79,9 @@ class MujocoScene:
         placed: What each body is, by its key.
         model: The compiled model.
         batch: The batch of as many simulations as there are worlds.
-        holds: The grips and joints as equality constraints.
+        holds: The grips, and what is held as grips are, as equality constraints.
+        joints: The hinges and sliders.
+        sums: What joints bear and contacts give over a frame; None of cloth and soft bodies that were not asked about.
         compilations: How often the model was compiled.
         shortened: Whether a substep was of another length than the model's.
 
@@ -83,8 +95,10 @@ class MujocoScene:
         self._made = 0
         self.placed: dict[str, Placed]
         self.holds: Holds
+        self.joints: Joints
         self.model: Any = None
         self.batch: Any = None
+        self.sums: Sums | None = None
         self.compilations = 0
         self.shortened = False  # whether the substep has been another than the model's
         self._settings: tuple[Any, ...] = ()
@@ -97,46 +111,74 @@ class MujocoScene:
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0
         spec.option.gravity = self._world.gravity
-        self.spec, self.placed, self.holds = spec, {}, Holds(self._world)
+        # bodies that a joint joins touch each other where the world says so, not where MuJoCo would
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+        self.spec, self.placed = spec, {}
+        self.holds, self.joints = Holds(self._world), Joints(self._world)
         self._settings = (self._world.gravity, self._world.world_count)
 
     def bring(self, substep: float) -> None:
         """Edit the spec to what the world is now, and compile it, for substeps so long [s]."""
         world = self._world
-        wanted = {key: (body, *_role_and_signature(world, body)) for key, body in bodies_by_key(world).items()}
+        tree = plan_tree(world)
+        found = [(depth_of(body.key, tree), body.key, body) for body in world.bodies]
+        found.sort(key=lambda each: each[0])  # a body comes after what it hangs on
+        wanted: dict[str, Any] = {}
+        for _, key, body in found:
+            role, signature = _role_and_signature(world, body)
+            if key in tree:
+                target = tree[key].target
+                above = None if target is None else (target.key, wanted[target.key][2])
+                signature = (*signature, tree[key].kind, *frames_of(tree[key]), above)
+            wanted[key] = body, role, signature
         dropped = [key for key, own in self.placed.items() if key not in wanted or own.signature != wanted[key][2]]
         # to delete a flex's bodies one by one takes longer than to begin anew: 9 s of a cloth of 30 x 30 cells
         if self._settings != (world.gravity, world.world_count) or any(self.placed[k].role == "flex" for k in dropped):
             self._begin()
         else:
             self.holds.clear()
-            for key in dropped:
+            self.joints.clear()
+            for key in sorted(dropped, key=lambda key: -self.placed[key].depth):  # a body's children go with it
                 self._delete(key)
-        for key, (body, role, signature) in wanted.items():
+        for depth, key, body in found:
             if key not in self.placed:
-                self.placed[key] = self._place(body, role, signature)
+                _, role, signature = wanted[key]
+                self.placed[key] = self._place(body, role, signature, tree.get(key))
+                self.placed[key].depth = depth
+        carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
+        for key, own in self.placed.items():
+            own.carries, own.helpers = key in carriers, []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
         set_friction(self.spec, world, bodies)
         self.holds.add(self.spec, self.placed)
+        self.joints.add(self.spec, self.placed, tree)
+        for body, own in bodies:
+            if own.role == "rigid":
+                _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
         self.spec.option.timestep, self.shortened = substep, False
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
-        self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1)
+        # the forces of contacts are read from the data after each substep
+        kept = bool(world.engine.rules.summed) or any(own.role == "rigid" for own in self.placed.values())
+        self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1, kept)
         self.compilations += 1
         for own in self.placed.values():
             self._find(own)
+        self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
+        self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
+        self.sums = Sums(self, world.world_count) if kept else None
 
     def _delete(self, key: str) -> None:
         own = self.placed.pop(key)
         for element in [*own.flexes, *own.bodies, *own.assets]:
             self.spec.delete(element)
 
-    def _place(self, body: Body, role: str, signature: tuple[Any, ...]) -> Placed:
+    def _place(self, body: Body, role: str, signature: tuple[Any, ...], joint: Joint | None) -> Placed:
         self._made += 1
         name, dynamics = f"b{self._made}", dynamics_of(body)
         spec = self.spec
@@ -148,14 +190,14 @@ class MujocoScene:
         else:
             from nuno.bodies.rigid_dynamics import parts_of
 
-            made = spec.worldbody.add_body(name=name)
+            other = None if joint is None else joint.target
+            parent = spec.worldbody if other is None else self.placed[other.key].bodies[0]
+            made = parent.add_body(name=name)
             if isinstance(dynamics, ArrayRigid):
-                inertia = dynamics.inertia[0]
-                made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]), dynamics.centre, True
-                made.fullinertia = [
-                    inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
-                ]  # fmt: skip
-                made.add_freejoint(name=name)
+                if joint is None:
+                    made.add_freejoint(name=name)
+                else:
+                    hang(made, name, joint)
                 parts = dynamics.parts
             else:
                 parts = parts_of(body, moves=False)
@@ -187,11 +229,14 @@ class MujocoScene:
         worlds = self._world.world_count
         moving: list[tuple[Any, Placed]] = [(dynamics_of(b), own) for b, own in bodies if dynamics_of(b) is not None]
         for dynamics, own in moving:
-            ids = own.id + np.arange(len(own.bodies))
-            batch.expand("body_mass")[:, ids] = dynamics.mass.reshape(worlds, -1)
-            if own.role == "rigid":
-                share = np.trace(dynamics.inertia, axis1=1, axis2=2)
-                batch.expand("body_inertia")[:, own.id] = model.body_inertia[own.id] * (share / share[0])[:, None]
+            if own.role == "flex":
+                ids = own.id + np.arange(len(own.bodies))
+                batch.expand("body_mass")[:, ids] = dynamics.mass
+                continue
+            share = np.trace(dynamics.inertia, axis1=1, axis2=2)
+            for each in (own.id, *(int(model.body(helper.name).id) for helper in own.helpers)):
+                batch.expand("body_mass")[:, each] = dynamics.mass / (1 + len(own.helpers))
+                batch.expand("body_inertia")[:, each] = model.body_inertia[each] * (share / share[0])[:, None]
         if moving:
             batch.set_const()  # of all worlds, so that one is the same in any batch
         for dynamics, own in moving:
@@ -218,6 +263,16 @@ class MujocoScene:
         for axis in range(3):
             damping[:, own.dof[0] + axis] = drag * dynamics.mass
             damping[:, own.dof[0] + 3 + axis] = drag * spin
+
+
+def _share_mass(dynamics: Any, bodies: list[Any]) -> None:
+    """Give a rigid body and its helpers equal shares of its mass and inertia."""
+    inertia = dynamics.inertia[0] / len(bodies)
+    for made in bodies:
+        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) / len(bodies), dynamics.centre, True
+        made.fullinertia = [
+            inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
+        ]  # fmt: skip
 
 
 def flex_id(model: Any, name: str) -> int:

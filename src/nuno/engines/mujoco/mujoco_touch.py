@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,28 +23,26 @@ BITS = 31
 _warned: set[frozenset[str]] = set()
 
 
-def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
-    """Give all geoms and flexes the masks by which exactly those pairs collide that touch in the world.
-
-    MuJoCo's rule is an or, Nuno's an and: each class of bodies that touch the same others has a bit of its own.
+def touch_classes(world: Simulation, bodies: Sequence[Body]) -> list[list[int]]:
+    """Return the bodies by their places in classes that touch the same others, and one another or not.
 
     Raises:
         InvalidInputError: there are more than 31 such classes.
     """
-    n = len(bodies)
+    n, rules = len(bodies), rules_of(world)
+    moves = [dynamics_of(body) is not None for body in bodies]
     touches = np.zeros((n, n), dtype=bool)
-    for i, (a, _) in enumerate(bodies):
-        for j, (b, _) in enumerate(bodies[:i]):
-            moves = dynamics_of(a) is not None or dynamics_of(b) is not None
-            touches[i, j] = touches[j, i] = moves and rules_of(world).touch(a, b)
+    for i, a in enumerate(bodies):
+        for j, b in enumerate(bodies[:i]):
+            touches[i, j] = touches[j, i] = (moves[i] or moves[j]) and rules.touch(a, b)
     classes: list[list[int]] = []
     for i in range(n):
         for members in classes:
-            first = members[0]
             others = np.ones(n, dtype=bool)
             others[[*members, i]] = False
-            inner = {bool(touches[a, b]) for a in (*members, i) for b in (*members, i) if a != b}
-            if np.array_equal(touches[i, others], touches[first, others]) and len(inner) == 1:
+            # those that are members are alike to one another
+            inner = {*touches[i, members].tolist(), *touches[members[0], members[1:2]].tolist()}
+            if np.array_equal(touches[i, others], touches[members[0], others]) and len(inner) == 1:
                 members.append(i)
                 break
         else:
@@ -53,12 +52,30 @@ def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
             f"mujoco tells {BITS} classes of bodies apart that touch different others, and here are {len(classes)}; "
             "let more bodies touch alike (groups, ignore_contact)"
         )
+    return classes
+
+
+def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
+    """Give all geoms and flexes the masks by which exactly those pairs collide that touch in the world.
+
+    MuJoCo's rule is an or, Nuno's an and: each class of bodies that touch the same others has a bit of its own.
+
+    Raises:
+        InvalidInputError: there are more than 31 such classes.
+    """
+    own = [body for body, _ in bodies]
+    classes = touch_classes(world, own)
+
+    def touch(i: int, j: int) -> bool:
+        moves = dynamics_of(own[i]) is not None or dynamics_of(own[j]) is not None
+        return moves and rules_of(world).touch(own[i], own[j])
+
     for k, members in enumerate(classes):
         mask = 0
         for other, theirs in enumerate(classes):
             one = members[0]
             two = next((m for m in theirs if m != one), None)
-            if two is not None and touches[one, two]:
+            if two is not None and touch(one, two):
                 mask |= 1 << other
         for member in members:
             placed = bodies[member][1]

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-PARTICLE_STIFFNESS, SHAPE_STIFFNESS = 5e3, 2e4
+PARTICLE_STIFFNESS, SHAPE_STIFFNESS = 5e3, 4e5
 """[N/m] of contacts: a particle's with a shape has the mean of both, two particles' the first, two shapes' the second.
-A napkin's vertex of 0.1 g sinks in by 0.1 um, a box of 1 kg on four corners by 0.1 mm."""
+A box of 1 kg on four corners sinks in by 6 um. At 2e4 N/m a box slid 2 % too far down an incline."""
 SHAPE_DAMPING = 100.0
-"""[N s/m] of contacts of shapes, near the critical damping of a box of half a kilogram: what falls does not bounce."""
+"""[N s/m] of contacts of shapes: a box of 1 kg that falls by 0.25 m bounces back by 0.03 m, without by 0.05 m."""
 MAX_POISSON = 0.3
 """The membrane's largest Poisson ratio: Newton's is isotropic, and a softer shear than this leaves is not met."""
 

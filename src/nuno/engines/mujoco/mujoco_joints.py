@@ -1,0 +1,271 @@
+"""Hinges and sliders as joints of MuJoCo: their elements in a spec, and the numbers of their drives in a batch.
+
+A drive is what MuJoCo has: stops are a joint's range, springs its stiffness and damping, friction a dry friction of
+its coordinate. A motor with gains is an actuator with an affine law and a limit. A motor that keeps a velocity exactly
+is a clutch, a dry friction as large as its effort between the joint and a flywheel that turns at that velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_tree import JointStates, axis_of, depth_of, hinges_and_sliders, rest_pose
+from nuno.joints.joint import Joint
+from nuno.joints.joint_drives import DRIVES
+from nuno.shapes import quaternion as quat
+
+if TYPE_CHECKING:
+    from nuno.world.simulation import Simulation
+
+STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""``solimp`` of dry friction, stops and the welds of helpers."""
+CLOSING = 2.0
+"""Their time constant, in substeps."""
+FAR = 1e10
+"""[rad, m] Where the stops are of what has none."""
+STRONGEST = 1e9
+"""[N m, N] Of a motor without a limit."""
+FLYWHEEL = 1e6
+"""[kg]"""
+
+
+@dataclass(eq=False)
+class Jointed:
+    """A hinge or slider as it is in the spec.
+
+    Attributes:
+        joint: The joint.
+        depth: Of its body in the tree; -1 where a helper stands for it.
+        name: Of MuJoCo's joint, site, actuator and sensors.
+        helper: The helper, or None: a copy of the body, which takes a share of its mass.
+        clutch: Whether it has one.
+    """
+
+    joint: Joint
+    depth: int
+    name: str
+    helper: Any = None
+    clutch: bool = False
+
+
+def hang(made: Any, name: str, joint: Joint) -> None:
+    """Let a body of a spec, which is the child of the other one, move by a joint alone."""
+    place, turn = rest_pose(joint.spec)
+    made.pos, made.quat = place[0], turn[0]
+    _add_joint(made, name, joint, joint.spec.place[0], axis_of(joint.spec)[0])
+
+
+def _add_joint(made: Any, name: str, joint: Joint, place: Any, axis: Any) -> None:
+    kinds = mujoco_package().mjtJoint
+    kind = kinds.mjJNT_HINGE if joint.kind == "hinge" else kinds.mjJNT_SLIDE
+    own = made.add_joint(name=name, type=kind, pos=place, axis=axis, limited=1, range=(-FAR, FAR))
+    own.solimp_limit = own.solimp_friction = STIFF
+    made.add_site(name=name, pos=place)
+
+
+class Joints:
+    """All hinges and sliders of a world.
+
+    Args:
+        world: The world.
+
+    Attributes:
+        states: Their coordinates from the bodies' states, and back.
+        qpos, dof, number: Addresses (n,) of their coordinates and velocities in the model, and their numbers there.
+    """
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        self._joined: list[Jointed] = []
+        self._elements: list[Any] = []
+        self._spec: Any = None
+        self._made = 0
+        self.states: Any = None
+        self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
+        self._is_driven = False  # whether the numbers of the drives are those that the batch has
+
+    def __len__(self) -> int:
+        return len(self._joined)
+
+    @property
+    def joints(self) -> list[Joint]:
+        """The joints, in their order here."""
+        return [own.joint for own in self._joined]
+
+    def carriers(self) -> dict[str, np.ndarray]:
+        """Return `JointStates.carriers`, of no joints none."""
+        return {} if self.states is None else self.states.carriers()
+
+    # The spec
+
+    def clear(self) -> None:
+        """Take what belongs to joints, but for those of bodies themselves, out of the spec."""
+        for element in reversed(self._elements):
+            self._spec.delete(element)
+        self._joined, self._elements = [], []
+
+    def add(self, spec: Any, placed: dict[str, Any], tree: dict[str, Joint]) -> None:
+        """Put all into the spec, as the bodies of the tree are in it."""
+        self._spec = spec
+        for joint in hinges_and_sliders(self._world):
+            if tree.get(joint.body.key) is joint:
+                own = Jointed(joint, depth_of(joint.body.key, tree), placed[joint.body.key].bodies[0].name)
+            else:
+                own = self._add_helper(joint, placed)
+            self._joined.append(own)
+            self._add_drive(own)
+
+    def _add_helper(self, joint: Joint, placed: dict[str, Any]) -> Jointed:
+        self._made += 1
+        joined = placed[joint.body.key]
+        parent = self._spec.worldbody if joint.target is None else placed[joint.target.key].bodies[0]
+        helper = parent.add_body(name=f"j{self._made}")
+        joined.helpers.append(helper)
+        hang(helper, helper.name, joint)
+        mujoco = mujoco_package()
+        weld = self._spec.add_equality(
+            name=helper.name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=helper.name,
+            name2=joined.bodies[0].name, solimp=STIFF,
+        )  # fmt: skip
+        self._elements += [helper, weld]
+        return Jointed(joint, -1, helper.name, helper)
+
+    def _add_drive(self, own: Jointed) -> None:
+        mujoco, spec, name = mujoco_package(), self._spec, own.name
+        motor = spec.add_actuator(
+            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE, forcelimited=1, forcerange=(-1.0, 1.0),
+        )  # fmt: skip
+        motor.gainprm[0] = 0.0
+        self._elements.append(motor)
+        for kind in ("FORCE", "TORQUE"):
+            sensor = spec.add_sensor(
+                name=f"{name}.{kind}", type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+                objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name,
+            )  # fmt: skip
+            self._elements.append(sensor)
+        if not needs_clutch(own.joint):
+            return
+        own.clutch = True
+        wheel = spec.worldbody.add_body(
+            name=f"{name}.wheel", mass=FLYWHEEL, inertia=[FLYWHEEL] * 3, explicitinertial=True, gravcomp=1.0
+        )
+        wheel.add_joint(name=wheel.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(1.0, 0.0, 0.0))
+        clutch = spec.add_tendon(name=name, frictionloss=1.0, solimp_friction=STIFF)
+        clutch.wrap_joint(name, 1.0)
+        clutch.wrap_joint(wheel.name, -1.0)
+        self._elements += [wheel, clutch]
+
+    # The model
+
+    def find(self, model: Any, batch: Any, step: float) -> None:
+        """Note where all is in a compiled model, and write what does not change with time."""
+        joined = self._joined
+        self.number = np.array([model.joint(own.name).id for own in joined], dtype=int)
+        self.qpos, self.dof = model.jnt_qposadr[self.number], model.jnt_dofadr[self.number]
+        self._is_driven, self.states = False, None
+        if not joined:
+            return
+        self._motor = np.array([model.actuator(own.name).id for own in joined], dtype=int)
+        self._site = np.array([model.site(own.name).id for own in joined], dtype=int)
+        first = np.array([int(model.sensor(f"{own.name}.FORCE").adr[0]) for own in joined])
+        self._sensor = first[:, None] + np.arange(6)
+        assert all(model.sensor(f"{own.name}.TORQUE").adr[0] == at + 3 for own, at in zip(joined, first, strict=True))
+        clutched = [own for own in joined if own.clutch]
+        self._clutched = np.array([own.clutch for own in joined])
+        self._clutch = np.array([model.tendon(own.name).id for own in clutched], dtype=int)
+        self._wheel = np.array([int(model.joint(f"{own.name}.wheel").dofadr[0]) for own in clutched], dtype=int)
+        closing = (CLOSING * step, 1.0)
+        batch.expand("jnt_solref")[:, self.number] = closing
+        batch.expand("dof_solref")[:, self.dof] = closing
+        if clutched:
+            batch.expand("tendon_solref_fri")[:, self._clutch] = closing
+        for own in joined:
+            self._set_frames(own, model, batch)
+        self.states = JointStates(self._world, self.joints, [own.depth for own in joined])
+
+    def _set_frames(self, own: Jointed, model: Any, batch: Any) -> None:
+        """Write a joint's frames where they differ between worlds."""
+        spec, body, joint = own.joint.spec, model.body(own.name).id, model.joint(own.name).id
+        place, turn = rest_pose(spec)
+        if any(np.ptp(part, axis=0).any() for part in (place, turn, spec.place, spec.turn)):
+            batch.expand("body_pos")[:, body], batch.expand("body_quat")[:, body] = place, turn
+            batch.expand("jnt_pos")[:, joint], batch.expand("jnt_axis")[:, joint] = spec.place, axis_of(spec)
+            batch.expand("site_pos")[:, model.site(own.name).id] = spec.place
+
+    def weld(self, model: Any, batch: Any, step: float) -> None:
+        """Write of each helper that it is where the body is, after MuJoCo's constants are set, which would undo it."""
+        for own in self._joined:
+            if own.helper is None:
+                continue
+            row, place = model.equality(own.name).id, own.joint.spec.place
+            batch.expand("eq_solref")[:, row] = CLOSING * step, 1.0
+            data = batch.expand("eq_data")
+            data[:, row, 0:3], data[:, row, 3:6] = place, place
+            data[:, row, 6:10], data[:, row, 10] = quat.IDENTITY, 1.0
+
+    def drives_changed(self, joint: Joint) -> bool:
+        """Be told that a joint's drives are others now; return whether the spec has what they need."""
+        self._is_driven = False
+        own = next((own for own in self._joined if own.joint is joint), None)
+        return own is not None and (own.clutch or not needs_clutch(joint))
+
+    def write(self, batch: Any, moved: dict[str, tuple[np.ndarray, ...]]) -> None:
+        """Write the joints' coordinates, as the bodies are, and their drives where these have changed."""
+        if not self._joined:
+            return
+        positions, velocities = self.states.coordinates(moved)
+        batch.bind("qpos")[:, self.qpos], batch.bind("qvel")[:, self.dof] = positions, velocities
+        if not self._is_driven:
+            self._write_drives(batch)
+            self._is_driven = True
+        if len(self._wheel):
+            batch.bind("qvel")[:, self._wheel] = self._speeds
+
+    def _write_drives(self, batch: Any) -> None:
+        table = np.stack([own.joint.spec.drives for own in self._joined], axis=1)
+        own = dict(zip(DRIVES, np.moveaxis(table, -1, 0), strict=True))
+        batch.expand("jnt_range")[:, self.number] = np.clip(np.stack([own["lower"], own["upper"]], -1), -FAR, FAR)
+        batch.expand("dof_frictionloss")[:, self.dof] = own["friction"]
+        batch.expand("jnt_stiffness")[:, self.number] = own["spring"]
+        batch.expand("qpos_spring")[:, self.qpos] = own["rest"]
+        batch.expand("dof_damping")[:, self.dof] = own["spring_damping"]
+        keeps = np.isinf(own["damping"])
+        damping = np.where(keeps, 0.0, own["damping"])
+        most = np.minimum(own["max_effort"], STRONGEST)
+        law = batch.expand("actuator_biasprm")
+        law[:, self._motor, 0] = own["stiffness"] * own["position"] + damping * own["velocity"]
+        law[:, self._motor, 1], law[:, self._motor, 2] = -own["stiffness"], -damping
+        batch.expand("actuator_forcerange")[:, self._motor] = np.stack([-most, most], -1)
+        if len(self._wheel):
+            batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps, most, 0.0)[:, self._clutched]
+            self._speeds = own["velocity"][:, self._clutched]
+
+    def read(self, batch: Any, moved: dict[str, tuple[np.ndarray, ...]]) -> None:
+        """Set the states of the bodies that hang in the tree; ``moved`` is as `JointStates.set_bodies` takes it."""
+        if self._joined:
+            self.states.set_bodies(batch.bind("qpos")[:, self.qpos], batch.bind("qvel")[:, self.dof], moved)
+
+    def loads(self, batch: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the last substep's joints bore and did.
+
+        Force [N] and torque [N m] of each body on the other, (worlds, n, 6), along the world's axes and about the
+        joint; and the part of it along the free direction that drives do to the body [N m; N], (worlds, n).
+        """
+        given = batch.bind("sensordata")[:, self._sensor].reshape(self._world.world_count, -1, 2, 3)
+        frames = batch.bind("site_xmat")[:, self._site].reshape(*given.shape[:2], 3, 3)
+        on_body = np.einsum("wnxy,wnky->wnkx", frames, given)
+        axis = batch.bind("xaxis")[:, self.number]
+        which = np.where(self.states.slides, 0, 1)
+        along = np.einsum("wnx,wnx->wn", on_body[:, np.arange(len(which)), which], axis)
+        return -on_body.reshape(*given.shape[:2], 6), along
+
+
+def needs_clutch(joint: Joint) -> bool:
+    """Return True if a joint has a motor that keeps a velocity exactly, in any world."""
+    drives = dict(zip(DRIVES, np.moveaxis(joint.spec.drives, -1, 0), strict=True))
+    return bool((np.isinf(drives["damping"]) & (drives["max_effort"] > 0.0)).any())
