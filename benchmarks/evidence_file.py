@@ -67,7 +67,7 @@ class Evidence:
         chamfer = value["chamfer"].astype(float)
         pattern = value["pattern"].astype(float) if "pattern" in value else None
         return Comparison(
-            value["candidates"].astype(int), value["turns"], chamfer, value["iou"].astype(float), np.zeros_like(chamfer),
+            value["candidates"].astype(int), value["turns"], chamfer, value["iou"].astype(float), np.zeros(chamfer.shape),
             value["finite"], pattern, value["correction"].astype(float) if "correction" in value else None,
             log_priors=value["log_priors"],
         )  # fmt: skip

@@ -27,7 +27,7 @@ def drawn(size, yaw, skew=0.0) -> np.ndarray:
 def found(mask: np.ndarray, told: float) -> FocalRatio:
     """What is found where a focal length is told that is ``told`` times the true one."""
     camera = camera_with(TRUE, np.log(told))
-    ratio = focal_of_rectangle(fit_rectangle(mask, None, camera, HEIGHT), mask, None, camera, HEIGHT)
+    ratio = focal_of_rectangle(fit_rectangle(mask, None, camera, HEIGHT), mask, camera, HEIGHT)
     assert ratio is not None
     return ratio
 
@@ -39,6 +39,14 @@ def test_a_wrong_focal_length_is_measured(told, yaw):
     ratio = found(drawn((0.55, 0.4), yaw), told)
     assert ratio.log == pytest.approx(-np.log(told), abs=0.01)
     assert ratio.std < 0.01
+
+
+def test_a_wrong_focal_length_is_told_by_name():
+    """A tenth is, in its direction; what is right, or wrong by 2 %, is not."""
+    mask = drawn((0.55, 0.4), 0.2)
+    assert "11 % longer" in found(mask, 0.9).warning and "9 % shorter" in found(mask, 1.1).warning
+    assert found(mask, 1.0).warning is None and found(mask, 1.02).warning is None
+    assert FocalRatio(0.08, 0.03).warning is None
 
 
 def test_a_noisy_outline_tells_less():
@@ -54,7 +62,7 @@ def test_a_noisy_outline_tells_less():
 def test_a_table_of_another_height_leaves_a_rectangle():
     """Rays from one point cut parallel planes in figures of one shape."""
     mask = drawn((0.55, 0.4), 0.2)
-    ratio = focal_of_rectangle(fit_rectangle(mask, None, TRUE, HEIGHT - 0.04), mask, None, TRUE, HEIGHT - 0.04)
+    ratio = focal_of_rectangle(fit_rectangle(mask, None, TRUE, HEIGHT - 0.04), mask, TRUE, HEIGHT - 0.04)
     assert ratio is not None and abs(ratio.log) < 0.01
 
 
@@ -67,4 +75,4 @@ def test_no_edge_tells_nothing():
     """Of a mask that is elsewhere than the rectangle."""
     mask = drawn((0.55, 0.4), 0.2)
     rectangle = fit_rectangle(mask, None, TRUE, HEIGHT)
-    assert focal_of_rectangle(rectangle, np.roll(mask, 200, axis=1), None, TRUE, HEIGHT) is None
+    assert focal_of_rectangle(rectangle, np.roll(mask, 200, axis=1), TRUE, HEIGHT) is None

@@ -28,6 +28,14 @@ RANGE = 0.3
 """The logarithm of the ratio is not followed farther than this: then it is no focal length that is wrong."""
 
 
+FOCAL = "the cloth's outline is a rectangle only with a focal length "
+"""How a warning begins that tells of another focal length."""
+TOLD = 0.04
+"""The logarithm of a ratio from which on it is told."""
+OTHER_CAUSES = 0.012
+"""Standard deviation of the logarithm by what else there is: a cloth's own shape, a camera's tilt."""
+
+
 @dataclass(frozen=True)
 class FocalRatio:
     """A focal length beside the one that was told.
@@ -40,16 +48,27 @@ class FocalRatio:
     log: float
     std: float
 
+    @property
+    def warning(self) -> str | None:
+        """Words of warning, where it is another for all that is known."""
+        if abs(self.log) < max(TOLD, 3.0 * float(np.hypot(self.std, OTHER_CAUSES))):
+            return None
+        share = 100.0 * abs(float(np.expm1(self.log)))
+        return (
+            f"{FOCAL}{share:.0f} % {'longer' if self.log > 0.0 else 'shorter'} than is told: are the camera's focal "
+            "length and tilt right, and are the cloth's corners square?"
+        )
 
-def focal_of_rectangle(
-    rectangle: ClothRectangle, mask: np.ndarray, image: np.ndarray | None, camera: Camera, height: float
-) -> FocalRatio | None:
+
+def focal_of_rectangle(rectangle: ClothRectangle, mask: np.ndarray, camera: Camera, height: float) -> FocalRatio | None:
     """Return the ratio of the focal length with which a cloth's outline is most like a rectangle to the one told.
+
+    The mask's edge is asked, not the image's: that is looked for within 2 px of the rectangle's sides, which a wrong
+    focal length puts farther off.
 
     Args:
         rectangle: As it was fitted with the focal length that is told.
         mask: (h, w) bool, the cloth.
-        image: (h, w, 3) uint8 RGB, or None where only the mask is known.
         camera: The camera.
         height: z of the cloth's middle surface [m].
 
@@ -60,9 +79,8 @@ def focal_of_rectangle(
     if _turn(corners) < 0.0:
         corners = corners[[0, 3, 2, 1]]
     soft_mask = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
-    soft_image = None if image is None else cv2.GaussianBlur(image.astype(np.float32), (0, 0), 0.6)
     try:
-        edges = measured_edges(corners, soft_mask, soft_image, camera, height)
+        edges = measured_edges(corners, soft_mask, None, camera, height)
     except EstimationError:
         return None
     return _fitted(edges, corners, camera, height)
