@@ -65,11 +65,10 @@ class Evidence:
         """A comparison as it was dumped."""
         value = {key[len(name) + 1 :]: array for key, array in self.arrays.items() if key.startswith(name + ".")}
         chamfer = value["chamfer"].astype(float)
-        pattern = value["pattern"].astype(float) if "pattern" in value else None
+        pattern, added = (value[n].astype(float) if n in value else None for n in ("pattern", "correction"))
         return Comparison(
-            value["candidates"].astype(int), value["turns"], chamfer, value["iou"].astype(float), np.zeros(chamfer.shape),
-            value["finite"], pattern, value["correction"].astype(float) if "correction" in value else None,
-            log_priors=value["log_priors"],
+            value["candidates"].astype(int), value["turns"], chamfer, value["iou"].astype(float),
+            np.zeros(chamfer.shape), value["finite"], pattern, added, log_priors=value["log_priors"],
         )  # fmt: skip
 
     @cached_property
