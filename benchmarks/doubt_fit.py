@@ -17,18 +17,24 @@ import numpy as np
 from evidence_file import COUNT, Evidence, read_evidence
 from scipy.optimize import minimize
 
-from nuno.camera.focal_of_rectangle import FOCAL, focal_of_rectangle
-from nuno.camera.rectangle import ROUGH, SQUARE, ClothRectangle
+from nuno.camera.focal_of_rectangle import FOCAL
+from nuno.camera.rectangle import ROUGH, SQUARE
 from nuno.estimate import doubt
 from nuno.estimate.doubt import ELSEWHERE, POOR, doubted, misfit, oddities
-from nuno.estimate.hypotheses import DISCRETISATIONS
+from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import SURE, rank
+from nuno.estimate.seeing import AWAY, COVERED
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97, 1.0001)
-NAMES = ("temperature", "well", "badly", "bad share", "breadth", "elsewhere", "focal", "warned")
-BEGUN = np.array([1.0, doubt.WELL, doubt.BADLY, 0.6, doubt.BREADTH, 0.25, 0.25, 0.25])
+NAMES = ("temperature", "well", "badly", "bad share", "breadth", "hand", "focal", "warned")
+BEGUN = np.array(
+    [
+        1.0, doubt.WELL, doubt.BADLY, doubt.BAD_SHARE, doubt.BREADTH, doubt.SHARES[ELSEWHERE], doubt.SHARES[FOCAL],
+        doubt.WARNED_SHARE,
+    ]
+)  # fmt: skip
 LOW = np.array([0.7, 5.0, 11.0, 0.0, 1.5, 0.0, 0.0, 0.0])
-HIGH = np.array([4.0, 12.0, 25.0, 0.95, 12.0, 0.9, 0.9, 0.9])
+HIGH = np.array([4.0, 16.0, 25.0, 0.95, 12.0, 0.9, 0.9, 0.9])
 
 
 @dataclass
@@ -71,9 +77,8 @@ def ended(case: Evidence) -> Ended:
             error = comparison.error("evidence")[..., at[0]]
             found.append((float(error.min()), n, int(np.unravel_index(error.argmin(), error.shape)[1])))
     _, stage, guess = min(found)
-    odd = oddities(seen, best, "evidence", DISCRETISATIONS[stage].hypotheses[guess])
-    told = [w for w in (*case.row["rectangle_warnings"], *case.row["seen_warnings"]) if not w.startswith(FOCAL)]
-    warnings = (*told, *lens_warning(case), *odd)
+    odd = oddities(seen, best, "evidence", Hypothesis(1e-4, mistake=case.row["mistakes"][stage][guess]))
+    warnings = (*case.row["rectangle_warnings"], *case.row["seen_warnings"], *odd)
     with_doubt = doubted(seen, "evidence", COUNT, case.prior, warnings)
     assert with_doubt.likely is not None
     without = rank(seen, "evidence", COUNT, case.prior, without_best=True)
@@ -82,20 +87,10 @@ def ended(case: Evidence) -> Ended:
     )  # fmt: skip
 
 
-def lens_warning(case: Evidence) -> list[str]:
-    """The warning of another focal length, from the mask before."""
-    corners = np.asarray(case.row["rectangle"])
-    rectangle = ClothRectangle(corners, 0.0, 0.0, corners.mean(axis=0), 0.0, 0.0)
-    if any("table's border" in w for w in case.row["rectangle_warnings"]):
-        return []
-    ratio = focal_of_rectangle(rectangle, case.mask("before"), case.camera, float(corners[0, 2]))
-    return [] if ratio is None or ratio.warning is None else [ratio.warning]
-
-
 def kinds_of(warnings: Sequence[str]) -> np.ndarray:
-    """(3,) float, how many warnings there are of each kind that counts: `ELSEWHERE`, `FOCAL`, others."""
+    """(3,) float, how many warnings there are of each kind that counts: of the hand, of the focal length, others."""
     counted = [w for w in warnings if not w.startswith((SQUARE, ROUGH, POOR))]
-    named = [sum(w.startswith(begin) for w in counted) for begin in (ELSEWHERE, FOCAL)]
+    named = [sum(w.startswith(begin) for w in counted) for begin in ((ELSEWHERE, AWAY, COVERED), FOCAL)]
     return np.array([*named, len(counted) - sum(named)], dtype=float)
 
 

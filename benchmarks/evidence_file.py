@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from nuno.camera.camera import Camera
-from nuno.camera.rectangle import SQUARE
 from nuno.estimate.hand_error import GROSS_SHARE
-from nuno.estimate.hypotheses import DISCRETISATIONS
 from nuno.estimate.lift_prior import SIDEWAYS, log_prior_of_lift
 from nuno.estimate.ranking import Comparison
 
@@ -52,13 +50,15 @@ class Evidence:
     def comparisons(self) -> list[Comparison]:
         """Of all stages, mistakes of the hand weighed as an estimate weighs them."""
         found = []
-        for k, stage in enumerate(DISCRETISATIONS):
-            if f"stage{k}.chamfer" not in self.arrays:
-                break
+        for k, mistakes in enumerate(self.row["mistakes"]):
             comparison = self.comparison(f"stage{k}")
-            mistakes = np.array([h.mistake != 0.0 for h in stage.hypotheses])
             added = 0.0 if comparison.correction is None else comparison.correction
-            found.append(replace(comparison, correction=added + np.log(np.where(mistakes, GROSS_SHARE, 1.0))[:, None]))
+            found.append(
+                replace(
+                    comparison,
+                    correction=added + np.log(np.where(np.array(mistakes) != 0.0, GROSS_SHARE, 1.0))[:, None],
+                )
+            )
         return found
 
     def comparison(self, name: str) -> Comparison:
@@ -88,12 +88,6 @@ class Evidence:
         camera = self.camera
         flat = np.unpackbits(self.arrays[f"mask_{name}"])[: camera.width * camera.height]
         return flat.reshape(camera.height, camera.width).astype(bool)
-
-    @property
-    def told(self) -> list[str]:
-        """Warnings of how the images were seen."""
-        square = [w for w in self.row["rectangle_warnings"] if not w.startswith(SQUARE)]
-        return [*square, *self.row["seen_warnings"]]
 
 
 def read_evidence(folder: Path) -> tuple[list[Evidence], list[dict[str, Any]]]:

@@ -5,7 +5,7 @@ and far hands through noisy masks (``generated_cases.py``), half what leaves the
 (``varied_cases.py``). Every case is a line of evidence.jsonl (what is told, the truth, the answer, warnings, seconds)
 and a few arrays of evidence-*.npz (every future's scores at every pose, both masks). ``doubt_fit.py`` reads them.
 
-    python benchmarks/pick_evidence.py out --workers 8 cuda:0 --workers 8 cpu --limit 420
+    python benchmarks/pick_evidence.py out --workers 6 cuda:0 --workers 10 cpu --limit 480 [--stop]
 """
 
 from __future__ import annotations
@@ -76,13 +76,15 @@ def rounds(number: int, seed: int, device: str) -> Iterator[tuple[str, str, dict
         yield name, truth["kind"], arguments, truth["true_ij"], truth
 
 
-def judged(kept: Kept, kind: str, arguments: dict[str, Any], device: str, ask: bool) -> tuple[dict[str, Any], Any]:
+def judged(
+    kept: Kept, arguments: dict[str, Any], device: str, sure: float, ask: bool
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """An estimate's line and arrays."""
     from nuno import estimate_pick
 
     kept.trials = None
     started = time.perf_counter()
-    result = estimate_pick(device=device, progress=False, sure=1.0, **arguments)
+    result = estimate_pick(device=device, progress=False, sure=sure, **arguments)
     seconds = time.perf_counter() - started
     trials = kept.trials
     line = {
@@ -94,6 +96,7 @@ def judged(kept: Kept, kind: str, arguments: dict[str, Any], device: str, ask: b
         "camera": result.camera.to_dict() if hasattr(result.camera, "to_dict") else described(result.camera),
         "table_height": arguments["table_height"], "seconds": seconds, "stages": result.seconds,
         "scores": result.scores.tolist(),
+        "mistakes": [[h.mistake for h in batch.discretisation.hypotheses] for batch in trials.batches],
     }  # fmt: skip
     arrays = {f"stage{k}": packed(c) for k, c in enumerate(trials.comparisons)}
     for name, mask in (("before", result.mask_before), ("after", result.mask_after)):
@@ -173,7 +176,14 @@ def pin(number: int) -> None:
 
 
 def work(
-    number: int, device: str, jobs: Any, ready: Any, folder: Path, seed: int, deadline: float, ask: bool, first: bool
+    number: int,
+    device: str,
+    jobs: Any,
+    ready: Any,
+    folder: Path,
+    options: argparse.Namespace,
+    started: float,
+    first: bool,
 ) -> None:
     """Judge rounds until there are no more or the time is up; the first process of a device compiles on all cores."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -183,20 +193,22 @@ def work(
     import warp as wp
 
     from nuno import NunoError
+    from nuno.estimate.ranking import SURE
 
     wp.config.log_level = wp.LOG_ERROR
     logging.disable(logging.WARNING)
     cv2.setNumThreads(1)
-    kept = Kept()
+    kept, deadline = Kept(), started + options.limit
+    sure = SURE if options.stop else 1.0
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:
                 job = jobs.get(timeout=1.0)
-                for name, kind, arguments, true, truth in rounds(job, seed, device):
+                for name, kind, arguments, true, truth in rounds(job, options.seed, device):
                     row = {"case": name, "round": job, "kind": kind, "device": device, "true": true}
-                    row["material"] = truth["material"]
+                    row |= {"material": truth["material"], "at": time.time() - started}
                     try:
-                        line, kept_arrays = judged(kept, kind, arguments, device, ask and kind in ASKED)
+                        line, kept_arrays = judged(kept, arguments, device, sure, options.what_ifs and kind in ASKED)
                         row |= line
                         write_arrays(folder / f"{name}.zip", name, kept_arrays)
                     except NunoError as error:  # no answer is a wrong answer
@@ -251,42 +263,44 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first round")
     parser.add_argument("--seed", type=int, default=50_000)
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
-    parser.add_argument("--no-what-ifs", action="store_true", help="ask not whether camera and table are as told")
+    parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
+    parser.add_argument("--stop", action="store_true", help="end the stages as users' estimates do, for true seconds")
     options = parser.parse_args()
     started = time.time()
     parts = Path(tempfile.mkdtemp())
     options.folder.mkdir(parents=True, exist_ok=True)
     context = multiprocessing.get_context("spawn")
-    jobs, processes, number = context.Queue(), [], 0
+    jobs, processes = context.Queue(), []
+    wanted = options.workers or [("1", "cpu")]
+    events = {device: context.Event() for _, device in wanted}  # kept to the end, for children open them late
     for k in range(options.first, options.first + options.rounds):
         jobs.put(k)
     time.sleep(0.5)  # until the queue is no longer empty to others
-    first: list[Any] = []
-    for wave in (0, 1):  # one of each device first: it compiles what the others take from the cache
-        for count, device in options.workers or [("1", "cpu")]:
-            ready = context.Event()
-            for _ in range(1 if wave == 0 else int(count) - 1):
-                arguments = (
-                    number, device, jobs, ready, parts, options.seed, started + options.limit, not options.no_what_ifs,
-                    wave == 0,
-                )  # fmt: skip
-                process = context.Process(target=work, args=arguments, daemon=True)
-                process.start()
-                processes.append(process)
-                number += 1
-            if wave == 0:
-                first.append(ready)
-        if wave == 0:
-            for ready in first:
-                ready.wait(max(1.0, started + 0.6 * options.limit - time.time()))
-            print(f"first cases after {time.time() - started:.0f} s", flush=True)
+
+    def begin(device: str, ready: Any, first: bool) -> None:
+        arguments = (len(processes), device, jobs, ready, parts, options, started, first)
+        processes.append(context.Process(target=work, args=arguments, daemon=True))
+        processes[-1].start()
+
+    waiting = {}
+    for count, device in wanted:  # one of each first: the others take from the cache what it compiles
+        waiting[device] = (events[device], int(count) - 1)
+        begin(device, waiting[device][0], True)
+    while waiting and time.time() < started + 0.8 * options.limit:
+        for device, (ready, count) in list(waiting.items()):
+            if ready.wait(0.2):
+                print(f"first case on {device} after {time.time() - started:.0f} s", flush=True)
+                for _ in range(count):
+                    begin(device, ready, False)
+                del waiting[device]
     for process in processes:
         process.join(max(1.0, started + options.limit + 45.0 - time.time()))
         if process.is_alive():
             process.terminate()
+    jobs.close()
     jobs.cancel_join_thread()
     count = gather(parts, options.folder)
-    print(f"{count} cases in {time.time() - started:.0f} s with {number} processes", flush=True)
+    print(f"{count} cases in {time.time() - started:.0f} s with {len(processes)} processes", flush=True)
 
 
 if __name__ == "__main__":

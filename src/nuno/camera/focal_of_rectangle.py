@@ -55,8 +55,8 @@ class FocalRatio:
             return None
         share = 100.0 * abs(float(np.expm1(self.log)))
         return (
-            f"{FOCAL}{share:.0f} % {'longer' if self.log > 0.0 else 'shorter'} than is told: are the camera's focal "
-            "length and tilt right, and are the cloth's corners square?"
+            f"{FOCAL}{share:.0f} % {'longer' if self.log > 0.0 else 'shorter'} than is told, which is taken: are the "
+            "camera's focal length and tilt right, and are the cloth's corners square?"
         )
 
 

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.flat import first_look
-from nuno.camera.focal_of_rectangle import focal_of_rectangle
 from nuno.camera.image import check_image, check_mask, read_image
-from nuno.camera.rectangle import ClothRectangle, fit_rectangle, main_part
+from nuno.camera.rectangle import ClothRectangle, fit_rectangle
 from nuno.camera.regions import grow
 from nuno.camera.segmentation import segment_before
 from nuno.camera.table import Table
@@ -108,8 +107,7 @@ def find_cloth_before(
             taken, *others = rectangle.warnings
             taken = f"{taken}; if it is one, {why_no_rectangle(images.mask_before)}"
             rectangle = replace(rectangle, warnings=(taken, *others))
-        lens = None if over else focal_warning(rectangle, images.mask_before, camera, height)
-        odd = tuple(warning for warning in (over, lens, other) if warning is not None)
+        odd = tuple(warning for warning in (over, other) if warning is not None)
         rectangle = replace(rectangle, warnings=(*rectangle.warnings, *odd))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
@@ -131,21 +129,6 @@ def border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None
         f"{100.0 * share:.0f} % of the cloth's outline lies on the table's border: what hangs over it is not seen, so "
         "the cloth may be larger and its points elsewhere; rectangle= takes its true corners"
     )
-
-
-def focal_warning(rectangle: ClothRectangle, mask: np.ndarray, camera: Camera, height: float) -> str | None:
-    """Return a warning where another focal length makes the outline of a mask (h, w) far more like a rectangle.
-
-    Args:
-        rectangle: The cloth; None is returned where it was taken by its outline.
-        mask: Its mask.
-        camera: The camera.
-        height: z of the cloth's middle surface [m].
-    """
-    if isinstance(rectangle, ClothOutline):
-        return None
-    ratio = focal_of_rectangle(rectangle, main_part(mask, []), camera, height)
-    return None if ratio is None else ratio.warning
 
 
 def why_no_rectangle(mask: np.ndarray) -> str:
