@@ -26,7 +26,9 @@ FAR_FROM_HAND = 10.0
 MUCH_DOUBT = 0.1
 """Share of the cloth's area that may be in doubt before a warning says so: 5 % of masks that were good have more."""
 COVERED_SHARE = 0.6
-"""Of the hand's disc that shows cloth, where it is not the hand; where the hand is, 0.15 at most did."""
+"""Of the middle of the hand's disc that shows cloth, where it is not the hand; where the hand is, 0.15 at most did."""
+MIDDLE = 0.3
+"""Of the disc's radius are left out of that at its rim, where cloth is seen about the hand."""
 AWAY = "the cloth found in the image after begins "
 """How a warning begins that there is no cloth at the hand."""
 COVERED = "the image after shows cloth where the hand is told to be"
@@ -124,9 +126,12 @@ def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
 
 
 def _uncovered(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
-    """A warning where the mask (h, w) that was found in the image goes on over the hand's pixels (h, w)."""
-    share = float((mask & ignored).sum() / max(ignored.sum(), 1))
-    if share < COVERED_SHARE:
+    """A warning where the mask (h, w) that was found in the image goes on over the middle of the hand's pixels (h, w)."""
+    import cv2
+
+    depth = cv2.distanceTransform(ignored.astype(np.uint8), cv2.DIST_L2, 5)
+    middle = depth > MIDDLE * depth.max()
+    if float((mask & middle).sum()) < COVERED_SHARE * max(int(middle.sum()), 1):
         return ()
     return (f"{COVERED}: is it behind the cloth, or are hand and camera told wrongly?",)
 
