@@ -126,7 +126,7 @@ def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
 
 
 def _uncovered(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
-    """A warning where the mask (h, w) that was found in the image goes on over the middle of the hand's pixels (h, w)."""
+    """A warning where the mask (h, w) that was found goes on over the middle of the hand's pixels (h, w)."""
     import cv2
 
     depth = cv2.distanceTransform(ignored.astype(np.uint8), cv2.DIST_L2, 5)
