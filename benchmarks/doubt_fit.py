@@ -18,7 +18,7 @@ from evidence_file import COUNT, Evidence, read_evidence
 from scipy.optimize import minimize
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import ROUGH, SQUARE
+from nuno.camera.rectangle import UNEVEN, SQUARE
 from nuno.estimate import doubt
 from nuno.estimate.doubt import ELSEWHERE, POOR, doubted, misfit, oddities
 from nuno.estimate.hypotheses import Hypothesis
@@ -89,7 +89,7 @@ def ended(case: Evidence) -> Ended:
 
 def kinds_of(warnings: Sequence[str]) -> np.ndarray:
     """(3,) float, how many warnings there are of each kind that counts: of the hand, of the focal length, others."""
-    counted = [w for w in warnings if not w.startswith((SQUARE, ROUGH, POOR))]
+    counted = [w for w in warnings if not w.startswith((SQUARE, UNEVEN, POOR))]
     named = [sum(w.startswith(begin) for w in counted) for begin in ((ELSEWHERE, AWAY, COVERED), FOCAL)]
     return np.array([*named, len(counted) - sum(named)], dtype=float)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import ROUGH, SQUARE
+from nuno.camera.rectangle import UNEVEN, SQUARE
 from nuno.estimate.doubt import (
     BAD_SHARE,
     BADLY,
@@ -92,7 +92,7 @@ def test_warnings_lower_the_confidence():
     [
         (0.0, (), 0.0), (WELL, (), 0.0), (0.5 * (WELL + BADLY), (), 0.5 * BAD_SHARE), (99.0, (), BAD_SHARE),
         (0.0, ("odd",), WARNED_SHARE), (99.0, ("odd", "odder"), 1.0 - (1.0 - BAD_SHARE) * (1.0 - WARNED_SHARE) ** 2),
-        (0.0, (f"{SQUARE}0.4 m", f"{ROUGH}: 1.6 px"), 0.0), (99.0, (POOR,), BAD_SHARE),
+        (0.0, (f"{SQUARE}0.4 m", f"{UNEVEN}: 1.6 px"), 0.0), (99.0, (POOR,), BAD_SHARE),
         (0.0, (f"{FOCAL}9 %",), SHARES[FOCAL]),
         (0.0, (f"{ELSEWHERE}5 cm", "odd"), 1.0 - (1.0 - SHARES[ELSEWHERE]) * (1.0 - WARNED_SHARE)),
     ],

@@ -1,4 +1,4 @@
-"""Which focal length makes the outline of a flat rectangular cloth a rectangle.
+"""The focal length that makes the outline of a flat rectangular cloth a rectangle.
 
 With a wrong focal length, what is a rectangle on the table is none any more once its outline is taken back to the
 table: the near and the far side no longer have one length. So a sixth number is fitted to the edge beside the
@@ -20,7 +20,7 @@ from nuno.errors import EstimationError
 
 APART = 8.0
 """Points of an edge, 2 px apart, that err alike: the noise of segmented masks is smooth over some 16 px."""
-LEAST_NOISE = 0.1
+MINIMUM_NOISE = 0.1
 """[px] Edges are known no better than this."""
 STEP = 1e-4
 """Of the logarithm of the focal length, for differences."""
@@ -30,7 +30,7 @@ RANGE = 0.3
 
 FOCAL = "the cloth's outline is a rectangle only with a focal length "
 """How a warning begins that tells of another focal length."""
-TOLD = 0.04
+REPORTED = 0.04
 """The logarithm of a ratio from which on it is told."""
 CLEARLY = 4.0
 """Standard deviations from which on it is; at three, two of 52 rough masks with the right focal length told another."""
@@ -53,7 +53,7 @@ class FocalRatio:
     @property
     def warning(self) -> str | None:
         """Words of warning, where it is another for all that is known."""
-        if abs(self.log) < max(TOLD, CLEARLY * float(np.hypot(self.std, OTHER_CAUSES))):
+        if abs(self.log) < max(REPORTED, CLEARLY * float(np.hypot(self.std, OTHER_CAUSES))):
             return None
         share = 100.0 * abs(float(np.expm1(self.log)))
         return (
@@ -119,7 +119,7 @@ def _fitted(edges: EdgePoints, corners: np.ndarray, camera: Camera, height: floa
         jacobian = per_metre[:, None] * np.column_stack(
             [(at * turned).sum(axis=1), -each, ((after - at) * normal).sum(axis=1) / STEP]
         )
-        noise = max(1.4826 * float(np.median(np.abs(error))), LEAST_NOISE)
+        noise = max(1.4826 * float(np.median(np.abs(error))), MINIMUM_NOISE)
         robust = 1.0 / (1.0 + (error / (2.0 * noise)) ** 2)
         information = jacobian.T @ (jacobian * robust[:, None])
         try:

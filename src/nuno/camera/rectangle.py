@@ -15,7 +15,7 @@ from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 
 SQUARE = "the sides, "
 """How a warning begins that tells of a square cloth: it names the corners, and makes no number less sure."""
-ROUGH = "the cloth's sides are not straight"
+UNEVEN = "the cloth's sides are not straight"
 """The same of one whose outline is rough or wavy."""
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
@@ -125,7 +125,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
         for _ in range(2):
             pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
     if residual > 1.5:
-        warnings.append(f"{ROUGH}: {residual:.1f} px off the rectangle on average")
+        warnings.append(f"{UNEVEN}: {residual:.1f} px off the rectangle on average")
     return _labelled(pose, camera, plane_height, residual, warnings)
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import ROUGH, SQUARE
+from nuno.camera.rectangle import UNEVEN, SQUARE
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
 from nuno.estimate.seeing import AWAY, COVERED
@@ -30,7 +30,7 @@ POOR = "even the best imagined pick looks little like the image after"
 """How the warning of a bad fit begins."""
 ELSEWHERE = "the image after looks as if the hand were "
 """How a warning begins that the hand is told to be where it is not."""
-SHARES = {SQUARE: 0.0, ROUGH: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
+SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
 """Of the broad probabilities, by how a warning begins, of what those before it left. A square or rough outline told
 nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
 WARNED_SHARE = 0.1
