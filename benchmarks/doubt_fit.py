@@ -18,7 +18,7 @@ from evidence_file import COUNT, Evidence, read_evidence
 from scipy.optimize import minimize
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import UNEVEN, SQUARE
+from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate import doubt
 from nuno.estimate.doubt import ELSEWHERE, POOR, doubted, misfit, oddities
 from nuno.estimate.hypotheses import Hypothesis

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import UNEVEN, SQUARE
+from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate.doubt import (
     BAD_SHARE,
     BADLY,

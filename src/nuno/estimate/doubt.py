@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from nuno.camera.focal_of_rectangle import FOCAL
-from nuno.camera.rectangle import UNEVEN, SQUARE
+from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
 from nuno.estimate.seeing import AWAY, COVERED
