@@ -76,3 +76,12 @@ def test_no_edge_tells_nothing():
     mask = drawn((0.55, 0.4), 0.2)
     rectangle = fit_rectangle(mask, None, TRUE, HEIGHT)
     assert focal_of_rectangle(rectangle, np.roll(mask, 200, axis=1), TRUE, HEIGHT) is None
+
+
+def test_a_camera_straight_above_tells_nothing_false():
+    """Whatever its focal length, a rectangle stays one: no ratio, or one that is not clearly another."""
+    above = look_at(np.array([0.05, 0.01, 1.6]), np.array([0.05, 0.0100001, 0.7]), 500.0)
+    xy = plane_coordinates(above, HEIGHT) - (0.05, 0.01)
+    mask = (np.abs(xy) <= (0.27, 0.2)).all(axis=-1)
+    ratio = focal_of_rectangle(fit_rectangle(mask, None, above, HEIGHT), mask, above, HEIGHT)
+    assert ratio is None or ratio.warning is None
