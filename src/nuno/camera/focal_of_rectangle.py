@@ -30,8 +30,6 @@ RANGE = 0.3
 
 FOCAL = "the cloth's outline is a rectangle only with a focal length "
 """How a warning begins that tells of another focal length."""
-REPORTED = 0.04
-"""The logarithm of a ratio from which on it is told."""
 CLEARLY = 4.0
 """Standard deviations from which on it is; at three, two of 52 rough masks with the right focal length told another."""
 OTHER_CAUSES = 0.012
@@ -53,7 +51,7 @@ class FocalRatio:
     @property
     def warning(self) -> str | None:
         """Words of warning, where it is another for all that is known."""
-        if abs(self.log) < max(REPORTED, CLEARLY * float(np.hypot(self.std, OTHER_CAUSES))):
+        if abs(self.log) < CLEARLY * float(np.hypot(self.std, OTHER_CAUSES)):
             return None
         share = 100.0 * abs(float(np.expm1(self.log)))
         return (
