@@ -28,7 +28,7 @@ from nuno.camera.table import Table
 
 ONE_SCENE = (
     "ordinary", "sideways", "up_first", "over_edge", "stiff", "limp", "hand_off", "focal_off", "checks", "clutter",
-    "dark", "bright",
+    "dark", "bright", "hand_noise", "table_off", "tilt_off",
 )  # fmt: skip
 """What departs in a case whose cloth, table and camera are ordinary."""
 OWN_SCENE = ("small", "large", "square", "low_camera", "close_camera")
@@ -39,6 +39,9 @@ NEAR = (0.0, 0.1)  # [m] and one that does not
 LIFT_SECONDS = 1.5
 WRONG_HEIGHT = 0.05  # [m] of a hand whose height is told wrongly
 WRONG_FOCUS = 0.1  # of a focal length that is told wrongly
+WRONG_TABLE = 0.03  # [m] of a table whose height is told wrongly
+WRONG_TILT = 2.0  # [degrees] of a camera whose tilt is told wrongly
+HAND_NOISE = 0.01  # [m] standard deviation along each axis of a hand that is measured as hands are
 
 
 @dataclass
@@ -238,14 +241,22 @@ def _described(scene: Scene, pick: Pick, sign: float) -> tuple[dict[str, Any], d
     """What an estimator is told, wrongly where that is what departs, and the truth."""
     camera, hand, table = scene.camera, pick.path[-1].copy(), scene.table
     focal = camera.fx * (1.0 + (sign * WRONG_FOCUS if pick.kind == "focal_off" else 0.0))
+    height = table.height + (sign * WRONG_TABLE if pick.kind == "table_off" else 0.0)
+    pose = camera.camera_to_world.copy()
+    if pick.kind == "tilt_off":
+        tilt = np.deg2rad(sign * WRONG_TILT)
+        c, s = np.cos(tilt), np.sin(tilt)
+        pose[:3, :3] = pose[:3, :3] @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     if pick.kind == "hand_off":
         hand[2] += sign * WRONG_HEIGHT
+    if pick.kind == "hand_noise":
+        hand += HAND_NOISE * np.random.default_rng(int(1e6 * abs(hand).sum())).standard_normal(3)
     told = {
         "camera": {
             "width": camera.width, "height": camera.height, "fx": focal, "fy": focal, "cx": camera.cx,
-            "cy": camera.cy, "camera_to_world": camera.camera_to_world.tolist(),
+            "cy": camera.cy, "camera_to_world": pose.tolist(),
         },
-        "image_before": "before.png", "image_after": "after.png", "table_height_m": table.height,
+        "image_before": "before.png", "image_after": "after.png", "table_height_m": height,
         "table_half_extents_xy_m": list(table.half_extents), "table_centre_xy_m": list(table.centre),
         "table_thickness_m": table.thickness, "hand_position_m": hand.tolist(),
     }  # fmt: skip

@@ -7,7 +7,7 @@ import nuno
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate.seeing import _doubts, _oddities, begin_to_see
+from nuno.estimate.seeing import _doubts, _oddities, _uncovered, begin_to_see
 
 POSE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
 CAMERA = Camera(80, 60, 60.0, 60.0, 39.5, 29.5, POSE)
@@ -77,3 +77,18 @@ def test_a_mask_in_doubt_gets_a_warning():
     doubt[24] = True
     (warning,) = _doubts(square(), doubt)
     assert "17%" in warning and "after_mask" in warning  # 200 px
+
+
+def test_cloth_in_place_of_the_hand_gets_a_warning():
+    """Where most of the middle of the hand's pixels was found to be cloth; beside them there may be any."""
+    ignored, mask = np.zeros((2, 60, 80), dtype=bool)
+    ignored[10:20, 10:20] = True
+    mask[15:40, 10:30] = True
+    assert _uncovered(mask, ignored) == ()  # half of them
+    mask[13:15, 10:30] = True
+    (warning,) = _uncovered(mask, ignored)  # of rows 11 to 18, which are the middle, 6 of 8
+    assert warning.startswith("the image after shows cloth where the hand is told to be")
+    rim = ignored.copy()
+    rim[12:18, 12:18] = False
+    assert _uncovered(rim, ignored) == ()
+    assert _uncovered(mask, np.zeros_like(mask)) == ()  # the hand is out of the image

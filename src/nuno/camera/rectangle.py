@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
-from nuno.camera.edges import edge_in_image, edge_in_mask, side_pixels
 from nuno.camera.image import check_image, check_mask
-from nuno.camera.rim_shadow import cloth_at_shadow
+from nuno.camera.rectangle_edges import measured_edges
 from nuno.errors import ClothNotFoundError, EstimationError, InvalidInputError
 
 SQUARE = "the sides, "
 """How a warning begins that tells of a square cloth: it names the corners, and makes no number less sure."""
+UNEVEN = "the cloth's sides are not straight"
+"""The same of one whose outline is rough or wavy."""
 _SQUARE = 0.02  # sides this close to each other do not say which one is the longer
-_ENDS = 0.06  # share of a side next to a corner that is not measured: there the other side bends the edge
-_MIN_SHARE = 0.2  # share of a side that must show an edge
-_SCATTER = 0.25  # [px] median scatter of an edge about its line that noise explains
-_AGREE = 1.0  # [px] how far an edge may be from the one that most others agree on
 _CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # anticlockwise from above
 _OUTWARD = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])  # normal of the side after each corner
 
@@ -128,7 +125,7 @@ def fit_rectangle(mask: ArrayLike, image: ArrayLike | None, camera: Camera, plan
         for _ in range(2):
             pose, residual = _fit_to_edges(pose, soft_mask, soft_image, camera, plane_height)
     if residual > 1.5:
-        warnings.append(f"the cloth's sides are not straight: {residual:.1f} px off the rectangle on average")
+        warnings.append(f"{UNEVEN}: {residual:.1f} px off the rectangle on average")
     return _labelled(pose, camera, plane_height, residual, warnings)
 
 
@@ -160,63 +157,11 @@ def _fit_to_edges(
     pose: _Pose, mask: np.ndarray, image: np.ndarray | None, camera: Camera, height: float
 ) -> tuple[_Pose, float]:
     """Measure the edge along the sides, in a soft mask (h, w) or also in the image, and fit to it."""
-    corners = pose.corners()
-    ground, weights, sides = [], [], []
-    lines = [side_pixels(corners[side], corners[(side + 1) % 4], camera, height, _ENDS) for side in range(4)]
-    shadows = [None] * 4 if image is None else _shadows(image, lines, camera, height)
-    for side, (pixels, normals, seen) in enumerate(lines):
-        pixels, normals, count = pixels[seen], normals[seen], len(seen)
-        edge = edge_in_mask(mask, pixels, normals)
-        shift = shadows[side]
-        if shift is not None:
-            edge = pixels + shift[:, None] * normals
-        elif image is not None:
-            edge = _refined(pixels, normals, edge, edge_in_image(image, pixels, normals))
-        good = np.isfinite(edge).all(axis=1)
-        edge, normals = edge[good], normals[good]
-        if len(edge) < _MIN_SHARE * count:
-            raise EstimationError(
-                f"only {len(edge) / count:.0%} of one side of the cloth shows an edge: it is cut off, "
-                "or the region is not a rectangle on the plane"
-            )
-        points = camera.back_project(edge, height)[:, :2]
-        further = camera.back_project(edge + normals, height)[:, :2]
-        metres = np.abs((further - points) @ (_OUTWARD[side] @ pose.axes()))
-        ground.append(points)
-        weights.append(1.0 / np.maximum(metres, 1e-6))
-        sides.append(np.full(len(edge), side))
-    fitted, residual = _least_squares(pose, np.concatenate(ground), np.concatenate(sides), np.concatenate(weights))
-    return fitted, residual
-
-
-def _shadows(
-    image: np.ndarray, lines: list[tuple[np.ndarray, np.ndarray, np.ndarray]], camera: Camera, height: float
-) -> list[np.ndarray | None]:
-    """The cloth's edge along each side that casts a shadow; of two opposite sides only one can: others are a border."""
-    found: list[np.ndarray | None] = []
-    for pixels, normals, seen in lines:
-        middle = len(pixels) // 2
-        ground = camera.back_project(np.stack([pixels[middle], pixels[middle] + normals[middle]]), height)
-        metres = float(np.linalg.norm(ground[1] - ground[0]))
-        found.append(cloth_at_shadow(image, pixels[seen], normals[seen], metres))
-    return [None if found[(side + 2) % 4] is not None else found[side] for side in range(4)]
-
-
-def _refined(line: np.ndarray, normals: np.ndarray, mask_edge: np.ndarray, image_edge: np.ndarray) -> np.ndarray:
-    """The edge (k, 2) along a line (k, 2): the image's, or the mask's where the image's is in doubt.
-
-    The mask is right on average but may be rough; the image is fine where a plain cloth meets a plain
-    table. Where a pattern runs along the side, the image's edges jump between the cloth's and the pattern's.
-    """
-    offsets = [((edge - line) * normals).sum(axis=1) for edge in (mask_edge, image_edge)]
-    middles = [float(np.median(offset[np.isfinite(offset)])) for offset in offsets if np.isfinite(offset).any()]
-    if len(middles) < 2 or np.isfinite(offsets[1]).mean() < 0.5 or abs(middles[1] - middles[0]) > _AGREE:
-        return mask_edge
-    scatter = [float(np.nanmedian(np.abs(offset - middle))) for offset, middle in zip(offsets, middles, strict=True)]
-    if scatter[1] > max(scatter[0], _SCATTER):
-        return mask_edge
-    image_edge[np.abs(offsets[1] - middles[1]) > _AGREE] = np.nan
-    return image_edge
+    edges = measured_edges(pose.corners(), mask, image, camera, height)
+    points = camera.back_project(edges.pixels, height)[:, :2]
+    further = camera.back_project(edges.pixels + edges.normals, height)[:, :2]
+    metres = np.abs(((further - points) * (_OUTWARD[edges.sides] @ pose.axes())).sum(axis=1))
+    return _least_squares(pose, points, edges.sides, 1.0 / np.maximum(metres, 1e-6))
 
 
 def _least_squares(pose: _Pose, points: np.ndarray, sides: np.ndarray, weights: np.ndarray) -> tuple[_Pose, float]:

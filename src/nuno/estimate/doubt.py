@@ -14,19 +14,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from nuno.camera.focal_of_rectangle import FOCAL
+from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
+from nuno.estimate.seeing import AWAY, COVERED
 
-WELL = 9.5
-"""-log likelihood of a silhouette, without its pattern, up to which a future fits well."""
-BADLY = 15.0
+WELL = 13.0
+"""-log likelihood of a silhouette, without its pattern, up to which a future fits well; beyond, a warning says so."""
+BADLY = 19.0
 """The same, from which on it fits badly."""
-POORLY = 12.0
-"""The same, from which on a warning says so."""
 BAD_SHARE = 0.6
 """Of the broad probabilities in the answer, where the best future fits badly; up to there in proportion."""
-WARNED_SHARE = 0.25
-"""Of the broad probabilities, for every warning again of what is left."""
+POOR = "even the best imagined pick looks little like the image after"
+"""How the warning of a bad fit begins."""
+ELSEWHERE = "the image after looks as if the hand were "
+"""How a warning begins that the hand is told to be where it is not."""
+SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
+"""Of the broad probabilities, by how a warning begins, of what those before it left. A square or rough outline told
+nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
+WARNED_SHARE = 0.1
+"""The same of any other warning."""
 BREADTH = 6.0
 """Evidence's logarithms are divided by this for the broad probabilities."""
 
@@ -56,32 +64,34 @@ def oddities(comparisons: Sequence[Comparison], candidate: int, score: str, gues
         return ()
     if guess.mistake != 0.0:
         return (
-            f"the image after looks as if the hand were {100.0 * abs(guess.mistake):.0f} cm "
+            f"{ELSEWHERE}{100.0 * abs(guess.mistake):.0f} cm "
             f"{'higher' if guess.mistake > 0.0 else 'lower'} than it is told to be: are hand, camera and table_height "
             "right?",
         )
-    if misfit(comparisons, candidate) < POORLY:
+    if misfit(comparisons, candidate) < WELL:
         return ()
     return (
-        "even the best imagined pick looks little like the image after: is the cloth larger, folded or of another kind "
-        "than any guess, or are hand, camera or table_height wrong?",
+        f"{POOR}: is the cloth larger, folded or of another kind than any guess, or are hand, camera or table_height "
+        "wrong?",
     )
 
 
-def share_of_doubt(misfit: float, warnings: int) -> float:
+def share_of_doubt(misfit: float, warnings: Sequence[str] = ()) -> float:
     """Return which share of the broad probabilities there is in an answer, 0 to 1.
 
     Args:
         misfit: Of the best future, see `misfit`.
-        warnings: How many there are.
+        warnings: What was odd.
     """
-    bad = BAD_SHARE * float(np.clip((misfit - WELL) / (BADLY - WELL), 0.0, 1.0))
-    return float(1.0 - (1.0 - bad) * (1.0 - WARNED_SHARE) ** warnings)
+    left = 1.0 - BAD_SHARE * float(np.clip((misfit - WELL) / (BADLY - WELL), 0.0, 1.0))
+    for warning in warnings:
+        left *= 1.0 - next((share for begin, share in SHARES.items() if warning.startswith(begin)), WARNED_SHARE)
+    return 1.0 - left
 
 
 def doubted(
     comparisons: Sequence[Comparison], score: str, count: int, log_prior_of_candidates: np.ndarray | None,
-    warnings: int | None = None,
+    warnings: Sequence[str] = (),
 ) -> Ranked:  # fmt: skip
     """Rank the candidates, and tell how likely each is as far as the evidence may be trusted.
 
@@ -90,8 +100,8 @@ def doubted(
         score: What ranks.
         count: Number of candidates.
         log_prior_of_candidates: (count,) float, or None.
-        warnings: How many tell that the images or the cloth are odd; None while more guesses may follow. A misfit
-            short of `POORLY` then counts for nothing, as another guess would hardly mend it.
+        warnings: Of how the images and the cloth are odd; none while more guesses may follow, for none of them would
+            mend that.
     """
     ranked = rank(comparisons, score, count, log_prior_of_candidates)
     if score not in EVIDENCE or not np.isfinite(ranked.scores).any():
@@ -99,7 +109,7 @@ def doubted(
     without = rank(comparisons, score, count, log_prior_of_candidates, without_best=True)
     logs = np.logaddexp(_log_shares(ranked.scores), _log_shares(without.scores)) - np.log(2.0)
     found = misfit(comparisons, int(ranked.order[0]))
-    share = 0.0 if warnings is None and found < POORLY else share_of_doubt(found, warnings or 0)
+    share = share_of_doubt(found, warnings)
     if share > 0.0:
         logs = np.logaddexp(np.log1p(-share) + logs, np.log(share) + _log_shares(ranked.scores / BREADTH))
     return replace(ranked, likely=np.exp(logs))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate.compile_ahead import compile_ahead
+from nuno.estimate.focal_doubt import with_focal_of_rectangle
 from nuno.estimate.futures import LIFT_SECONDS
 from nuno.estimate.hand_path import HandPath
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation
@@ -83,7 +84,8 @@ def estimate_pick(
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
             ``before_mask`` is given.
         after: RGB image of the cloth in the hand, or its path; None where ``after_mask`` is given.
-        camera: The camera of both images, or the ``camera`` entry of an input.json.
+        camera: The camera of both images, or the ``camera`` entry of an input.json. Where the outline of the cloth
+            before is a rectangle with a clearly other focal length alone, that is taken instead, with a warning.
         table_height: z of the table top [m].
         hand: (3,) where the picked point is now [m].
         table_half_extents: Half sizes of the top along x and y [m]; None: it is taken as endless.
@@ -154,7 +156,10 @@ def estimate_pick(
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
+    measured = rectangle is None
     images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES), template)
+    if measured:
+        settings, rectangle = with_focal_of_rectangle(settings, images, rectangle)
     settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(
         images.before, images.after, images.mask_before, images.mask_after, camera=settings.camera,

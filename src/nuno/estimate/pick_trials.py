@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nuno.camera.rectangle import SQUARE, ClothRectangle
+from nuno.camera.rectangle import ClothRectangle
 from nuno.errors import EstimationError
 from nuno.estimate.doubt import doubted, oddities
 from nuno.estimate.futures import Futures, imagine_picks
@@ -128,7 +128,7 @@ def try_picks(
     batch, world, _ = PickTrials(comparisons, batches, ranked, seen).best_match(best, settings.score)
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
     odd = oddities(comparisons, best, settings.score, guess)
-    reported = len(odd) + len(seen.warnings) + sum(not warning.startswith(SQUARE) for warning in rectangle.warnings)
+    reported = (*rectangle.warnings, *seen.warnings, *odd)
     ranked = doubted(comparisons, settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted)

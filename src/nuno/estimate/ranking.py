@@ -31,7 +31,7 @@ SURE = 0.96
 """A candidate as likely as this after some of the guesses, with and without the best of them, needs no more."""
 HOTTEST = 12.0
 """Logarithm of the highest temperature, at which all are alike."""
-SHARE = 0.97
+SHARE = 0.95
 """Further guesses look at the candidates that together hold so much of the probability."""
 
 

@@ -25,6 +25,14 @@ FAR_FROM_HAND = 10.0
 """[px] of the full image. A cloth that a hand holds is seen beside it; nearer than this, fine folds may be missed."""
 MUCH_DOUBT = 0.1
 """Share of the cloth's area that may be in doubt before a warning says so: 5 % of masks that were good have more."""
+COVERED_SHARE = 0.6
+"""Of the middle of the hand's disc that shows cloth, where it is not the hand; where the hand is, 0.15 at most did."""
+MIDDLE = 0.3
+"""Of the disc's radius are left out of that at its rim, where cloth is seen about the hand."""
+AWAY = "the cloth found in the image after begins "
+"""How a warning begins that there is no cloth at the hand."""
+COVERED = "the image after shows cloth where the hand is told to be"
+"""How a warning begins that there is no hand."""
 HAND_MARGIN = 2
 """[px] of the full image around the hand that count neither as cloth nor as background."""
 
@@ -91,7 +99,10 @@ def begin_to_see(
         if with_pattern and before is not None and after is not None:
             colours = cloth_colours(before, mask_before, rectangle)
             pattern = find_pattern(colours, after, mask & ~ignored, rectangle, camera, hand)
-        return Seen(mask, ignored, small, silhouette, coarse, pattern, _oddities(mask, ignored) + _doubts(mask, doubt))
+        odd = _oddities(mask, ignored) + _doubts(mask, doubt)
+        if mask_after is None and hidden is None:
+            odd += _uncovered(mask, ignored)
+        return Seen(mask, ignored, small, silhouette, coarse, pattern, odd)
 
     if not meanwhile:
         seen = look()
@@ -111,7 +122,18 @@ def _oddities(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
     away = float(cv2.distanceTransform((~ignored).astype(np.uint8), cv2.DIST_L2, 5)[mask].min())
     if away <= max(float(np.sqrt(ignored.sum() / np.pi)), FAR_FROM_HAND):
         return ()
-    return (f"the cloth found in the image after begins {away:.0f} px away from the hand: does it hold the cloth?",)
+    return (f"{AWAY}{away:.0f} px away from the hand: does it hold the cloth?",)
+
+
+def _uncovered(mask: np.ndarray, ignored: np.ndarray) -> tuple[str, ...]:
+    """A warning where the mask (h, w) that was found goes on over the middle of the hand's pixels (h, w)."""
+    import cv2
+
+    depth = cv2.distanceTransform(ignored.astype(np.uint8), cv2.DIST_L2, 5)
+    middle = depth > MIDDLE * depth.max()
+    if float((mask & middle).sum()) < COVERED_SHARE * max(int(middle.sum()), 1):
+        return ()
+    return (f"{COVERED}: is it behind the cloth, or are hand and camera told wrongly?",)
 
 
 def _doubts(mask: np.ndarray, doubt: np.ndarray | None) -> tuple[str, ...]:
