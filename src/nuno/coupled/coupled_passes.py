@@ -206,7 +206,7 @@ def solve(
                     if counts:
                         note_wrong(passing, island, off, size)
                         wrong = wp.max(wrong, off)
-            project_trees(rigid, joints, trees, passing, world, dt)
+            project_trees(rigid, joints, trees, passing, world, dt, k_pass)
             for t in range(trees.count):
                 off = trees.wrong[world * trees.count + t]
                 island = island_of(passing, world, joints.body[trees.joint[t]])

@@ -13,6 +13,7 @@ from nuno.coupled.contact_candidates import Elements, bound_triangles, keep_rows
 from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
+from nuno.coupled.drive_constraints import UNDECIDED
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees
 from nuno.coupled.kept_multipliers import kept_room, more_kept_room
@@ -228,6 +229,7 @@ class Coupling(CouplingResults):
         if self.joints.count:
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
+            self.joints.state.fill_(UNDECIDED)
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         # what diverges is told of after the run
