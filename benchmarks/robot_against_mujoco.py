@@ -55,7 +55,7 @@ def step_response(
 ) -> dict[str, Any]:
     """Return how far joints of both are from each other, over the joints' ranges, and what a simulated second costs.
 
-    MuJoCo takes steps that are ``finer`` times shorter: at steps of 1.67 ms its own error is as large as the difference.
+    MuJoCo takes steps that are ``finer`` times shorter: at 1.67 ms its own error is as large as the difference.
     """
     robot = fixed_or_free(afloat)
     world = nuno.World(device="cpu", gravity=gravity, substeps=substeps)

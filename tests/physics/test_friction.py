@@ -52,7 +52,7 @@ def test_a_sheet_below_the_angle_of_friction_does_not_creep(kind):
 
 
 def test_a_rigid_box_holds_and_slides_at_the_angle_of_friction():
-    """Coulomb at default substeps: at 0.995 of tan(slope) = mu a box stands, at 1.005 its acceleration is to 0.01 % of mu g."""
+    """Coulomb, at default substeps: stands at 0.995 of tan = mu, and goes at g (sin - mu cos) at 1.005."""
     friction = np.array([0.1, 0.1, 0.5, 0.5, 1.0, 1.0])
     slope = np.arctan(friction * np.array([0.995, 1.005] * 3))
     world = nuno.World(device="cpu")

@@ -12,16 +12,16 @@ the substep. Projected one after the other, n joints of a chain need some n^2 pr
 Motors, springs, friction and stops are linear about where the joint ends, which `driven` tells as if its carrier stood
 still. A joint at a stop or held by friction has no free direction. The next pass looks again.
 
-Whether friction holds or slides is a linear complementarity problem. All joints that are in the wrong state change it at
-once, which most often ends after a few passes; but two joints that turn each other may so let go and hold in turns for
-ever. After `TOGETHER` passes, therefore, only the first in the order of the tree changes its state in a pass, which ends
-always (Murty, "Note on a Bard-type scheme for solving the complementarity problem", Opsearch 11, 1974; block and single
-pivots together: Júdice and Pires, Computers and Operations Research 21, 1994).
+Whether friction holds or slides is a linear complementarity problem, solved by pivots. Where all joints in a wrong
+state change it at once, two that turn each other may let go and hold in turns for ever. So a joint changes its state
+only where none that it carries does in the pass (single pivots in an order, as in Murty, "Note on a Bard-type scheme
+for solving the complementarity problem", Opsearch 11, 1974), and one that slides the wrong way holds before it slides
+the other way. A substep's first pass has the states of the substep before, a frame's none.
 """
 
 import warp as wp
 
-from nuno.coupled.drive_constraints import UNDECIDED, angle_about, driven, project_ball, wrapped
+from nuno.coupled.drive_constraints import angle_about, driven, project_ball, wrapped
 from nuno.coupled.joint_constraints import ROUNDING, joint_apart
 from nuno.coupled.joint_response import (
     BALL,
@@ -41,8 +41,6 @@ from nuno.rigid.rigid_body import RigidState, point_before, point_of
 
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
-TOGETHER = wp.constant(1)
-"""Passes in which the friction of all joints is decided on together, before it changes joint by joint."""
 
 
 @wp.struct
@@ -180,9 +178,7 @@ def places_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp
 
 
 @wp.func
-def open_joint(
-    rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, own: Inertia, dt: float, may: int
-):
+def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, own: Inertia, dt: float, may: int):
     """Return a joint's response to its carrier, and how far it is from where it should be, beyond rounding.
 
     Args:
@@ -336,7 +332,7 @@ def project_trees(
             if trees.flipped[t] == 1:
                 below = other_arm
                 above = arm
-            may = wp.where(k_pass > 0 and (k_pass < TOGETHER or trees.changed[world * trees.count + t] == 0), 1, 0)
+            may = wp.where(k_pass > 0 and trees.changed[world * trees.count + t] == 0, 1, 0)
             state = joints.state[world * joints.count + k]
             opening, wrong = open_joint(
                 rigid, joints, trees, world, t, seen_from(trees.node[nodes + t], -below), dt, may
