@@ -350,17 +350,12 @@ def test_a_napkin_between_plates_does_not_creep(where, shape):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "seconds",
-    [
-        0.5,
-        pytest.param(60.0, marks=[pytest.mark.slow, pytest.mark.xfail(strict=True, reason="0.14 mm in 60 s")]),
-    ],
-)
+@pytest.mark.parametrize("seconds", [0.5, pytest.param(60.0, marks=pytest.mark.slow)])
 def test_plates_with_napkins_between(seconds):
     """A pile of plates of 0.3 kg stands, each a napkin above the other, and wanders by less than 0.1 mm in 60 s.
 
-    Before: 15 um/s, as rows between two heavy bodies and a light cloth were not solved to their end.
+    Before: 15 um/s, as rows between two heavy bodies and a light cloth were not solved to their end, and 1.3 um/s while
+    they began each substep from nothing.
     """
     world = nuno.World(device="cpu")
     table(world)

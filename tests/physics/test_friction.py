@@ -51,6 +51,29 @@ def test_a_sheet_below_the_angle_of_friction_does_not_creep(kind):
     assert np.abs(rows(body) - start).max() < 1e-4
 
 
+def test_a_rigid_box_holds_and_slides_at_the_angle_of_friction():
+    """Coulomb, at default substeps: stands at 0.995 of tan = mu, and goes at g (sin - mu cos) at 1.005."""
+    friction = np.array([0.1, 0.1, 0.5, 0.5, 1.0, 1.0])
+    slope = np.arctan(friction * np.array([0.995, 1.005] * 3))
+    world = nuno.World(device="cpu")
+    world.add(nuno.plane(name="ramp"))
+    world.add(nuno.box((0.2, 0.2, 0.05), name="box"))
+    world = world.imagine(len(slope))
+    world.find("ramp").rotate(slope, "y")
+    normal = np.stack([np.sin(slope), 0 * slope, np.cos(slope)], axis=1)
+    box = world.find("box").rotate(slope, "y").locate(0.0251 * normal)
+    world.attach(box, nuno.Rigid(mass=1.0))
+    world.set_friction("ramp", "box", friction)
+    world.run(0.3)
+    before = np.array(box.velocity)
+    world.run(0.5)
+    along = np.stack([np.cos(slope), 0 * slope, -np.sin(slope)], axis=1)
+    gained = np.einsum("wx,wx->w", box.velocity - before, along) / 0.5
+    pull = np.maximum(GRAVITY * (np.sin(slope) - friction * np.cos(slope)), 0.0)
+    # velocities are floats: 1e-7 of 1 m/s over 0.5 s
+    np.testing.assert_allclose(gained, pull, atol=1e-4 * GRAVITY * friction.min())
+
+
 def test_friction_of_a_pair_is_the_geometric_mean():
     """Promise of the interface: a cloth of 0.9 on a ramp of 0.4 has 0.6, holds at 30 degrees, not at 32.5."""
     slope = np.radians([30.0, 32.5])

@@ -8,6 +8,7 @@ from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint,
 from nuno.coupled.joint_contacts import resolve_entries, resolve_others
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees, project_trees
+from nuno.coupled.kept_multipliers import Kept, keep, recall
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, is_linked, island_of, note_wrong
 from nuno.coupled.rigid_supports import link_supports, rubs_both, with_mate
 from nuno.coupled.row_projections import drag_row, join_row, push_row
@@ -119,7 +120,8 @@ def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
 @wp.kernel(enable_backward=False)
 def solve(
     particles: Particles, rigid: RigidState, parts: Parts, manifolds: Contacts, rows: Rows, ties: Ties, holds: Holds,
-    joints: Joints, trees: Trees, passing: Passing, dt: float, fraction: float, passes: int, at_once: int, size: int,
+    joints: Joints, trees: Trees, passing: Passing, kept: Kept, dt: float, fraction: float, passes: int,
+    at_once: int, size: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
@@ -140,6 +142,8 @@ def solve(
     linked_count = int(0)
     if at_once == 0:
         linked_count = link_supports(particles, rows, passing, world, first, base, count)
+        if linked_count > 0:
+            recall(kept, particles, rigid, rows, passing, world, first, start, base, count, fraction, ties.step)
     done = int(0)
     rowed = passes + LAST_PASSES
     k_pass = int(0)
@@ -202,7 +206,7 @@ def solve(
                     if counts:
                         note_wrong(passing, island, off, size)
                         wrong = wp.max(wrong, off)
-            project_trees(rigid, joints, trees, passing, world, dt)
+            project_trees(rigid, joints, trees, passing, world, dt, k_pass)
             for t in range(trees.count):
                 off = trees.wrong[world * trees.count + t]
                 island = island_of(passing, world, joints.body[trees.joint[t]])
@@ -226,6 +230,8 @@ def solve(
             if not anyone(wrong >= ENOUGH):
                 done = 1
         k_pass += 1
+    if linked_count > 0:
+        keep(kept, rows, passing, world, first, base, count, fraction)
     if rank == 0:
         for k in range(joints.count):
             settle_spins(rigid, joints, world, k, dt)

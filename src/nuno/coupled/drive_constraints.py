@@ -53,8 +53,14 @@ def wrapped(angle: float):
     return angle - 2.0 * wp.pi * wp.round(angle / (2.0 * wp.pi))
 
 
+HOLDS, UNDECIDED = wp.constant(0), wp.constant(2)
+"""Friction that holds, and a state of friction that is asked for. Where it slides the state is 1 or -1."""
+
+
 @wp.func
-def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, free: float, dt: float):
+def driven(
+    drive: wp.array(dtype=float), first: int, w: float, start: float, free: float, dt: float, state: int, may: int
+):
     """Return how far the free direction comes from ``free``, and the slope there of what acts along it.
 
     The slope is what a unit more of way takes of the multiplier; it is infinite where a stop, friction or a motor that
@@ -67,6 +73,11 @@ def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, fre
         start: Where the substep began.
         free: Where it ends without what acts along it.
         dt: Of the substep [s].
+        state: Whether friction held or slid, up to now; `UNDECIDED` before it is known.
+        may: 0 where friction stays in that state.
+
+    Returns:
+        The two, and the state of friction.
     """
     h2 = dt * dt
     back = start - free
@@ -101,8 +112,17 @@ def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, fre
     slope = float(passive + a)
     if rub > 0.0 or exact:
         slope = wp.inf
+    slides = int(HOLDS)
     if wp.abs(needed) > rub:
-        sum = force + wp.sign(needed) * rub
+        slides = wp.where(needed > 0.0, 1, -1)
+    if state != UNDECIDED and slides != state and rub > 0.0:
+        if may == 0:
+            slides = state
+        elif state != HOLDS:
+            # it stops before it goes the other way: what carries the joint gives way, too, which is not in w
+            slides = HOLDS
+    if slides != HOLDS:
+        sum = force + float(slides) * rub
         effort = b - a * ((sum + b) / (stiff + a))
         slope = passive + a
         if exact:
@@ -117,7 +137,7 @@ def driven(drive: wp.array(dtype=float), first: int, w: float, start: float, fre
     high = wp.max(drive[first + UPPER] - free, back - CATCH_UP * dt)
     if went < low or went > high:
         slope = wp.inf
-    return wp.clamp(went, low, high), slope
+    return wp.clamp(went, low, high), slope, slides
 
 
 @wp.func
@@ -151,7 +171,7 @@ def project_axis(
         w = wp.dot(axis, block.push * axis) + wp.dot(block.push * axis, pull) + wp.dot(turns, twist)
         pull = pull + axis
     old = joints.axial[r]
-    went, _slope = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt)
+    went, _slope, _state = driven(joints.drive, r * DRIVES, w, start, now - w * old, dt, UNDECIDED, 1)
     change = went / w - old
     joints.axial[r] = old + change
     joints.pull[r] = joints.pull[r] + pull * change

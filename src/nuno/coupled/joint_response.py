@@ -28,6 +28,7 @@ class Joints:
     pull: wp.array(dtype=wp.vec3)  # (worlds * count) multipliers of the substep: of the place,
     twist: wp.array(dtype=wp.vec3)  # of turns, what acts along the free direction included,
     axial: wp.array(dtype=float)  # what acts along it alone,
+    state: wp.array(dtype=int)  # whether friction holds or slides, see `driven`,
     free: wp.array(dtype=wp.vec3)  # and of a ball joint's friction and spring
     total: wp.array(dtype=wp.vec3)  # of all substeps of the frame
     total_twist: wp.array(dtype=wp.vec3)

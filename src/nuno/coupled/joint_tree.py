@@ -11,6 +11,12 @@ the substep. Projected one after the other, n joints of a chain need some n^2 pr
 
 Motors, springs, friction and stops are linear about where the joint ends, which `driven` tells as if its carrier stood
 still. A joint at a stop or held by friction has no free direction. The next pass looks again.
+
+Whether friction holds or slides is a linear complementarity problem, solved by pivots. Where all joints in a wrong
+state change it at once, two that turn each other may let go and hold in turns for ever. So a joint changes its state
+only where none that it carries does in the pass (single pivots in an order, as in Murty, "Note on a Bard-type scheme
+for solving the complementarity problem", Opsearch 11, 1974), and one that slides the wrong way holds before it slides
+the other way. A substep's first pass has the states of the substep before, a frame's none.
 """
 
 import warp as wp
@@ -80,6 +86,7 @@ class Trees:
     opening: wp.array(dtype=Opening)  # (worlds * count)
     shift: wp.array(dtype=wp.vec3)  # (worlds * (count + roots)), of the centre of mass
     turn: wp.array(dtype=wp.vec3)
+    changed: wp.array(dtype=int)  # (worlds * count), whether friction of it, or of what it carries, did in the pass
     wrong: wp.array(dtype=float)  # (worlds * count), how far each joint was from where it should be
 
 
@@ -171,7 +178,7 @@ def places_along(rigid: RigidState, joints: Joints, world: int, k: int, axis: wp
 
 
 @wp.func
-def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, own: Inertia, dt: float):
+def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, own: Inertia, dt: float, may: int):
     """Return a joint's response to its carrier, and how far it is from where it should be, beyond rounding.
 
     Args:
@@ -182,6 +189,7 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
         t: The joint's place in the trees.
         own: The inertia of what it carries, as seen from the joint.
         dt: Of the substep [s].
+        may: 0 where friction is to stay as it is, holding or sliding.
     """
     k = trees.joint[t]
     r = world * joints.count + k
@@ -223,7 +231,10 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
             pull = pull + wp.dot(along, own.force) + wp.dot(about, own.torque)
             start, now = places_along(rigid, joints, world, k, axis)
             old = joints.axial[r]
-            went, slope = driven(joints.drive, r * DRIVES, 1.0 / inertia, start, now - (pull + old) / inertia, dt)
+            went, slope, state = driven(
+                joints.drive, r * DRIVES, 1.0 / inertia, start, now - (pull + old) / inertia, dt, joints.state[r], may
+            )
+            joints.state[r] = state
             end = now - (pull + old) / inertia + went
             if wp.isinf(slope):
                 made.shift = made.shift + along * (end - now)
@@ -299,10 +310,13 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
 
 
 @wp.func
-def project_trees(rigid: RigidState, joints: Joints, trees: Trees, passing: Passing, world: int, dt: float):
+def project_trees(
+    rigid: RigidState, joints: Joints, trees: Trees, passing: Passing, world: int, dt: float, k_pass: int
+):
     """One pass over all trees of a world; `trees.wrong` tells how far each joint was from where it should be."""
     nodes = world * (trees.count + trees.roots)
     for t in range(trees.count):
+        trees.changed[world * trees.count + t] = 0
         k = trees.joint[t]
         slot = wp.where(trees.flipped[t] == 1, joints.other[k], joints.slot[k])
         trees.node[nodes + t] = body_inertia(rigid, world * rigid.capacity + slot)
@@ -318,7 +332,16 @@ def project_trees(rigid: RigidState, joints: Joints, trees: Trees, passing: Pass
             if trees.flipped[t] == 1:
                 below = other_arm
                 above = arm
-            opening, wrong = open_joint(rigid, joints, trees, world, t, seen_from(trees.node[nodes + t], -below), dt)
+            may = wp.where(k_pass > 0 and trees.changed[world * trees.count + t] == 0, 1, 0)
+            state = joints.state[world * joints.count + k]
+            opening, wrong = open_joint(
+                rigid, joints, trees, world, t, seen_from(trees.node[nodes + t], -below), dt, may
+            )
+            if joints.state[world * joints.count + k] != state:
+                trees.changed[world * trees.count + t] = 1
+            if trees.carrier[t] >= 0 and trees.carrier[t] < trees.count:
+                carrying = world * trees.count + trees.carrier[t]
+                trees.changed[carrying] = wp.max(trees.changed[carrying], trees.changed[world * trees.count + t])
             trees.opening[world * trees.count + t] = opening
             trees.wrong[world * trees.count + t] = wrong
             if trees.carrier[t] >= 0:

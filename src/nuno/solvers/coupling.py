@@ -13,8 +13,10 @@ from nuno.coupled.contact_candidates import Elements, bound_triangles, keep_rows
 from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
+from nuno.coupled.drive_constraints import UNDECIDED
 from nuno.coupled.joint_response import Joints
 from nuno.coupled.joint_tree import Trees
+from nuno.coupled.kept_multipliers import kept_room, more_kept_room
 from nuno.coupled.pass_progress import Passing
 from nuno.coupled.rigid_supports import held_slots
 from nuno.coupled.shape_bounds import Surroundings, bound_particles
@@ -110,6 +112,8 @@ class Coupling(CouplingResults):
         tied = set(ties.body.numpy()[: ties.count].tolist())
         self._is_tied = np.array([k in tied for k in range(self._bodies)])
         self._rows = self._row_room(4 * total + 512)
+        room = 0 if self._at_once or rigid is None else self._rows.room
+        self._multipliers = kept_room(self.world_count, total if room else 0, room, self.device)
         self._kept = wp.zeros(self.world_count, dtype=int, device=self.device)
         self._bvh: Any = None
         self.kinematic: list[int] = []
@@ -217,6 +221,7 @@ class Coupling(CouplingResults):
             self._rigid.open(time, dt, [*self._slots, *self.kinematic])
         self._particles.bounded_count.zero_()
         self._impulses.zero_()
+        self._multipliers.at.zero_()
         for total in (self._ties.total, self._ties.unmet, self.holds.total, self.holds.total_twist, self.holds.unmet):
             total.zero_()
         self._ties.step = self.holds.step = 1.0 / substeps
@@ -224,6 +229,7 @@ class Coupling(CouplingResults):
         if self.joints.count:
             for name in ("total", "total_twist", "total_axial", "unmet"):
                 getattr(self.joints, name).zero_()
+            self.joints.state.fill_(UNDECIDED)
         self._rate = 1.0 / (dt * dt)
         self._scale = self._rate / substeps
         # what diverges is told of after the run
@@ -325,7 +331,7 @@ class Coupling(CouplingResults):
         if self._row_count or self._ties.count or self.holds.count or self.joints.count:
             self._go(
                 solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
-                self.holds, self.joints, self._trees, self._passing, dt, fraction,
+                self.holds, self.joints, self._trees, self._passing, self._multipliers, dt, fraction,
                 PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
             )  # fmt: skip
             if self._row_count:
@@ -373,6 +379,8 @@ class Coupling(CouplingResults):
             if self._row_count <= self._rows.room:
                 return
             before, self._rows = self._rows, self._row_room(self._row_count + self._row_count // 2)
+            if self._multipliers.room:
+                self._multipliers = more_kept_room(self._multipliers, self.world_count, self._rows.room)
             if not from_start:
                 self._keep_rows(before)
 

@@ -62,8 +62,8 @@ class CoupledJoints:
         self._put("other_turn", [np.roll(spec.other_turn, -1, axis=1) for spec in specs], wp.quat)
         self._put("limit", [np.broadcast_to(spec.max_force, (worlds,)) for spec in specs], float)
         for name, kind in (
-            ("pull", wp.vec3), ("twist", wp.vec3), ("free", wp.vec3), ("axial", float), ("total", wp.vec3),
-            ("total_twist", wp.vec3), ("total_axial", float), ("unmet", int),
+            ("pull", wp.vec3), ("twist", wp.vec3), ("free", wp.vec3), ("axial", float), ("state", int),
+            ("total", wp.vec3), ("total_twist", wp.vec3), ("total_axial", float), ("unmet", int),
         ):  # fmt: skip
             setattr(self.table, name, wp.zeros(worlds * count, dtype=kind, device=self._device))
         pairs = [

@@ -108,5 +108,6 @@ def tree_table(pairs: Sequence[tuple[int, int]], worlds: int, device: str) -> Tr
     table.opening = wp.zeros(worlds * table.count, dtype=Opening, device=device)
     table.shift = wp.zeros(nodes, dtype=wp.vec3, device=device)
     table.turn = wp.zeros(nodes, dtype=wp.vec3, device=device)
+    table.changed = wp.zeros(worlds * table.count, dtype=int, device=device)
     table.wrong = wp.zeros(worlds * table.count, dtype=float, device=device)
     return table
