@@ -16,7 +16,7 @@ from wire_with import PATIENCE, advance, until
 
 from nuno.robot.wire import bridge
 from nuno.robot.wire.bridge_client import CONTROL
-from nuno.robot.wire.outbox import KEPT_MOST
+from nuno.robot.wire.outbox import MAX_KEPT
 from nuno.robot.wire.server import WAITS
 
 
@@ -139,8 +139,8 @@ def test_a_long_queue_for_one_that_never_reads(serve, raw):
     (client,) = server._bridge.clients
     for k in range(500):  # 50 MB: more than system buffers hold
         server._bridge.publish("/big", {"data": f"{k}" + "x" * 10**5})
-        assert len(client.outbox) <= KEPT_MOST
-    until(lambda: len(client.outbox) == KEPT_MOST)
+        assert len(client.outbox) <= MAX_KEPT
+    until(lambda: len(client.outbox) == MAX_KEPT)
     assert ask(raw(server)) == 0.0
 
 
