@@ -122,8 +122,7 @@ def test_too_many_open_files(serve, raw):
         for each in own:
             each.connect(("127.0.0.1", server.port))
         first = ask(other)
-        time.sleep(0.2)
-        assert ask(other) > first
+        until(lambda: ask(other) > first)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         for each in own:
