@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 import pytest
 
-from nuno.__main__ import _without_lines, main
+from nuno.__main__ import main
 from nuno.errors import EstimationError
 from nuno.estimate.case import PickCase, read_case
+from nuno.kernels.start_warp import without_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "pick-case"
 TRUE = [0, 0]  # where the bundled cloth was picked, in the simulation that its images were rendered from
@@ -252,7 +253,7 @@ def test_a_folder_that_may_not_be_written_to_is_status_2(tmp_path, capsys, monke
     def refuse(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("nuno.__main__.tempfile.TemporaryFile", refuse)
+    monkeypatch.setattr("nuno.files.out_folder.tempfile.TemporaryFile", refuse)
     assert pick(CASE, tmp_path / "out") == 2
     check_failure(capsys.readouterr(), "InvalidInputError", "Permission denied")
 
@@ -266,7 +267,7 @@ def test_a_byte_order_mark_is_read_over(case):
 
 def test_only_warps_line_about_the_driver_is_kept_back(capfd):
     """What else is written to standard error meanwhile comes through, also from a library's own code."""
-    with _without_lines(b"Warp CUDA warning"):
+    with without_lines(b"Warp CUDA warning"):
         os.write(2, b"one\nWarp CUDA warning: no driver\n")
         os.write(2, b"two\n")
     os.write(2, b"three\n")
