@@ -1,8 +1,8 @@
 """CPU seconds in which each module of kernels is compiled to PTX for CUDA, by which functions are kept out of line.
 
 ``python benchmarks/cuda_source.py --lines 0 25 60 --json source.json``; no GPU is needed. Functions whose source has at
-least so many lines are not inlined; 0 inlines all, as what is launched. Each module is compiled in a process of its own,
-into a cache of its own, as many at once as there are cores.
+least so many lines are not inlined; 0 inlines all, as what is launched. Each module is compiled in a process and into a
+cache of its own, as many at once as there are cores.
 """
 
 import argparse

@@ -78,8 +78,9 @@ def check_result(result, n, m):
     assert set(result["seconds"]) == {"read", "see", "compile", "imagine", "compare", "total"}
 
 
+@pytest.mark.long
 def test_the_full_grid(tmp_path):
-    """All 36 candidates: the answer is the point that was picked."""
+    """All 36 candidates: the answer is the point that was picked; `test_a_small_grid_end_to_end` has four of them."""
     assert pick(CASE, tmp_path) == 0
     check_result(json.loads((tmp_path / "result.json").read_text()), 6, 6)
 
@@ -175,7 +176,7 @@ def test_a_bad_case_is_status_2(name, case, tmp_path, capsys):
     """One line on standard error with the error's name and what is wrong; nothing is written."""
     spoil, error, words = BAD[name]
     spoil(case)
-    assert pick(case, tmp_path / "out") == 2
+    assert pick(case, tmp_path / "out", "--candidates", "2x2") == 2
     check_failure(capsys.readouterr(), error, words)
     assert not (tmp_path / "out").exists()
 
