@@ -15,12 +15,16 @@ EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 LONG = {
     "all_kinds",
+    "box_on_towel",
     "carry_mat",
     "closed_loop",
+    "fit_material",
+    "follow_cloth",
+    "hold_by_friction",
     "hold_garment",
     "pick_outline",
     "talos_fold",
-}  # more than 15 s of a core each
+}  # more than 5 s of a core each
 
 
 def _pictures_of():
