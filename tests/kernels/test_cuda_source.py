@@ -20,9 +20,10 @@ WHOLE = {
 """Of the modules that go through the substeps of bodies, those that between them have all native snippets, in floats
 and doubles: only these have a branch for CUDA. The others have the same snippets over other memory, and functions that
 the CPU compiles too; `.ci/run` leaves them, named "again-...", to the slow tests."""
-LONG = 25
+LONG, LONG_OF_CLOTH = 25, 60
 """Lines of a function's source from which it is not inlined where only the source is looked at: its callers are small
-then, and `nuno.coupled.coupled_passes` compiles in 14 s of CPU time, inlined in 75 s (`benchmarks/cuda_source.py`)."""
+then. By CPU time (`benchmarks/cuda_source.py`): `nuno.coupled.coupled_passes` takes 14 s, inlined 75 s. Functions of
+cloth hand on much, and take least from 60 lines on: `nuno.plans.run_blocks_shared` 63 s, from 25 on 119 s."""
 
 
 def _again(name):
@@ -32,8 +33,9 @@ def _again(name):
 
 
 @pytest.fixture
-def long_functions_apart():
+def long_functions_apart(name):
     """Keep Nuno's long functions out of line; Warp names what is made of them by another hash than what is launched."""
+    lines = LONG_OF_CLOTH if name.startswith(("nuno.plans.run_blocks", "nuno.plans.run_grid")) else LONG
     found = [each for each in gc.get_objects() if isinstance(each, wp.Function)]
     apart = [
         each
@@ -42,7 +44,7 @@ def long_functions_apart():
         and each.native_snippet is None
         and each.func is not None
         and each.func.__module__.startswith("nuno.")
-        and each.adj.source.count("\n") >= LONG
+        and each.adj.source.count("\n") >= lines
     ]
     for each in apart:
         each.inline_hint = "noinline"
@@ -72,7 +74,7 @@ def compile_to_ptx(name):
 @pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}" if _again(name) else name)
 def test_module_compiles_to_ptx(long_functions_apart, name):
     """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
-    assert len(long_functions_apart) > 100
+    assert len(long_functions_apart) > 10
     compile_to_ptx(name)
 
 
