@@ -202,7 +202,7 @@ def test_feet_stick_and_slide_at_the_angle_of_friction(share):
 
 @pytest.fixture(scope="module")
 def resting():
-    """A Talos that stands on a floor with 2.5 kg fixed to each hand, at rest."""
+    """A Talos that stands on a floor with 2.5 kg fixed to each hand, at rest; `test_felt_contacts.py` has one without."""
     world = nuno.World(device="cpu")
     world.add(nuno.plane(name="floor"))
     robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
@@ -255,6 +255,7 @@ def statics(resting):
 SWAYS = pytest.mark.xfail(strict=True, reason="1.2 %, 0.037 N m, since balance weighs what the hands hold")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "group", ["leg_left", "leg_right", "arm_left", "arm_right", pytest.param("torso", marks=SWAYS)]
 )
@@ -268,6 +269,7 @@ def test_at_rest_all_torques_are_those_of_inverse_dynamics(resting, statics, gro
     np.testing.assert_allclose(mine[rows], theirs[rows], atol=0.01 * np.abs(theirs[rows]).max())
 
 
+@pytest.mark.long
 def test_the_zero_moment_point_is_that_of_the_contact_forces(resting):
     """Of the soles' contacts, and of inverse dynamics with what the hands hold: within 1 mm; the weight: 0.2 %."""
     world, robot = resting
@@ -278,6 +280,7 @@ def test_the_zero_moment_point_is_that_of_the_contact_forces(resting):
     np.testing.assert_allclose(robot.read().zero_moment_point[:2], point, atol=1e-3)
 
 
+@pytest.mark.long
 def test_ankles_read_the_weight(resting):
     """Both ankles together bear all but the feet below them: within 1 %."""
     _, robot = resting

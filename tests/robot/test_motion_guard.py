@@ -107,13 +107,14 @@ def test_a_wall_at_the_side(beside, caplog, gap, passes):
     assert bool(caplog.records) is not passes
 
 
+@pytest.mark.long
 def test_a_velocity_ends_before_a_wall():
     """Also where it is sent again and again, and the walk is worked out step by step."""
     robot = make()
     robot.world.add(nuno.box((0.1, 3.0, 2.0), name="wall", position=(1.05, 0.0, 1.0)))
 
     def drive(look):
-        for _ in range(20):
+        for _ in range(16):
             robot.send_velocity(0.15, 0.0, 0.0, hold=1.0)
             robot.world.run(0.5, each_frame=look)
 
