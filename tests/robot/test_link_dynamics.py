@@ -202,7 +202,7 @@ def test_feet_stick_and_slide_at_the_angle_of_friction(share):
 
 @pytest.fixture(scope="module")
 def resting():
-    """A Talos that stands on a floor with 2.5 kg fixed to each hand, at rest; `test_felt_contacts.py` has one without."""
+    """A Talos that stands on a floor with 2.5 kg in each hand, at rest; `test_felt_contacts.py` has one without."""
     world = nuno.World(device="cpu")
     world.add(nuno.plane(name="floor"))
     robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
