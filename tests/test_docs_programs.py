@@ -16,8 +16,11 @@ PAGES = {
 }
 # pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
 SLOW = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
-# and those of some four seconds or more; `test_docs.py` looks for all names of all pages, and runs the first program
-LONG = {"folds", "following", "garments", "robot-dynamics", "scenes", "soft-bodies", "viewer", "worlds"}
+# and those of some three seconds or more; `test_docs.py` looks for all names of all pages, and runs the first program
+LONG = {
+    "folds", "following", "garments", "learning", "planning", "robot-dynamics", "scenes", "sensors", "soft-bodies",
+    "viewer", "worlds",
+}  # fmt: skip
 MARKS = {**dict.fromkeys(SLOW, pytest.mark.slow), **dict.fromkeys(LONG, pytest.mark.long)}
 
 

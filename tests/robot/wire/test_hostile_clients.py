@@ -94,6 +94,7 @@ def test_a_message_in_many_pieces(serve, raw):
     until(lambda: not server._bridge.clients)
 
 
+@pytest.mark.long
 def test_a_thousand_connections_in_a_row(serve, raw):
     """Connections that come and go at once, with and without a word, leave no files open."""
     server = serve(real_time_factor=1.0)
@@ -157,6 +158,7 @@ def test_one_who_reads_late(serve, raw):
     assert late.hear(id="after")["result"]
 
 
+@pytest.mark.long
 def test_pings_without_end_from_one_that_never_reads(serve, raw):
     """Pongs are kept for nobody: who asks for them without end and reads none is disconnected."""
     server = serve()
