@@ -213,6 +213,7 @@ def test_detached_it_stands_still_and_walks_as_it_is_sent(standing):
     assert robot.is_dynamic and robot.state().fallen is None
 
 
+@pytest.mark.long
 def test_a_hand_stops_at_a_table(standing):
     """A static box before the hand: the forearm presses on it instead of going through."""
     world, robot = standing
