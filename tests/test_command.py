@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 import pytest
 
-from nuno.__main__ import _without_lines, main
+from nuno.__main__ import main
 from nuno.errors import EstimationError
 from nuno.estimate.case import PickCase, read_case
+from nuno.kernels.start_warp import without_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "pick-case"
 TRUE = [0, 0]  # where the bundled cloth was picked, in the simulation that its images were rendered from
@@ -77,8 +78,9 @@ def check_result(result, n, m):
     assert set(result["seconds"]) == {"read", "see", "compile", "imagine", "compare", "total"}
 
 
+@pytest.mark.long
 def test_the_full_grid(tmp_path):
-    """All 36 candidates: the answer is the point that was picked."""
+    """All 36 candidates: the answer is the point that was picked; `test_a_small_grid_end_to_end` has four of them."""
     assert pick(CASE, tmp_path) == 0
     check_result(json.loads((tmp_path / "result.json").read_text()), 6, 6)
 
@@ -174,7 +176,7 @@ def test_a_bad_case_is_status_2(name, case, tmp_path, capsys):
     """One line on standard error with the error's name and what is wrong; nothing is written."""
     spoil, error, words = BAD[name]
     spoil(case)
-    assert pick(case, tmp_path / "out") == 2
+    assert pick(case, tmp_path / "out", "--candidates", "2x2") == 2
     check_failure(capsys.readouterr(), error, words)
     assert not (tmp_path / "out").exists()
 
@@ -252,7 +254,7 @@ def test_a_folder_that_may_not_be_written_to_is_status_2(tmp_path, capsys, monke
     def refuse(**_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("nuno.__main__.tempfile.TemporaryFile", refuse)
+    monkeypatch.setattr("nuno.files.out_folder.tempfile.TemporaryFile", refuse)
     assert pick(CASE, tmp_path / "out") == 2
     check_failure(capsys.readouterr(), "InvalidInputError", "Permission denied")
 
@@ -266,7 +268,7 @@ def test_a_byte_order_mark_is_read_over(case):
 
 def test_only_warps_line_about_the_driver_is_kept_back(capfd):
     """What else is written to standard error meanwhile comes through, also from a library's own code."""
-    with _without_lines(b"Warp CUDA warning"):
+    with without_lines(b"Warp CUDA warning"):
         os.write(2, b"one\nWarp CUDA warning: no driver\n")
         os.write(2, b"two\n")
     os.write(2, b"three\n")

@@ -113,13 +113,13 @@ def check(seeds, folder, device):
 
 def test_copies_of_a_few_random_worlds(tmp_path):
     """Of the same, so many as take seconds."""
-    assert "run" in check(SHORT[:4], tmp_path, "cpu")
+    assert "run" in check(SHORT[:2], tmp_path, "cpu")
 
 
 @pytest.mark.long
 def test_copies_of_random_worlds(tmp_path):
     """Imagined, adopted, restored here and elsewhere, from memory and files: equal now, later, and after more."""
-    happened = check(SHORT, tmp_path, "cpu")
+    happened = check(SHORT[2:], tmp_path, "cpu")
     assert happened >= {"add", "attach", "detach", "attach_as_another", "grip", "weld", "push", "move", "locate", "run"}
 
 

@@ -10,6 +10,8 @@ SHORT, LONG = (5, 6, 8, 10, 18, 19, 25, 29, 36, 41, 55, 58, 104, 106, 127), rang
 """Seeds; the short ones are some in which a world differed: where lists of contacts and the ends of pushes were the
 batch's, then where a step's length was rounded, where a body was led in one world and stood in others, and where one
 was put elsewhere in some."""
+FEW = (29, 55, 58, 106)
+"""Of those, some that take no second each and have all kinds of changes but leaving dynamics."""
 WORLDS, COLOURS = 3, 4
 
 
@@ -68,13 +70,13 @@ def check(seeds, device):
 
 def test_a_few_worlds_of_a_batch_that_differ():
     """Of the same, so many as take seconds."""
-    assert "run" in check(SHORT[:1], "cpu")
+    assert "run" in check(FEW, "cpu")
 
 
 @pytest.mark.long
 def test_worlds_of_a_batch_that_differ():
     """Other places, velocities, pushes, paths, grips and friction in each world: each is what it is alone."""
-    happened = check(SHORT, "cpu")
+    happened = check([seed for seed in SHORT if seed not in FEW], "cpu")
     assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "reset", "run"}
 
 

@@ -15,7 +15,13 @@ PAGES = {
     if re.search(r"^```python", page.read_text(encoding="utf-8"), re.M)
 }
 # pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
-LONG = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
+SLOW = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
+# and those of some three seconds or more; `test_docs.py` looks for all names of all pages, and runs the first program
+LONG = {
+    "folds", "following", "garments", "learning", "planning", "robot-dynamics", "scenes", "sensors", "soft-bodies",
+    "viewer", "worlds",
+}  # fmt: skip
+MARKS = {**dict.fromkeys(SLOW, pytest.mark.slow), **dict.fromkeys(LONG, pytest.mark.long)}
 
 
 def blocks(page):
@@ -24,9 +30,7 @@ def blocks(page):
     return re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in sorted(PAGES)]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in sorted(PAGES)])
 def test_a_page_runs(name, tmp_path):
     """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")

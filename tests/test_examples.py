@@ -13,14 +13,8 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-LONG = {
-    "all_kinds",
-    "carry_mat",
-    "closed_loop",
-    "hold_garment",
-    "pick_outline",
-    "talos_fold",
-}  # more than 15 s of a core each
+SHORT = {"load_scene", "pick_estimate", "save_and_restore", "show_world", "soft_cube"}
+"""The others take more than some three seconds of a core each."""
 
 
 def _pictures_of():
@@ -36,7 +30,7 @@ pictures_of = _pictures_of()
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem in LONG else []) for path in EXAMPLES],
+    [pytest.param(path, id=path.stem, marks=[] if path.stem in SHORT else [pytest.mark.long]) for path in EXAMPLES],
 )
 def test_example(path, tmp_path):
     """In a process of its own, without a display: its check holds, and a picture is all that it leaves."""

@@ -27,6 +27,7 @@ def fold(case, out, *options):
     return main(["fold", str(case), "--out", str(out), "--device", "cpu", "--no-progress", *options])
 
 
+@pytest.mark.long
 def test_the_bundled_case_end_to_end(tmp_path):
     """``python -m nuno fold`` in a process of its own: status 0, one line, and every file that is promised."""
     out = tmp_path / "new" / "out"

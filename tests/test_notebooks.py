@@ -11,7 +11,7 @@ from html_page import Page
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
-LONG = {"a_robot_folds", "where_was_it_picked"}  # tens of seconds, of what examples/ does too
+LONG = {"a_robot_folds", "a_sweep_plotted", "imagine_and_adopt", "where_was_it_picked"}  # of what examples/ does too
 
 
 @pytest.mark.parametrize(

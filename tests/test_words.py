@@ -10,7 +10,7 @@ PACKAGE = Path(nuno.__file__).parent
 FOLDERS = (
     "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
     "numbers", "state", "constraints", "plans", "solvers", "topology", "rigid", "coupled", "bodies", "world",
-    "envs", "engines", "scenes", "tracking",
+    "envs", "engines", "scenes", "tracking", "robot",
 )  # fmt: skip
 """Where nothing is left; `tests/test_imports.py` looks for the first of the words in all folders."""
 
@@ -58,7 +58,7 @@ ALLOWED = {
     r"SpreadTask|spread_task": "a task of `nuno.envs`: a cloth is spread on a table",
     r"BALL|(project_)?ball(_joint)?": "the field's ball joint",
     r"listed_(position|rotation)": "where bodies were when rows were listed: a verb, and in saved states",
-    r"lay_over|left_over|over_triangle": "verbs: to lay over, to be left over",
+    r"lay_over|left_over|over_triangle|take_over": "verbs: to lay over, to be left over, to take over",
     r"(Get|Is)PseudoRoot|GetRootLayer": "names of usd-core",
     r"bvh_get_group_root|cast": "names of Warp and of typing",
     r"MOST": "shapes that one particle is held against, until `nuno.coupled` has another word",

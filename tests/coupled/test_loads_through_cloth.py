@@ -58,7 +58,9 @@ def led_edge(world, cloth, times, places):
 
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
-@pytest.mark.parametrize(("mass", "cell"), [(0.05, 0.02), (0.5, 0.02), (5.0, 0.02), (5.0, 0.01)])
+@pytest.mark.parametrize(
+    ("mass", "cell"), [(0.05, 0.02), (0.5, 0.02), (5.0, 0.02), pytest.param(5.0, 0.01, marks=pytest.mark.long)]
+)
 def test_a_box_rests_a_thickness_above_the_table(where, mass, cell):
     """The gap is the cloth's thickness, and forces of table and cloth are the weights.
 
@@ -83,7 +85,7 @@ def test_a_cup_on_a_towel_stays(where):
     table(world)
     towel(world)
     cup = load(world, 0.1, nuno.cylinder(0.04, 0.1))
-    world.run(2.0, progress=False)
+    world.run(1.3, progress=False)
     before = cup.position.copy()
     world.run(0.5, progress=False)
     assert np.linalg.norm(cup.position - before) < 0.5e-3  # under 1 mm/s
@@ -142,7 +144,7 @@ def test_nothing_wanders_in_a_minute(mass, shape, cell):
 
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
-@pytest.mark.parametrize("mass", [0.01, 0.05])
+@pytest.mark.parametrize("mass", [0.01, pytest.param(0.05, marks=pytest.mark.long)])
 def test_a_drawn_towel_takes_along_what_stands_on_it(where, mass):
     """A towel drawn 100 mm in 1 s at an eighth of mu g carries a box as far, which stands when it stands."""
     world = nuno.World(device=where)
@@ -300,12 +302,12 @@ def test_a_book_on_towels(layers):
     world = nuno.World(device="cpu")
     table(world)
     for k in range(layers):
-        cloth = towel(world, (0.24, 0.2), height=0.0021 + 0.00405 * k, name=f"towel{k}")
-    book = load(world, 1.0, nuno.box((0.2, 0.15, 0.03)), bottom=0.0045 + 0.00405 * (layers - 1))
+        cloth = towel(world, (0.16, 0.12), height=0.0021 + 0.00405 * k, name=f"towel{k}")
+    book = load(world, 1.0, nuno.box((0.13, 0.09, 0.03)), bottom=0.0045 + 0.00405 * (layers - 1))
     world.run(0.5, progress=False)
     assert book.position[2] - 0.015 == pytest.approx(layers * THICK, rel=0.05)
     assert borne(world, book, cloth.name)[2] == pytest.approx(G, rel=0.02)
-    assert borne(world, world.find("towel0"), "table")[2] == pytest.approx((1 + layers * 0.2 * 0.048) * G, rel=0.02)
+    assert borne(world, world.find("towel0"), "table")[2] == pytest.approx((1 + layers * 0.2 * 0.0192) * G, rel=0.02)
 
 
 @pytest.mark.slow
@@ -331,8 +333,18 @@ def test_a_book_on_a_folded_towel(layers):
     assert borne(world, cloth, "table")[2] == pytest.approx((1 + 0.2 * side * side * layers) * G, rel=0.02)
 
 
-@pytest.mark.parametrize("where", DEVICES, indirect=True)
-@pytest.mark.parametrize("shape", ["round", "square"])
+@pytest.mark.parametrize(
+    ("where", "shape"),
+    [
+        ("cpu", "square"),
+        pytest.param("cpu", "round", marks=pytest.mark.long),
+        pytest.param("at once", "square", marks=pytest.mark.long),
+        pytest.param("at once", "round", marks=pytest.mark.slow),  # square ones crept more, and take less
+        pytest.param("cuda:0", "square", marks=pytest.mark.cuda),
+        pytest.param("cuda:0", "round", marks=pytest.mark.cuda),
+    ],
+    indirect=["where"],
+)
 def test_a_napkin_between_plates_does_not_creep(where, shape):
     """Nothing goes as fast as 0.1 mm in 60 s (one by one before: round ones by 8 um/s, square ones by 50)."""
     world = nuno.World(device=where)
@@ -459,12 +471,12 @@ def test_copies_have_the_same_bits(where):
     """Under a load, too, futures and a restored world are the world, bit for bit."""
     world = nuno.World(device=where)
     bodies = scene(world)
-    futures, moment = world.imagine(3), world.save()
+    futures, moment = world.imagine(2), world.save()
     futures.run(0.2, progress=False)
     world.run(0.2, progress=False)
     expected = [body.vertices for body in bodies]
     for body, places in zip(bodies, expected, strict=True):
-        for k in range(3):
+        for k in range(2):
             assert np.array_equal(futures.find(body.name).vertices[k], places)
     world.restore(moment)
     world.run(0.2, progress=False)

@@ -4,6 +4,8 @@ Native snippets have a branch for CUDA, which no other test looks at on a machin
 compiled in its cache, by a hash of the source, so that only what has changed is compiled again.
 """
 
+import gc
+
 import pytest
 import warp as wp
 
@@ -12,23 +14,47 @@ from nuno.kernels.kernel_modules import kernel_modules
 ARCHITECTURE = 90
 MODULES = {module.name: module for module in kernel_modules() if "cuda" in module.devices}
 WHOLE = {
-    "run_blocks_shared", "run_double_blocks_partly", "run_grid", "run_soft_blocks_shared_sharp",
-    "run_soft_double_blocks_partly_sharp", "run_soft_grid",
+    "run_blocks_shared", "run_grid", "run_soft_blocks_shared_sharp", "run_soft_double_blocks_partly_sharp",
+    "run_rigid_group",
 }  # fmt: skip
-"""Of the modules that go through the substeps of cloth and soft bodies, those that between them have all functions. The
-others have the same functions over other memory; `.ci/run` leaves them, named "again-...", to the slow tests."""
+"""Of the modules that go through the substeps of bodies, those that between them have all native snippets, in floats
+and doubles: only these have a branch for CUDA. The others have the same snippets over other memory, and functions that
+the CPU compiles too; `.ci/run` leaves them, named "again-...", to the slow tests."""
+LONG, LONG_OF_CLOTH = 25, 60
+"""Lines of a function's source from which it is not inlined where only the source is looked at: its callers are small
+then. By CPU time (`benchmarks/cuda_source.py`): `nuno.coupled.coupled_passes` takes 14 s, inlined 75 s. Functions of
+cloth hand on much, and take least from 60 lines on: `nuno.plans.run_blocks_shared` 63 s, from 25 on 119 s."""
 
 
 def _again(name):
-    """Return whether a module has the functions of others."""
+    """Return whether a module has the snippets of others."""
     last = name.rpartition(".")[2]
-    return name.startswith("nuno.plans.run_") and last not in WHOLE
+    return name.startswith(("nuno.plans.run_", "nuno.rigid.run_")) and last not in WHOLE
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}" if _again(name) else name)
-def test_module_compiles_to_ptx(name):
-    """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
+@pytest.fixture
+def long_functions_apart(name):
+    """Keep Nuno's long functions out of line; Warp names what is made of them by another hash than what is launched."""
+    lines = LONG_OF_CLOTH if name.startswith(("nuno.plans.run_blocks", "nuno.plans.run_grid")) else LONG
+    found = [each for each in gc.get_objects() if isinstance(each, wp.Function)]
+    apart = [
+        each
+        for each in found
+        if each.inline_hint is None
+        and each.native_snippet is None
+        and each.func is not None
+        and each.func.__module__.startswith("nuno.")
+        and each.adj.source.count("\n") >= lines
+    ]
+    for each in apart:
+        each.inline_hint = "noinline"
+    yield apart
+    for each in apart:
+        each.inline_hint = None
+
+
+def compile_to_ptx(name):
+    """Compile a module, and look for all its kernels in what was made."""
     module, blocks = MODULES[name].module, MODULES[name].blocks
     kept = dict(wp.get_module_options(module))
     wp.set_module_options({"block_dim": blocks[0]}, module=module)
@@ -41,3 +67,19 @@ def test_module_compiles_to_ptx(name):
     assert kernels
     for kernel in kernels:
         assert f".entry {kernel.key}_" in ptx, kernel.key
+    return ptx
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}" if _again(name) else name)
+def test_module_compiles_to_ptx(long_functions_apart, name):
+    """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
+    assert len(long_functions_apart) > 10
+    compile_to_ptx(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}")
+def test_module_compiles_as_it_is_launched(name):
+    """The same with everything inlined, as on a device: up to five times as long."""
+    compile_to_ptx(name)

@@ -118,14 +118,16 @@ def test_a_lifted_cube_slides_as_coulomb_says(share):
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.long if kind == "towel" else ()) for kind in sorted(MATERIALS)]
+    "kind", [pytest.param(kind, marks=() if kind in ("cube", "soft mat") else pytest.mark.long) for kind in MATERIALS]
 )
 def test_things_are_carried_by_friction_alone(kind):
     """0.5 m up in 1 s: with 1.2 times the bound's force nothing slides by more than 0.5 mm."""
     assert Gripper(kind, 1.2 * bound(kind, PEAK)).carry() < 5e-4
 
 
-@pytest.mark.parametrize("kind", sorted(MATERIALS))
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=() if kind in ("cube", "towel") else pytest.mark.long) for kind in MATERIALS]
+)
 def test_things_slip_where_friction_is_too_small(kind):
     """With 0.8 times the force that holds the weight at rest, they slide down, and out."""
     gripper = Gripper(kind, 0.8 * bound(kind))

@@ -116,6 +116,7 @@ def test_a_four_bar_closes_and_its_rocker_goes_where_geometry_says():
     assert drive.velocity == pytest.approx(6.0, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_door_on_a_slope_swings_about_its_lowest_point():
     """Axis 10 degrees off the vertical: T = 2 pi sqrt(I / m g b sin 10) (1 + A^2 / 16) within 0.5 %; it ends lowest."""
     world = nuno.World(device="cpu")

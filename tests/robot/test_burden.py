@@ -70,10 +70,10 @@ def test_a_kilogram_is_nothing():
     """Nor is a robot that stands, walks and moves its arms."""
     robot = make()
     in_the_hand(robot, 1.0)
-    robot.go_pos(0.2, wait=False)
+    robot.go_pos(0.1, wait=False)
     robot.angle_vector({"arm_left_4_joint": -1.0}, 1.0)
     seen = set()
-    for _ in range(40):
+    for _ in range(25):
         robot.sleep(0.1)
         state = robot.state()
         seen |= {state.over_torque, state.unbalanced}

@@ -80,8 +80,8 @@ def test_a_step_lands_and_ends():
     landed = carried_on(step, own, True, 0.9 * step.air)
     assert landed.landed == pytest.approx(0.9 * step.air)
     moving = pendulum((0.1, 0.0), (0.3, 0.0))
-    assert not carried_on(landed, moving, True, 10.0).is_over
-    assert carried_on(landed, own, True, 10.0).is_over
+    assert not carried_on(landed, moving, True, 10.0).is_finished
+    assert carried_on(landed, own, True, 10.0).is_finished
     assert isinstance(landed, CaptureStep) and landed.foot == step.foot
 
 

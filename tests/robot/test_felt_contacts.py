@@ -107,6 +107,7 @@ def test_a_wrist_reads_what_a_table_does_to_the_hand(standing):
     assert state.fallen is None
 
 
+@pytest.mark.long
 def test_a_wrist_reads_what_a_scale_shows(standing):
     """A plate on a spring goes down by F / k under the hand, and the wrist reads F, within 2 %."""
     world, robot = standing
@@ -144,6 +145,7 @@ def felt_by_copies(world, seconds):
     return [state.joint_wrenches for state in states], [by_table(state) for state in states]
 
 
+@pytest.mark.long
 def test_feelings_are_restored_and_imagined(standing):
     """A restored robot reads what it read, and a copy in an imagined world feels what the robot does, bit for bit."""
     world, robot = standing

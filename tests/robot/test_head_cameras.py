@@ -30,6 +30,7 @@ def test_the_pair_has_its_baseline_and_looks_the_same_way(name, baseline, reques
     np.testing.assert_allclose(0.5 * (right + left), middle, atol=1e-9)
 
 
+@pytest.mark.long
 def test_both_arms_are_seen_and_hide_the_towel(scene):
     """Arms on their sides of the image; where an arm is, the towel is not; without the robot all of it is seen."""
     _, _, links = scene

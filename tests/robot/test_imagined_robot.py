@@ -19,7 +19,9 @@ def standing(dynamics):
     return world, robot, towel
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["kinematic", "dynamic"])
+@pytest.fixture(
+    scope="module", params=[False, pytest.param(True, marks=pytest.mark.long)], ids=["kinematic", "dynamic"]
+)
 def scene(request):
     """The scene of ``standing``, saved."""
     world, robot, towel = standing(request.param)

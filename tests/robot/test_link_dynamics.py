@@ -172,7 +172,7 @@ def test_swinging_limbs_change_no_momentum():
     np.testing.assert_allclose(last[3:], first[3:], atol=4e-3 * np.linalg.norm(first[3:]))
 
 
-@pytest.mark.parametrize("share", [0.9, 1.2])
+@pytest.mark.parametrize("share", [0.9, pytest.param(1.2, marks=pytest.mark.long)])
 def test_feet_stick_and_slide_at_the_angle_of_friction(share):
     """Talos on stiff motors on a slope aside, friction 0.1: it slides at g (sin - mu cos), and below atan(mu) stops.
 
@@ -202,7 +202,7 @@ def test_feet_stick_and_slide_at_the_angle_of_friction(share):
 
 @pytest.fixture(scope="module")
 def resting():
-    """A Talos that stands on a floor with 2.5 kg fixed to each hand, at rest."""
+    """A Talos that stands on a floor with 2.5 kg in each hand, at rest; `test_felt_contacts.py` has one without."""
     world = nuno.World(device="cpu")
     world.add(nuno.plane(name="floor"))
     robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
@@ -252,6 +252,7 @@ def statics(resting):
     return np.mean(told, axis=0), np.mean(wanted, axis=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("group", ["leg_left", "leg_right", "arm_left", "arm_right", "torso"])
 def test_at_rest_all_torques_are_those_of_inverse_dynamics(resting, statics, group):
     """Hips, knees, ankles, trunk, arms and wrists: gravity, the loads, and what contact does to the soles; within 1 %.
@@ -263,6 +264,7 @@ def test_at_rest_all_torques_are_those_of_inverse_dynamics(resting, statics, gro
     np.testing.assert_allclose(mine[rows], theirs[rows], atol=0.01 * np.abs(theirs[rows]).max())
 
 
+@pytest.mark.long
 def test_friction_holds_the_arms_of_a_robot_at_rest(resting):
     """Coulomb: wrists rub by 1 N m, which bears what they need, so that nothing in the arms moves.
 
@@ -278,6 +280,7 @@ def test_friction_holds_the_arms_of_a_robot_at_rest(resting):
     assert np.std(speeds, axis=0).max() < 0.05
 
 
+@pytest.mark.long
 def test_the_zero_moment_point_is_that_of_the_contact_forces(resting):
     """Of the soles' contacts, and of inverse dynamics with what the hands hold: within 1 mm; the weight: 0.2 %."""
     world, robot = resting
@@ -288,6 +291,7 @@ def test_the_zero_moment_point_is_that_of_the_contact_forces(resting):
     np.testing.assert_allclose(robot.read().zero_moment_point[:2], point, atol=1e-3)
 
 
+@pytest.mark.long
 def test_ankles_read_the_weight(resting):
     """Both ankles together bear all but the feet below them: within 1 %."""
     _, robot = resting

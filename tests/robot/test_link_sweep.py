@@ -5,7 +5,7 @@ import pytest
 
 import nuno
 from nuno.robot.coal_shapes import LinkHulls
-from nuno.robot.link_sweep import DEEP, LEAST, Sweep, first_entry, spare_way
+from nuno.robot.link_sweep import DEEP, MIN_ADVANCE, Sweep, first_entry, spare_way
 from nuno.robot.static_shapes import StaticShapes
 
 
@@ -60,7 +60,7 @@ def test_a_robot_that_slides_into_a_wall(hulls, talos, world, count):
     found = first_entry(straight(hulls, talos, (1.0, 0.0, 0.0), times), shapes_of(world, hulls))
     k, own, obstacle, point = found
     step = 1.0 / (count - 1)
-    assert k * step - LEAST <= 0.37 + DEEP <= (k + 1) * step + LEAST
+    assert k * step - MIN_ADVANCE <= 0.37 + DEEP <= (k + 1) * step + MIN_ADVANCE
     assert obstacle.body.name == "wall"
     if count > 30:  # legs are alike
         assert hulls.names[own].replace("left", "right") == link.replace("left", "right")
@@ -109,7 +109,7 @@ def test_floors_of_every_kind(hulls, talos, world):
         sweep = straight(hulls, talos, (0.0, 0.0, -0.5), np.linspace(0.0, 1.0, 101))
         found.append(first_entry(sweep, shapes_of(own, hulls))[0])
     assert max(found) - min(found) <= 1  # a hundredth of 0.5 m
-    assert 0.005 * found[0] <= 0.2 + DEEP + LEAST and 0.005 * (found[0] + 1) >= 0.2 + DEEP - LEAST
+    assert 0.005 * found[0] <= 0.2 + DEEP + MIN_ADVANCE and 0.005 * (found[0] + 1) >= 0.2 + DEEP - MIN_ADVANCE
 
 
 def _heights(robot):

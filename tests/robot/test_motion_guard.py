@@ -8,7 +8,7 @@ import pytest
 import nuno
 from nuno.errors import InvalidInputError
 from nuno.robot.goal import GoalStatus
-from nuno.robot.link_sweep import DEEP, LEAST
+from nuno.robot.link_sweep import DEEP, MIN_ADVANCE
 from nuno.robot.motion_guard import MotionGuard
 from nuno.robot.servo import ServoCommand
 
@@ -79,7 +79,7 @@ def test_a_walk_ends_in_front_of_a_wall(caplog):
                                               robot.world.run(10.0, each_frame=look)))  # fmt: skip
     goal, met = robot._base_goal, robot.state().collision
     assert goal.status == GoalStatus.ABORTED and "'wall'" in goal.text and "before its goal" in goal.text
-    assert high[0] <= 1.0 + DEEP + LEAST
+    assert high[0] <= 1.0 + DEEP + MIN_ADVANCE
     assert robot.read_base().position[0] > 0.5  # a step is 0.18 m, and knees and hands 0.3 m ahead of the base
     assert met.body == "wall" and met.link in robot.links.names
     assert abs(met.point[0] - 1.0) < 0.02 and 2.0 < met.time < 8.0
@@ -107,18 +107,19 @@ def test_a_wall_at_the_side(beside, caplog, gap, passes):
     assert bool(caplog.records) is not passes
 
 
+@pytest.mark.long
 def test_a_velocity_ends_before_a_wall():
     """Also where it is sent again and again, and the walk is worked out step by step."""
     robot = make()
     robot.world.add(nuno.box((0.1, 3.0, 2.0), name="wall", position=(1.05, 0.0, 1.0)))
 
     def drive(look):
-        for _ in range(20):
+        for _ in range(16):
             robot.send_velocity(0.15, 0.0, 0.0, hold=1.0)
             robot.world.run(0.5, each_frame=look)
 
     _, high = extent(robot, drive)
-    assert high[0] <= 1.0 + DEEP + LEAST
+    assert high[0] <= 1.0 + DEEP + MIN_ADVANCE
     assert robot.read_base().position[0] > 0.3
 
 
@@ -143,7 +144,7 @@ def test_a_hand_stops_on_a_table():
     robot.angle_vector(goal, 1.0)
     low, _ = extent(robot, lambda look: robot.world.run(1.2, each_frame=look), True)
     depth = height - low[2]
-    assert 0.0 < depth <= DEEP + LEAST
+    assert 0.0 < depth <= DEEP + MIN_ADVANCE
     own = robot.joints.controllers["larm_controller"].goal
     assert own.status == GoalStatus.ABORTED and "'table'" in own.text
     met = robot.state().collision
@@ -186,7 +187,7 @@ def test_a_walk_that_would_carry_an_arm_into_something():
     robot.world.run(0.5)
     robot.angle_vector(goal, 1.0, controller_type="larm_controller")
     robot.world.run(7.0, each_frame=look)
-    assert max(deepest) <= DEEP + LEAST
+    assert max(deepest) <= DEEP + MIN_ADVANCE
     assert robot.state().collision.body == "table"
     arm = robot.joints.controllers["larm_controller"].goal
     assert GoalStatus.ABORTED in (arm.status, robot._base_goal.status)
@@ -371,7 +372,7 @@ def test_a_torque_law_stops_at_a_table():
     wanted = [goal[robot.robot.joint_index(name)] for name in names]
     robot.servo(ServoCommand(names, wanted, kp=200.0, kd=20.0))
     low, _ = extent(robot, lambda look: robot.world.run(2.0, each_frame=look), True)
-    assert 0.0 <= height - low[2] + LEAST and height - low[2] <= DEEP + LEAST
+    assert 0.0 <= height - low[2] + MIN_ADVANCE and height - low[2] <= DEEP + MIN_ADVANCE
     assert robot.state().collision.body == "table"
     assert not robot.state().v.any()
 

@@ -178,6 +178,7 @@ def test_a_light_push_is_survived(standing, push):
     assert np.linalg.norm((momentum(robot)[1] - start)[:2]) < 2.5e-3 and robot.state().fallen is None
 
 
+@pytest.mark.long
 def test_a_shove_throws_it_over_and_it_is_said(standing, caplog):
     """800 N for 0.2 s: it falls, says so once with reason and time, lies on the floor, and stands again when set up."""
     world, robot = standing
@@ -212,6 +213,7 @@ def test_detached_it_stands_still_and_walks_as_it_is_sent(standing):
     assert robot.is_dynamic and robot.state().fallen is None
 
 
+@pytest.mark.long
 def test_a_hand_stops_at_a_table(standing):
     """A static box before the hand: the forearm presses on it instead of going through."""
     world, robot = standing

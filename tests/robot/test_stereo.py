@@ -108,6 +108,7 @@ def test_two_hands_are_followed_as_surely_as_they_say():
         assert path.holds[0][1] == np.inf
 
 
+@pytest.mark.long
 def test_a_hand_that_one_image_misses_is_still_followed():
     """Seen by the left camera alone for a third of the time: no gap, and within what the track tells."""
     way = two_ways()[:1]
@@ -141,6 +142,7 @@ def test_an_occluded_hand_is_bridged_and_the_gap_is_told():
     assert track.deviations[12] > 1.3 * track.deviations[5]
 
 
+@pytest.mark.long
 def test_cameras_that_move_follow_too():
     """The head turns while it looks: a camera for each frame."""
     way = two_ways()[:1]

@@ -159,6 +159,7 @@ def test_world_that_cannot_be_made(pool):
         search.sweep(searched.square, {"x": [1.0]}, world=searched.broken_room, executor=pool)
 
 
+@pytest.mark.long
 def test_one_device_a_process(monkeypatch, tmp_path):
     """Where there are two CUDA devices, two processes take one each, and get it back when they end."""
     code = """

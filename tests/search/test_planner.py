@@ -54,6 +54,7 @@ def test_the_same_seed_gives_the_same_plan():
     assert (bounded.knots >= -1.0).all() and (bounded.knots <= (1.0, 0.0, 1.0)).all()
 
 
+@pytest.mark.long
 def test_a_towel_is_laid_where_it_is_wanted():
     """A towel held by an edge: straight down its other edge folds under; the plan lays it flat on its place."""
     world = nuno.World(device="cpu")

@@ -37,6 +37,7 @@ def test_a_robot_that_stands_carries_steadily(result):
     assert result.best in (0, 2)
 
 
+@pytest.mark.long
 def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
     """Newton: nothing pulls a mat along the arms but friction; nothing is gripped or glued."""
     trials = {}

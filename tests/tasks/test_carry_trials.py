@@ -76,6 +76,7 @@ def test_a_trial_is_what_it_is_alone(plan):
         np.testing.assert_array_equal(end_of([k])[0], together[k])
 
 
+@pytest.mark.long
 def test_the_arms_bear_the_weight(plan):
     """Statics: at rest what the arms do to the mat is its weight, within 1 % (as in the tests of contact forces)."""
     futures = make_room(plan, "cpu").imagine(2)

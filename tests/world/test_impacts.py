@@ -235,6 +235,7 @@ def test_a_cloth_that_passes_through_itself_from_the_start_is_taken_apart():
     assert np.abs(cloth.velocities).max() < 1.0  # it was not blown apart
 
 
+@pytest.mark.long
 def test_what_is_taken_apart_is_the_same_in_pieces_in_batches_and_restored(tmp_path):
     """Promise: one run, steps, a batch and a snapshot restored from a file come to the same bits."""
     whole, batch, steps = pressed_through_itself(), pressed_through_itself(2), pressed_through_itself()

@@ -63,20 +63,22 @@ def check_image(image: ArrayLike, camera: Camera, name: str = "image") -> np.nda
     return array
 
 
-def check_any_size(image: ArrayLike, name: str = "image") -> np.ndarray:
+def check_any_size(image: ArrayLike, name: str = "image", *, grey: bool = True) -> np.ndarray:
     """Return the image as an array if it is RGB or grey, uint8 and not empty, of whatever size.
 
     Args:
         image: (h, w, 3) uint8 RGB, or (h, w) uint8.
         name: What to call it in a message.
+        grey: Take grey images, too.
 
     Raises:
         ImageError: it is not.
     """
     array = as_array("image", image, ImageError)
-    has_channels = array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)
+    has_channels = (grey and array.ndim == 2) or (array.ndim == 3 and array.shape[2] == 3)
     if array.dtype != np.uint8 or not has_channels or not array.size:
-        raise ImageError(f"{name} must be uint8 (h, w, 3) or (h, w), got {array.dtype} of shape {array.shape}")
+        shapes = "uint8 (h, w, 3) or (h, w)" if grey else "RGB uint8 (h, w, 3)"
+        raise ImageError(f"{name} must be {shapes}, got {array.dtype} of shape {array.shape}")
     return array
 
 

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from nuno.camera.calibration import Calibration, calibrate_camera, camera_above_table
 from nuno.camera.calibration_board import CalibrationBoard
 from nuno.camera.camera import Camera
-from nuno.camera.image import check_image, read_image
+from nuno.camera.image import check_any_size, check_image, read_image
 from nuno.camera.image_quality import check_quality
 from nuno.camera.marker_pose import find_marker
-from nuno.errors import ImageError, InvalidInputError
+from nuno.errors import InvalidInputError
 from nuno.estimate.capture_preview import preview
 from nuno.estimate.case_file import THICKNESS
 from nuno.files.whole_file import file_path, made_folder, write_whole
@@ -164,9 +164,7 @@ def capture_case(
 def _read(image: str | os.PathLike[str] | np.ndarray, name: str) -> np.ndarray:
     if not isinstance(image, np.ndarray):
         return read_image(file_path(image, name))
-    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
-        raise ImageError(f"the image {name} must be RGB uint8 (h, w, 3), got {image.dtype} of shape {image.shape}")
-    return image
+    return check_any_size(image, f"the image {name}", grey=False)
 
 
 def _check_hand(hand: np.ndarray, camera: Camera, height: float) -> None:

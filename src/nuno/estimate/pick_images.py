@@ -86,32 +86,47 @@ def find_cloth_before(
         InvalidInputError: too little is given to find the cloth before or after.
         ClothNotFoundError: no cloth in the image.
     """
-    camera, table = settings.camera, settings.table
-    other = None
-    if images.mask_before is None and (rectangle is None or images.mask_after is None):
-        if images.before is None:
-            raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
-        found = segment_before(images.before, camera, table, hint=hint, template=template)
-        if hint is None and template is None and rectangle is None:
-            other = other_cloth(images.before, found, camera, table)
-        images = replace(images, mask_before=found)
+    images, doubt = _with_mask_before(images, rectangle, hint, settings, template)
     if rectangle is None:
-        assert images.mask_before is not None
-        over = border_warning(images.mask_before, camera, table)
-        height = table.height + settings.rest_height
-        try:
-            rectangle = fit_cloth(images.mask_before, images.before, camera, height, shape)
-        except EstimationError as error:
-            raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
-        if shape == "auto" and isinstance(rectangle, ClothOutline) and over is None:
-            taken, *others = rectangle.warnings
-            taken = f"{taken}; if it is one, {why_no_rectangle(images.mask_before)}"
-            rectangle = replace(rectangle, warnings=(taken, *others))
-        odd = tuple(warning for warning in (over, other) if warning is not None)
-        rectangle = replace(rectangle, warnings=(*rectangle.warnings, *odd))
+        rectangle = _fitted(images, settings, shape)
+        if doubt is not None:
+            rectangle = replace(rectangle, warnings=(*rectangle.warnings, doubt))
     if images.mask_after is None and any(image is None for image in (images.before, images.after, images.mask_before)):
         raise InvalidInputError("both images are needed to find the cloth after, or after_mask")
     return images, rectangle
+
+
+def _with_mask_before(
+    images: PickImages, rectangle: ClothRectangle | None, hint: ArrayLike | None, settings: PickSettings,
+    template: ArrayLike | None,
+) -> tuple[PickImages, str | None]:  # fmt: skip
+    """Segment the image before unless its mask is given or nothing needs it; and warn of another possible cloth."""
+    if images.mask_before is not None or (rectangle is not None and images.mask_after is not None):
+        return images, None
+    if images.before is None:
+        raise InvalidInputError("the image before is needed, or before_mask, or rectangle and after_mask")
+    found = segment_before(images.before, settings.camera, settings.table, hint=hint, template=template)
+    is_named = hint is not None or template is not None or rectangle is not None
+    doubt = None if is_named else other_cloth(images.before, found, settings.camera, settings.table)
+    return replace(images, mask_before=found), doubt
+
+
+def _fitted(images: PickImages, settings: PickSettings, shape: str) -> ClothRectangle:
+    """Fit a rectangle or an outline to the mask before, with warnings of what the mask may not show."""
+    assert images.mask_before is not None
+    over = border_warning(images.mask_before, settings.camera, settings.table)
+    height = settings.table.height + settings.rest_height
+    try:
+        fitted = fit_cloth(images.mask_before, images.before, settings.camera, height, shape)
+    except EstimationError as error:
+        raise EstimationError(f"{error}; {over or why_no_rectangle(images.mask_before)}") from None
+    if over is not None:
+        return replace(fitted, warnings=(*fitted.warnings, over))
+    if shape == "auto" and isinstance(fitted, ClothOutline):
+        taken, *others = fitted.warnings
+        taken = f"{taken}; if it is one, {why_no_rectangle(images.mask_before)}"
+        return replace(fitted, warnings=(taken, *others))
+    return fitted
 
 
 def border_warning(mask: np.ndarray, camera: Camera, table: Table) -> str | None:

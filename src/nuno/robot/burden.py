@@ -51,30 +51,30 @@ class Burden:
         self._frames = 0
         self._still = 0  # looks since anything changed
         self._last: tuple[frozenset[int], float] = (frozenset(), -np.inf)
-        self._over: tuple[str, ...] = ()
+        self._overloaded: tuple[str, ...] = ()
         self._unbalanced: Unbalance | None = None
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
 
     def after_frame(self, state: RobotState, met: Collision | None) -> RobotState:
         """Return a state with what was found of it after a frame, and what its motion would run into."""
         self._frames += 1
         if self._frames >= EVERY - 1:
             self._look(state)
-        if met is None and not self._over and self._unbalanced is None:
+        if met is None and not self._overloaded and self._unbalanced is None:
             return state
-        return replace(state, over_torque=self._over, unbalanced=self._unbalanced, collision=met)
+        return replace(state, over_torque=self._overloaded, unbalanced=self._unbalanced, collision=met)
 
     def forget(self) -> None:
         """Begin anew: the robot was put elsewhere."""
-        self._last, self._over, self._unbalanced, self._still = (frozenset(), -np.inf), (), None, 0
+        self._last, self._overloaded, self._unbalanced, self._still = (frozenset(), -np.inf), (), None, 0
 
     def save(self) -> tuple[Any, ...]:
         """Return what it has found, for ``load``."""
-        return self._frames, self._still, self._last, self._over, self._unbalanced
+        return self._frames, self._still, self._last, self._overloaded, self._unbalanced
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Go on from what was found then."""
-        self._frames, self._still, self._last, self._over, self._unbalanced = saved
+        self._frames, self._still, self._last, self._overloaded, self._unbalanced = saved
 
     def _look(self, state: RobotState) -> None:
         loaded = any(body.is_dynamic for body in self._links.world.bodies)
@@ -87,18 +87,18 @@ class Burden:
         if prepares:
             self._sensors.follow_loads()  # a look takes what has changed since the frame before
             return
-        told = self._sensors.read(state)
+        readings = self._sensors.read(state)
         soles = self._sensors.soles
         if soles is not None and abs(float(soles[:, :, 2].min()) - self._sensors.ground) > LEVEL:
             self._sensors.ground = float(soles[:, :, 2].min())
-            told = self._sensors.read(state)
-        over = frozenset(np.flatnonzero(np.abs(told.torques) > self._limits).tolist())
-        outside = -np.inf if soles is None else self._outside(soles, told.zero_moment_point)
+            readings = self._sensors.read(state)
+        over = frozenset(np.flatnonzero(np.abs(readings.torques) > self._limits).tolist())
+        outside = -np.inf if soles is None else self._outside(soles, readings.zero_moment_point)
         last, self._last = self._last, (over, outside)
         both = over & last[0]
-        self._over = tuple(self._robot.joint_names[k] for k in sorted(both)) if both else ()
+        self._overloaded = tuple(self._robot.joint_names[k] for k in sorted(both)) if both else ()
         if both:
-            self._tell_torques(told.torques)
+            self._tell_torques(readings.torques)
         if min(outside, last[1]) <= TIPPING:
             self._unbalanced = None
         elif self._unbalanced is None:
@@ -111,10 +111,10 @@ class Burden:
             self._unbalanced = replace(self._unbalanced, distance=outside)
 
     def _tell_torques(self, torques: np.ndarray) -> None:
-        new = [name for name in self._over if name not in self._told]
+        new = [name for name in self._overloaded if name not in self._warned]
         if not new:
             return
-        self._told.update(new)
+        self._warned.update(new)
         rows = [self._robot.joint_index(name) for name in new]
         most = max(rows, key=lambda row: abs(torques[row]) / self._limits[row])
         logger.warning(

@@ -26,11 +26,11 @@ class CameraInterface(JointInterface):
             RobotModelError: no images come of it.
             RobotTimeoutError: none came in time.
         """
-        raise RobotModelError(f"{self.robot.name!r} shows no images of {self._known_camera(camera)!r}")
+        raise RobotModelError(f"{self.robot.name!r} shows no images of {self._checked_camera(camera)!r}")
 
     def read_depth(self, camera: str) -> ImageReading:
         """Return a fresh depth image of a camera; raises as ``read_image``."""
-        raise RobotModelError(f"{self.robot.name!r} shows no depths of {self._known_camera(camera)!r}")
+        raise RobotModelError(f"{self.robot.name!r} shows no depths of {self._checked_camera(camera)!r}")
 
     def read_images(self, cameras: Sequence[str]) -> dict[str, ImageReading]:
         """Return fresh images of several cameras, by name, of one time where the robot takes them so."""
@@ -63,13 +63,13 @@ class CameraInterface(JointInterface):
         Raises:
             UnknownNameError: the robot has no such camera.
         """
-        name = self._known_camera(camera)
+        name = self._checked_camera(camera)
         self.update_robot_state()
         return self.robot.camera(name)
 
     # Inside
 
-    def _known_camera(self, camera: str) -> str:
+    def _checked_camera(self, camera: str) -> str:
         if camera not in self.robot.description.cameras:
             raise UnknownNameError("camera", camera, list(self.robot.description.cameras))
         return camera

@@ -55,7 +55,7 @@ class CaptureStep:
         goal: (3,) to where: x, y [m], yaw [rad].
         height: Of the centre of mass above the soles [m], before.
         landed: When it met the ground [s], or None.
-        is_over: Whether the robot stands again.
+        is_finished: Whether the robot stands again.
         count: How many steps were made for the same push.
     """
 
@@ -66,7 +66,7 @@ class CaptureStep:
     goal: np.ndarray
     height: float
     landed: float | None = None
-    is_over: bool = False
+    is_finished: bool = False
     count: int = 1
 
     def share(self, time: float) -> float:
@@ -124,11 +124,11 @@ class Pendulum:
         side = 1.0 if foot == 0 else -1.0
         far = math.hypot(x, y)
         x *= 1.0 + PAST / max(far, PAST)
-        wide = side * y * (1.0 + PAST / max(far, PAST))
+        lateral = side * y * (1.0 + PAST / max(far, PAST))
         reach, least, most = FARTHEST * self.height, self.stance, WIDEST * self.height
-        ahead, aside = min(max(x, -reach), reach), min(max(wide, least), most)
+        ahead, aside = min(max(x, -reach), reach), min(max(lateral, least), most)
         # nearer than the usual stance is no loss: the capture point lies between the feet then
-        missing = math.hypot(x - ahead, ASIDE * (max(wide - aside, 0.0) + max(-wide, 0.0)))
+        missing = math.hypot(x - ahead, ASIDE * (max(lateral - aside, 0.0) + max(-lateral, 0.0)))
         return moved(stance, np.array([ahead, side * aside, 0.0])), missing
 
 
@@ -175,5 +175,5 @@ def carried_on(step: CaptureStep, pendulum: Pendulum, touches: bool, time: float
             return replace(step, goal=goal)
         return step
     if time - step.landed > RESTS and float(np.linalg.norm(pendulum.speed)) < STILL:
-        return replace(step, is_over=True)
+        return replace(step, is_finished=True)
     return step

@@ -16,7 +16,7 @@ LIGHT = 0.05
 """[kg] Less than this is not counted."""
 SMOOTH = 0.1
 """[s] In which a force on a link is taken for that of a load: what is swung pulls to and fro."""
-GONE = 1e-3
+NEGLIGIBLE = 1e-3
 """[N, N m] Smaller ones are forgotten."""
 
 
@@ -71,4 +71,4 @@ def smoothed(before: np.ndarray | None, now: np.ndarray | None, span: float) -> 
         return None
     was = 0.0 if before is None else before
     found = was + (1.0 - np.exp(-span / SMOOTH)) * ((0.0 if now is None else now) - was)
-    return found if np.abs(found).max() > GONE else None
+    return found if np.abs(found).max() > NEGLIGIBLE else None

@@ -65,8 +65,8 @@ def _crossings(
     """Return where lines along an axis cross triangles (k,) [m], and which lines (k,)."""
     corners = x[faces]
     flat = corners[:, :, across]
-    beside = ((flat.max(axis=1) < lines.min(axis=0)) | (flat.min(axis=1) > lines.max(axis=0))).any(axis=1)
-    corners, flat = corners[~beside], flat[~beside]
+    apart = ((flat.max(axis=1) < lines.min(axis=0)) | (flat.min(axis=1) > lines.max(axis=0))).any(axis=1)
+    corners, flat = corners[~apart], flat[~apart]
     a, u, v = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     real = np.abs(area) > 1e-12

@@ -26,7 +26,7 @@ def controller_groups(robot: Humanoid) -> dict[str, tuple[str, ...]]:
         InvalidInputError: a joint is in two groups.
     """
     if robot.description.groups:
-        return _listed(robot)
+        return _groups_of(robot)
     ends = {limb: role for limb, role in LIMBS.items() if role in robot.description.frames}
     if not ends:
         return {"fullbody_controller": robot.joint_names} if robot.joint_names else {}
@@ -51,7 +51,7 @@ def controller_groups(robot: Humanoid) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _listed(robot: Humanoid) -> dict[str, tuple[str, ...]]:
+def _groups_of(robot: Humanoid) -> dict[str, tuple[str, ...]]:
     found, taken = {}, dict[str, str]()
     for group, joints in robot.description.groups.items():
         for joint in joints:

@@ -25,7 +25,7 @@ from nuno.errors import (
 from nuno.shapes import quaternion as quat
 from nuno.validation import count, finite_array, number
 
-KNOWN_ROBOTS = Path(__file__).with_name("robots.toml")
+ROBOT_TABLE = Path(__file__).with_name("robots.toml")
 ENTRY = ("urdf", "srdf", "posture", "frames", "feet", "cameras", "hands", "groups", "velocity_limits")
 """Entries of a robot's table; ``robots.toml`` explains them."""
 FileName = str | os.PathLike[str]
@@ -142,7 +142,7 @@ def find_description(
         urdf = Path(name).resolve()
         made = RobotDescription(urdf.stem, urdf, None, given or tuple(urdf.parents[:5]))
     else:
-        made = _in_table(str(name), KNOWN_ROBOTS if robots is None else Path(robots), given)
+        made = _in_table(str(name), ROBOT_TABLE if robots is None else Path(robots), given)
     if srdf is not None:
         made = RobotDescription(**{**vars(made), "srdf": Path(srdf)})
     for what, path in (("URDF", made.urdf), ("SRDF", made.srdf)):
@@ -234,8 +234,8 @@ def _joints(group: str, given: Any) -> tuple[str, ...]:
 
 
 def _placed(name: str, folder: Path) -> Path:
-    beside = folder / name
-    return beside if beside.is_file() else robot_data() / name
+    sibling = folder / name
+    return sibling if sibling.is_file() else robot_data() / name
 
 
 def _check_meshes(robot: RobotDescription) -> None:

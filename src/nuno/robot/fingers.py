@@ -127,7 +127,7 @@ class FingerBodies:
         self._inward = np.array([finger.inward for _, finger in pairs]).reshape(-1, 3)
         self._moved = [finger for _, finger in pairs]
         self._joints = sorted({finger.row for finger in self._moved})
-        self._known: tuple[list[float], np.ndarray] | None = None  # joints' positions, and offsets
+        self._cached: tuple[list[float], np.ndarray] | None = None  # joints' positions, and offsets
 
     def offset(self, offsets: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """Return where bodies are in the frames of their joints (..., n, 3) [m], from where they are with open hands.
@@ -143,12 +143,12 @@ class FingerBodies:
             slides = np.stack([finger.slide(angles) for finger in self._moved], axis=-1)
             all_moved[:, self._rows] += slides[..., None] * self._inward
             return all_moved
-        now, known = [angles[row] for row in self._joints], self._known
-        if known is not None and known[0] == now:
-            return known[1]
+        now, cached = [angles[row] for row in self._joints], self._cached
+        if cached is not None and cached[0] == now:
+            return cached[1]
         moved = offsets.copy()
         moved[self._rows] += np.array([finger.slide(angles) for finger in self._moved])[:, None] * self._inward
-        self._known = now, moved
+        self._cached = now, moved
         return moved
 
     def of_hand(self, hand: str) -> list[list[int]]:

@@ -21,7 +21,7 @@ NEAR = 1e-4
 """[m, rad] Feet so near to their places make no step."""
 SOLE_GAP = 0.01
 """[m] Least distance between soles."""
-MOST_STEPS = 100
+MAX_STEPS = 100
 """Of one walk: each takes some 50 ms to plan, and much can happen in the minutes that it takes."""
 SLACK = 1e-9
 """By which rounding may make a step longer than its limit."""
@@ -89,7 +89,7 @@ def footsteps_to(
     plans = [plan for way in ways if (plan := _steps_of(way, feet, stride, soles)) is not None]
     if not plans:
         far = f"{distance:.1f} m take more"
-        raise WalkError(f"a walk has at most {MOST_STEPS} steps, and {far}: go there in several walks")
+        raise WalkError(f"a walk has at most {MAX_STEPS} steps, and {far}: go there in several walks")
     fewest = min(plans, key=lambda plan: len(plan))
     return tuple(fewest)
 
@@ -112,7 +112,7 @@ def _steps_of(
                 now[step.foot] = step.pose
     if not steps and _not_in_stance(now, stride):
         return None
-    return steps if len(steps) <= MOST_STEPS else None
+    return steps if len(steps) <= MAX_STEPS else None
 
 
 def footsteps_along(
@@ -130,18 +130,18 @@ def footsteps_along(
         soles: As in ``footsteps_to``.
 
     Raises:
-        WalkError: more than ``MOST_STEPS`` steps.
+        WalkError: more than ``MAX_STEPS`` steps.
     """
     opening = twist[1] / stride.side_step + twist[2] / stride.turn_step
     leading = LEFT if opening >= 0.0 else RIGHT
     first = leading if first is None else first
     count = max(count, _fewest(twist, stride, first == leading))
-    if count > MOST_STEPS:
-        raise WalkError(f"a walk has at most {MOST_STEPS} steps, and that takes more: go there in several walks")
+    if count > MAX_STEPS:
+        raise WalkError(f"a walk has at most {MAX_STEPS} steps, and that takes more: go there in several walks")
     most = 3 * count + 3  # soles that are near each other from the start do not come apart by shorter steps
     while True:
         steps = _steps(twist, feet, stride, count, first, leading)
-        if soles is None or count >= most or least_gap(steps, feet, soles) >= SOLE_GAP:
+        if soles is None or count >= most or min_gap(steps, feet, soles) >= SOLE_GAP:
             return steps
         count += 1
 
@@ -156,10 +156,10 @@ def steps_of_velocity(velocity: np.ndarray, seconds: float, stride: Stride) -> i
     # of a long walk at that velocity, so that the limit does not depend on how long it takes
     share = _share(velocity * stride.step_time, stride, 1.0, 0.5)
     if share > 1.0 + SLACK:
-        largest = (np.trunc(1000.0 * velocity / share) / 1000.0).tolist()
+        fastest = (np.trunc(1000.0 * velocity / share) / 1000.0).tolist()
         raise InvalidInputError(
             f"the velocity {velocity.tolist()} [m/s, m/s, rad/s] is faster than the stride allows; that way at most "
-            f"{largest}"
+            f"{fastest}"
         )
     return max(count, _fewest(velocity * seconds, stride, True))
 
@@ -198,13 +198,13 @@ def middle_of(feet: np.ndarray) -> np.ndarray:
     return np.array([*(0.5 * (left[:2] + right[:2])), left[2] + 0.5 * turn])
 
 
-def least_gap(steps: Sequence[Footstep], feet: np.ndarray, soles: Sequence[np.ndarray]) -> float:
+def min_gap(steps: Sequence[Footstep], feet: np.ndarray, soles: Sequence[np.ndarray]) -> float:
     """Return how near the soles come to each other [m], of all stances after a step."""
-    now, least = feet.copy(), np.inf
+    now, gap = feet.copy(), np.inf
     for step in steps:
         now[step.foot] = step.pose
-        least = min(least, sole_gap(now, soles))
-    return least
+        gap = min(gap, sole_gap(now, soles))
+    return gap
 
 
 def sole_gap(feet: np.ndarray, sizes: Sequence[np.ndarray]) -> float:
@@ -250,7 +250,7 @@ def _leads(count: int, starts: bool) -> int:
 
 def _fewest(twist: np.ndarray, stride: Stride, starts: bool) -> int:
     count = 1 if starts or not np.any(twist[1:]) else 2
-    while count <= MOST_STEPS and _share(twist, stride, count, max(_leads(count, starts), 1)) > 1.0 + SLACK:
+    while count <= MAX_STEPS and _share(twist, stride, count, max(_leads(count, starts), 1)) > 1.0 + SLACK:
         count += 1
     return count
 

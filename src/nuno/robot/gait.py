@@ -98,7 +98,7 @@ class Gait:
         walk = self.walk
         if walk is None:
             return -math.inf
-        return self._start + (walk.known_until if isinstance(walk, RunningWalk) else float(walk.times[-1]))
+        return self._start + (walk.computed_until if isinstance(walk, RunningWalk) else float(walk.times[-1]))
 
     def ahead(self, clock: np.ndarray) -> np.ndarray:
         """Return the configurations (k, nq) of the walk under way at times (k,) [s]; nothing changes."""

@@ -52,7 +52,7 @@ class Soles:
             self._sums[k, 0, own], self._sums[k, 1, own], self._sums[k, 2, own] = 1.0, arms[k, :, 1], -arms[k, :, 0]
         # which corners push when nothing is known, and nothing of how much where feet have no size
         everywhere = np.ones(4 * feet, dtype=bool)
-        self._pushing, self._levels, self._spread = everywhere, np.zeros((4 * feet, 3)), np.zeros((3 * feet, 3))
+        self._pushing, self._levels, self._distribution = everywhere, np.zeros((4 * feet, 3)), np.zeros((3 * feet, 3))
         self._take_as_pushing(everywhere)
 
     def share(self, force: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +90,7 @@ class Soles:
         for _ in range(GUESSES):
             pushing = self._levels @ wanted > 0.0
             if (pushing == self._pushing).all():
-                return (self._spread @ wanted).reshape(-1, 3)
+                return (self._distribution @ wanted).reshape(-1, 3)
             if not self._take_as_pushing(pushing):
                 break
         self._take_as_pushing(np.ones(len(pushing), dtype=bool))
@@ -106,5 +106,5 @@ class Soles:
             return False
         inverse = np.linalg.inv(square)
         self._pushing, self._levels = pushing, self._balance.T @ inverse
-        self._spread = (self._sums[:, :, pushing] @ some.T @ inverse).reshape(-1, 3)
+        self._distribution = (self._sums[:, :, pushing] @ some.T @ inverse).reshape(-1, 3)
         return True

@@ -76,7 +76,7 @@ class HeadCameras:
         self._instead = _visual_bodies(links) if looks == "visual" else {}
         self._last = -np.inf
         self._coming: deque[tuple[float, dict[str, Picture]]] = deque()
-        self._told: tuple[float, dict[str, Picture]] | None = None
+        self._delivered: tuple[float, dict[str, Picture]] | None = None
 
     @checked
     def camera(self, name: str) -> Camera:
@@ -101,18 +101,18 @@ class HeadCameras:
         world = self.links.world
         with world.lock:
             now = world.time
-            if self._told is not None and now < self._last - EARLY:
+            if self._delivered is not None and now < self._last - EARLY:
                 self._coming.clear()  # a world that was restored
-                self._told, self._taken = None, 0
+                self._delivered, self._taken = None, 0
             self._last = now
-            newest = self._coming[-1] if self._coming else self._told
+            newest = self._coming[-1] if self._coming else self._delivered
             due = newest is None or self._rate is None or now >= newest[0] + 1.0 / self._rate - EARLY
             if due:
                 self._coming.append((now, self._take()))
-        while self._coming and (self._told is None or self._coming[0][0] + self._latency <= now + EARLY):
-            self._told = self._coming.popleft()
-        assert self._told is not None
-        return self._told[1]
+        while self._coming and (self._delivered is None or self._coming[0][0] + self._latency <= now + EARLY):
+            self._delivered = self._coming.popleft()
+        assert self._delivered is not None
+        return self._delivered[1]
 
     def look_from(self, camera: Camera) -> Picture:
         """Return a picture from a camera anywhere, with the same light, patterns and looks, taken now."""

@@ -68,8 +68,8 @@ class Humanoid(Coordinates):
         self.joint_names: tuple[str, ...] = tuple(self.model.names[j] for j in joints)
         self._index = {joint: k for k, joint in enumerate(self.joint_names)}
         self._rows = np.array([self.model.joints[j].idx_q for j in joints], dtype=int)
-        self._turns_freely = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
-        self._free = np.flatnonzero(self._turns_freely)
+        self._is_continuous = np.array([self.model.joints[j].nq == 2 for j in joints], dtype=bool)
+        self._free = np.flatnonzero(self._is_continuous)
         assume_limits(self.model, self.name, self.is_slide, self.description.velocity_limits)
         self._add_frames()
         self.data, self.scratch = self.model.createData(), self.model.createData()  # of now, and for what might be
@@ -135,8 +135,8 @@ class Humanoid(Coordinates):
     @cached_property
     def joint_limits(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper limits, (n,) float [rad; m for slides] each; infinite for joints that turn freely."""
-        lower = np.where(self._turns_freely, -np.inf, self.model.lowerPositionLimit[self._rows])
-        upper = np.where(self._turns_freely, np.inf, self.model.upperPositionLimit[self._rows])
+        lower = np.where(self._is_continuous, -np.inf, self.model.lowerPositionLimit[self._rows])
+        upper = np.where(self._is_continuous, np.inf, self.model.upperPositionLimit[self._rows])
         return lower, upper
 
     @cached_property

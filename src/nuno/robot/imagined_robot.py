@@ -181,11 +181,11 @@ class ImaginedRobot:
             return
         aims = [own.begin(end, span, servo) for own in self._motions]
         if span > 0.0:
-            told = [
+            commands = [
                 self.balance.command(state, aim, span, self._servo)
                 for state, aim in zip(self._states, aims, strict=True)
             ]
-            self.balance.dynamics.drive(*(np.array(part) for part in zip(*told, strict=True)))
+            self.balance.dynamics.drive(*(np.array(part) for part in zip(*commands, strict=True)))
             self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
 
     def end_frame(self) -> None:

@@ -19,8 +19,8 @@ from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.robot.controller_client import Controller, ControllerClient
 from nuno.robot.controller_groups import controller_groups
 from nuno.robot.goal import Goal, Tolerances
-from nuno.robot.known_joints import Angles, KnownJoints
 from nuno.robot.limb_controllers import LimbControllers
+from nuno.robot.reported_joints import Angles, ReportedJoints
 from nuno.robot.trajectory import JointTrajectory, passing_velocities
 from nuno.shapes.path import minimum_jerk
 from nuno.validation import checked, finite_array, number
@@ -33,11 +33,11 @@ logger = logging.getLogger(__name__)
 STILL = (np.deg2rad(0.1), 0.01)
 """[rad], [m] Changes of hinges and slides that count as none when the shortest time is worked out."""
 INTERPOLATIONS = ("linear", "minjerk")
-MOST_POINTS = 100_000
+MAX_POINTS = 100_000
 """That an interpolation makes; a minute at 1 kHz has 60,000."""
 
 
-class JointInterface(LimbControllers, KnownJoints):
+class JointInterface(LimbControllers, ReportedJoints):
     """The joints of a robot and the controllers that move them.
 
     Angle vectors are (n,) [rad; m for slides] in the order of ``robot.joint_names``; where one is sent, a mapping from
@@ -241,7 +241,7 @@ class JointInterface(LimbControllers, KnownJoints):
             UnknownNameError: there is no such controller.
         """
         longest = number("timeout", timeout, low=0.0)
-        clients = self._known_clients(controller_type)
+        clients = self._checked_clients(controller_type)
         for client in clients:
             client.wait_for_result(longest)
         return [client.is_interpolating() for client in clients]
@@ -253,7 +253,7 @@ class JointInterface(LimbControllers, KnownJoints):
         Raises:
             UnknownNameError: there is no such controller.
         """
-        return any(client.is_interpolating() for client in self._known_clients(controller_type))
+        return any(client.is_interpolating() for client in self._checked_clients(controller_type))
 
     def is_moving(self, controller_type: str | None = None) -> bool:
         """Return True if a controller follows a goal, whoever sent it.
@@ -261,7 +261,7 @@ class JointInterface(LimbControllers, KnownJoints):
         Raises:
             UnknownNameError: there is no such controller.
         """
-        return any(self.is_busy(client.controller) for client in self._known_clients(controller_type))
+        return any(self.is_busy(client.controller) for client in self._checked_clients(controller_type))
 
     @checked
     def cancel_angle_vector(self, controller_type: str | None = None) -> None:
@@ -273,7 +273,7 @@ class JointInterface(LimbControllers, KnownJoints):
         Raises:
             UnknownNameError: there is no such controller.
         """
-        for client in self.controller_actions if controller_type is None else self._known_clients(controller_type):
+        for client in self.controller_actions if controller_type is None else self._checked_clients(controller_type):
             client.cancel_all_goals()
 
     @checked
@@ -340,7 +340,7 @@ class JointInterface(LimbControllers, KnownJoints):
             return None
         return self.controller_table[name]
 
-    def _known_clients(self, controller_type: str | None) -> list[ControllerClient]:
+    def _checked_clients(self, controller_type: str | None) -> list[ControllerClient]:
         name = controller_type or self.controller_type
         if name not in self.controller_table:
             raise UnknownNameError("controller", name, list(self.controller_table))
@@ -353,8 +353,8 @@ class JointInterface(LimbControllers, KnownJoints):
         if interpolation not in INTERPOLATIONS:
             raise InvalidInputError(f"interpolation must be one of {INTERPOLATIONS}, got {interpolation!r}")
         wanted = duration / number("interpolation_dt", interpolation_dt, above=0.0)
-        if wanted > MOST_POINTS:
-            raise InvalidInputError(f"interpolation_dt makes {wanted:.3g} points, at most {MOST_POINTS} are sent")
+        if wanted > MAX_POINTS:
+            raise InvalidInputError(f"interpolation_dt makes {wanted:.3g} points, at most {MAX_POINTS} are sent")
         count = max(1, int(wanted + 1e-9))
         s = np.arange(1, count + 1) / count
         if interpolation == "minjerk":

@@ -118,12 +118,12 @@ class LegMotion:
                     break
             else:
                 step = np.linalg.lstsq(self._jacobian, self._error, rcond=None)[0]
-            largest = np.abs(step).max()
-            if not np.isfinite(largest):
+            max_step = np.abs(step).max()
+            if not np.isfinite(max_step):
                 break
-            self._step[self._columns] = step * min(1.0, LONGEST_STEP / max(largest, 1e-12))
+            self._step[self._columns] = step * min(1.0, LONGEST_STEP / max(max_step, 1e-12))
             q = pin.integrate(self.model, q, self._step)
-            if largest < SMALL:
+            if max_step < SMALL:
                 return q
         time = begin + k * TICK
         raise WalkError(

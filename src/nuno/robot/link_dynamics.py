@@ -34,7 +34,7 @@ SETTLES = 0.03
 """[s] In which a motor that follows a velocity comes to it,"""
 HOLDS = 0.1
 """[s] and to its position."""
-MOST_WEIGHT = 1.5
+MAX_WEIGHT = 1.5
 """Times its weight that a body which moves is taken to load a link with."""
 RUBS = 5e-3
 """[rad/s or m/s] From which on a motor overcomes all of its joint's friction."""
@@ -248,12 +248,12 @@ class LinkDynamics:
         """
         gravity, own = float(np.linalg.norm(self.world.gravity)), set(self.bodies)
         found: dict[str, np.ndarray] = {}
-        for link, touched in contacts.items():
-            for name, force in () if link in feet else touched.items():
+        for link, forces in contacts.items():
+            for name, force in () if link in feet else forces.items():
                 other = self.world.find(name)
                 if other in own or not other.is_dynamic:
                     continue
-                most = MOST_WEIGHT * float(np.min(other.mass)) * gravity
+                most = MAX_WEIGHT * float(np.min(other.mass)) * gravity
                 share = min(1.0, most / float(np.linalg.norm(force)))
                 found[link] = found.get(link, 0.0) + share * force
         return found

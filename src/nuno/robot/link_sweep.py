@@ -23,7 +23,7 @@ DEEP = 5e-3
 """[m] Up to which links may go into something: a hand that rests on a table, hulls that are larger than the links."""
 DEEPER = 2e-3
 """[m] Likewise, beyond where it began, of a link that is in something when the motion begins."""
-LEAST = 1e-3
+MIN_ADVANCE = 1e-3
 """[m] By which a pair is looked at anew at least."""
 
 
@@ -96,10 +96,10 @@ class _Pair:
     def allowed(self, inside: Inside) -> float:
         """Return how deep [m] the link may go, deeper where it is in the obstacle already, and take note of that."""
         depth, pair = -self.distance(0, 0.0)[0], (self.link, self.obstacle.body)
-        if depth > DEEP + LEAST:
+        if depth > DEEP + MIN_ADVANCE:
             return inside.setdefault(pair, depth + DEEPER)
         inside.pop(pair, None)
-        return DEEP if depth <= DEEP else DEEP + LEAST
+        return DEEP if depth <= DEEP else DEEP + MIN_ADVANCE
 
     def entry(self, allowed: float, first: int, last: int) -> tuple[int, float, np.ndarray] | None:
         """Return after which time the link is first deeper than allowed in the obstacle, where (3,); else None.
@@ -122,7 +122,7 @@ class _Pair:
                 return (k, share, point) if share > 0.0 or k == first else (k - 1, 1.0, point)
             if at >= end:
                 return None
-            at = min(at + max(found + allowed, LEAST), end)
+            at = min(at + max(found + allowed, MIN_ADVANCE), end)
 
 
 def first_entry(
@@ -170,8 +170,8 @@ def spare_way(sweep: Sweep, shapes: StaticShapes, world: int = 0) -> float:
     for obstacle in shapes.obstacles:
         if obstacle.path is not None:
             return 0.0
-        touched = obstacle.touched[moved]
-        if not touched.any():
+        collides = obstacle.collides[moved]
+        if not collides.any():
             continue
         places, axes = obstacle.poses(sweep.times[-1:], world)
         local = (last - places[0]) @ axes[0]
@@ -179,7 +179,7 @@ def spare_way(sweep: Sweep, shapes: StaticShapes, world: int = 0) -> float:
             apart = local[:, 2]
         else:
             apart = np.linalg.norm(np.maximum(np.abs(local - obstacle.middle) - obstacle.half, 0.0), axis=1)
-        spare = min(spare, float((apart - radii)[touched].min()))
+        spare = min(spare, float((apart - radii)[collides].min()))
     return max(spare, 0.0)
 
 
@@ -191,9 +191,9 @@ def _near(sweep: Sweep, obstacle: Obstacle, places: np.ndarray, axes: np.ndarray
             "kli,ki->kl", sweep.middles - places[:, None], np.broadcast_to(normals, (len(sweep.times), 3))
         )
         near = (heights - sweep.hulls.radii).min(axis=0) < -DEEP
-        return np.flatnonzero(near & obstacle.touched)
+        return np.flatnonzero(near & obstacle.collides)
     centres = places + np.einsum("kij,j->ki", axes, obstacle.middle)
     reach = np.einsum("kij,j->ki", np.abs(axes), obstacle.half)
     low, high = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
     near = (sweep.high > low).all(axis=1) & (sweep.low < high).all(axis=1)
-    return np.flatnonzero(near & obstacle.touched)
+    return np.flatnonzero(near & obstacle.collides)

@@ -179,6 +179,6 @@ class Links:
     def _check_inside(self) -> None:
         if not self._inside:
             raise BodyStateError(f"the links of {self.robot.name!r} have left the world")
-        gone = [body.name for body in self.bodies if body._world is not self.world]
-        if gone:
-            raise BodyStateError(f"{len(gone)} links are no longer in the world, the first is {gone[0]!r}")
+        missing = [body.name for body in self.bodies if body._world is not self.world]
+        if missing:
+            raise BodyStateError(f"{len(missing)} links are no longer in the world, the first is {missing[0]!r}")

@@ -117,12 +117,12 @@ class LinkLoads:
         holding = {None if k is None else self._groups[k] for k in held_by}
         all_held = len(held_by) == len(dynamics.grips)
         near = self._near(body, x, holding.pop() if known and all_held and len(holding) == 1 else None)
-        touched = [self._index[other] for other in near if other in self._index]
-        bearing = touched + [k for k in held_by if k is not None]
+        supports = [self._index[other] for other in near if other in self._index]
+        bearing = supports + [k for k in held_by if k is not None]
         if not bearing:
             self._contacts.pop(body, None)
             return []
-        known = known and len(touched) == len(near)
+        known = known and len(supports) == len(near)
         if known and motion is not None and before is not None:
             missing = _missing(dynamics, x, before, motion, np.array(self._world.gravity))
             if all_held and len({self._groups[k] for k in bearing}) == 1:
@@ -139,12 +139,12 @@ class LinkLoads:
                 borne[3:] += own_torque + moment(point, own_force)
                 if link is not None:
                     loads.append(Load(link, point, own_force, own_torque))
-        if known and len({self._groups[k] for k in touched}) <= 1:
-            found = [self._one(touched, missing + borne)] if touched else []
+        if known and len({self._groups[k] for k in supports}) <= 1:
+            found = [self._one(supports, missing + borne)] if supports else []
         elif body in self._contacts and step == 0.0 and motion is not None:
             found = self._contacts[body]  # only a grip has changed since
         else:
-            found = self._asked(body) if touched else []
+            found = self._asked(body) if supports else []
         self._contacts[body] = found
         return loads + found
 

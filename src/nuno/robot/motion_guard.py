@@ -72,7 +72,7 @@ class MotionGuard:
         self._world = links.world if world is None else world
         self._made: tuple[LinkHulls, StaticShapes] | None = None
         self._placements: Any = None
-        self._told: set[tuple[str, str]] = set() if of is None else of._told
+        self._reported: set[tuple[str, str]] = set() if of is None else of._reported
         self._key: Any = None
         self._rests_since = -1  # the commands when nothing was left to do of them
         self._own: Any = None  # the commands after what was done here
@@ -256,8 +256,8 @@ class MotionGuard:
         hit = clock + met.time - self._world.time  # that of a frame, after which it is too late
         late = any(own.end > hit for own in self._leading(motion, met))
         self._walks_on = walked is not None and late and self._is_of_others(motion, times, walked)
-        turns_back = self.mode == "stop" and walked is not None and not self._walks_on
-        if turns_back and gait.turn_back(hit, str(met), self._meets(motion, span)):
+        goes_back = self.mode == "stop" and walked is not None and not self._walks_on
+        if goes_back and gait.turn_back(hit, str(met), self._meets(motion, span)):
             self._tell(met, "the walk ends before that")
             self._until = -np.inf  # the way is another one
             self._own = joints.commands, gait.walk
@@ -356,7 +356,7 @@ class MotionGuard:
 
     def _is_new(self, link: str, body: str) -> bool:
         """Return True once for a link and a body; never of copies, whose states tell."""
-        if (link, body) in self._told or self._of is not None:
+        if (link, body) in self._reported or self._of is not None:
             return False
-        self._told.add((link, body))
+        self._reported.add((link, body))
         return True

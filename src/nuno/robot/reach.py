@@ -32,7 +32,7 @@ POSTURE_WEIGHTS = (1e-2, 1e-3)
 """Of staying near the start, first and when the hands are near: 1e-2 holds them 1 mm away, 1e-3 does not."""
 TRUNK_SHARE = 3.0
 """Factor of that weight for joints that carry the stance or a fourth of the mass: the arms move first."""
-LARGEST_RETURN = 0.005
+MAX_RETURN = 0.005
 """[m] By which a step may have to take the centre of mass back inside."""
 STEADY_FEET = 1e-4
 """[m, rad] What a foot may have moved, of a solution."""
@@ -221,11 +221,11 @@ class _Solver:
         return ""
 
     def _error(self, data: Any) -> float:
-        largest = 0.0
+        worst = 0.0
         for frame, (goal, oriented) in self.goals.items():
             position, turn = self._error_of(data, frame, goal)
-            largest = max(largest, position / self.tolerance, turn / self.angle_tolerance if oriented else 0.0)
-        return largest
+            worst = max(worst, position / self.tolerance, turn / self.angle_tolerance if oriented else 0.0)
+        return worst
 
     def _error_of(self, data: Any, frame: str, goal: Any) -> tuple[float, float]:
         place = data.oMf[self.robot.frame_index(frame)]
@@ -260,7 +260,7 @@ def _support_limit(pink: Any, outline: np.ndarray, margin: float) -> Any:
             jacobian = pin.jacobianCenterOfMass(configuration.model, configuration.data, configuration.q)
             centre = configuration.data.com[0][:2]
             # what a step overshot, to second order, the next one takes back, if not so much that none could
-            return normals @ jacobian[:2], np.maximum(offsets - normals @ centre - margin, -LARGEST_RETURN)
+            return normals @ jacobian[:2], np.maximum(offsets - normals @ centre - margin, -MAX_RETURN)
 
     return SupportLimit()
 

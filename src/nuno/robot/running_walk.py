@@ -72,12 +72,12 @@ class RunningWalk(TimedMotion):
         self._targets = made(centre)  # of the second pass, which adds to the centre of mass tick by tick
         self._near = LegFollower(planner.legs, made(centre), q, None, begin * TICK)
         self._missed = np.zeros((n + len(control.preview_gains), 2))
-        self._known = 0  # ticks of the first pass whose zero moment points are known
+        self._computed = 0  # ticks of the first pass whose zero moment points are known
         self._second = np.zeros((n, 3, 2)), np.zeros((n, 2))
         self._second[0][0], self._second[1][0] = states[1]
         self._find_near(len(control.preview_gains) + 1)
-        known = self._missed[: self._known]
-        known[:] = control.joined(known, states[1][0])
+        computed = self._missed[: self._computed]
+        computed[:] = control.joined(computed, states[1][0])
         self._found = LegFollower(planner.legs, self._targets, self._near.found[0], self._near.found, begin * TICK)
         self.configurations = self._found.found
         self.velocities, self.accelerations = (np.zeros((n, self.model.nv)) for _ in range(2))
@@ -102,7 +102,7 @@ class RunningWalk(TimedMotion):
         return self._schedule
 
     @property
-    def known_until(self) -> float:
+    def computed_until(self) -> float:
         """The time [s] up to which all is worked out, and the tick after it."""
         return float(self.times[-1] if self._done == len(self.times) else self.times[max(self._done - 2, 0)])
 
@@ -147,22 +147,22 @@ class RunningWalk(TimedMotion):
 
     def _find_near(self, tick: int) -> None:
         """Find the first pass up to a tick, and what its zero moment points miss."""
-        n, done = len(self.times), self._known
+        n, done = len(self.times), self._computed
         while self._near.count <= min(tick, n - 1):
             self._near.step()
-        known = n if self._near.count == n else self._near.count - 1
-        if known == done:
+        computed = n if self._near.count == n else self._near.count - 1
+        if computed == done:
             return
-        low, high = max(done - 1, 0), min(known + 1, n)
+        low, high = max(done - 1, 0), min(computed + 1, n)
         q = self._near.found[low:high]
         motion = (q, *motion_of(self.model, q, TICK))
         points = zero_moments(self.model, self.planner.legs.data, motion, self.planner.floor)[0]
-        self._missed[done:known] = self._wanted.point[done:known] - points[done - low : known - low]
+        self._missed[done:computed] = self._wanted.point[done:computed] - points[done - low : computed - low]
         if done == 0:
             self._missed[0] = self._missed[1]  # accelerations at the ends are not known
-        if known == n:
+        if computed == n:
             self._missed[n - 1 :] = self._missed[n - 2]
-        self._known = known
+        self._computed = computed
 
     def _find(self, tick: int) -> None:
         """Find the second pass up to a tick."""

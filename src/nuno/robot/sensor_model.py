@@ -81,7 +81,7 @@ class Channel:
         """Begin anew, with the same noise."""
         self._random = np.random.default_rng(self._start)
         self._coming: deque[tuple[float, Any]] = deque()
-        self._told: tuple[float, Any] | None = None
+        self._delivered: tuple[float, Any] | None = None
         self._next, self._last = -np.inf, -np.inf
 
     def read(self, time: float, truth: Any) -> tuple[float, Any]:
@@ -105,10 +105,10 @@ class Channel:
                 # on a grid of its own, whatever the ticks are; a tick that comes late does not shift it
                 start = time if self._next == -np.inf else self._next
                 self._next = start + period * max(1.0, np.floor((time - start + EARLY) / period) + 1.0)
-        while self._coming and (self._told is None or self._coming[0][0] + self.model.latency <= time + EARLY):
-            self._told = self._coming.popleft()
-        assert self._told is not None
-        return self._told
+        while self._coming and (self._delivered is None or self._coming[0][0] + self.model.latency <= time + EARLY):
+            self._delivered = self._coming.popleft()
+        assert self._delivered is not None
+        return self._delivered
 
     def _sample(self, truth: Any) -> Any:
         value = truth + self._bias if self._biased else truth

@@ -157,7 +157,7 @@ class Sensors:
         pin.updateGlobalPlacements(model, data)
         if state.joint_wrenches is not None and state.torques is not None:
             point, pressed = self._feel(state, state.joint_wrenches)
-            return self._told(state.time, self._all_read(state, state.torques, {}, point, pressed))
+            return self._readings(state.time, self._all_read(state, state.torques, {}, point, pressed))
         self._acting[:] = 0.0
         base = self._axes[1]
         force, torque = base @ self._lacking[:3], base @ self._lacking[3:]
@@ -171,7 +171,7 @@ class Sensors:
         if standing or loads:
             torques = pin.rnea(model, data, state.q, state.v, state.a, self._external)
         torques = torques[6:] if state.torques is None else state.torques
-        return self._told(state.time, self._all_read(state, torques, before, point, pressed))
+        return self._readings(state.time, self._all_read(state, torques, before, point, pressed))
 
     @property
     def soles(self) -> np.ndarray | None:
@@ -327,13 +327,13 @@ class Sensors:
         exact = SensorModel()
         return {name: Channel(name, models.get(name, exact), size, seed) for name, size in sizes.items()}
 
-    def _told(self, time: float, read: dict[str, Any]) -> Readings:
+    def _readings(self, time: float, read: dict[str, Any]) -> Readings:
         sampled = dict.fromkeys(self._channels, time)
         for name, channel in self._inexact.items():
             if name == "orientation":
                 # the true turn goes along: what is told late is how it was turned then
                 sampled[name], turned = channel.read(time, _Turned(read[name]))
-                read[name] = turned.told()
+                read[name] = turned.quaternion()
             else:
                 sampled[name], read[name] = channel.read(time, read[name])
         if self._imu is None:
@@ -356,7 +356,7 @@ class _Turned:
     def __add__(self, error: np.ndarray) -> _Turned:
         return _Turned(self.turn, error if self.error is None else self.error + error)
 
-    def told(self) -> np.ndarray:
+    def quaternion(self) -> np.ndarray:
         """Return the quaternion (4,), (w, x, y, z)."""
         if self.error is None:
             return self.turn

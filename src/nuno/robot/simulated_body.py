@@ -81,7 +81,7 @@ class SimulatedBody(SimulatedSenses):
         with self.world.lock:
             self.balance.dynamics.attach()
             for gripper in self.grippers.values():
-                gripper.press_again()
+                gripper.close_again()
             self._arrive_within(np.inf)  # as on robots with motors, goals without tolerances end with their time
 
     def detach(self) -> None:

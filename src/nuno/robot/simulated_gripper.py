@@ -104,7 +104,7 @@ class SimulatedGripper:
             return
         goal.finish(GoalStatus.SUCCEEDED, ResultCode.SUCCESSFUL)
 
-    def press_again(self) -> None:
+    def close_again(self) -> None:
         """Close anew on what the hand held before its robot was given dynamics: its fingers press on it now."""
         if self.hand.presses and self.hand.grips:
             self.hand.open()

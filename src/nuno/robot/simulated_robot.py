@@ -183,9 +183,9 @@ class SimulatedRobot(SimulatedBody):
 
     def read_joint_state(self) -> JointState:
         """Return the joints as their sensors tell."""
-        told = self.read()
+        read = self.read()
         return JointState(
-            told.sampled["positions"], self.actual.joint_names, told.positions, told.velocities, told.torques
+            read.sampled["positions"], self.actual.joint_names, read.positions, read.velocities, read.torques
         )
 
     def read_reference(self) -> JointState:
@@ -199,7 +199,7 @@ class SimulatedRobot(SimulatedBody):
     ) -> Goal:
         """Send a trajectory to a controller, to start ``start_time`` [s] from now; see ``RobotInterface``."""
         with self.world.lock:
-            name = self._known(controller)
+            name = self._controller_name(controller)
             taken = "the robot walks" if self.gait.moves(name) else "its joints are under a servo command"
             if self.gait.moves(name) or self._servo_has(name):
                 goal = Goal(trajectory)
@@ -210,12 +210,12 @@ class SimulatedRobot(SimulatedBody):
     def cancel_trajectories(self, controller: Controller) -> None:
         """Let a controller give up what it does, and hold the joints where they are."""
         with self.world.lock:
-            self.joints.cancel(self._known(controller))
+            self.joints.cancel(self._controller_name(controller))
 
     def is_busy(self, controller: Controller) -> bool:
         """Return True if a controller follows a goal."""
         with self.world.lock:
-            return self.joints.controllers[self._known(controller)].is_busy
+            return self.joints.controllers[self._controller_name(controller)].is_busy
 
     @checked
     def servo(self, command: ServoCommand | None) -> None:
@@ -244,7 +244,7 @@ class SimulatedRobot(SimulatedBody):
         loads = self.loads.read() if any(own.is_dynamic for own in self.world.bodies) else ()
         return external_forces(self.links, loads) if loads else None
 
-    def _known(self, controller: Controller) -> str:
+    def _controller_name(self, controller: Controller) -> str:
         name = controller["controller_type"]
         if name not in self.joints.controllers:
             raise UnknownNameError("controller", name, list(self.joints.controllers))

@@ -65,8 +65,8 @@ class SimulatedSenses(RobotInterface):
         """
         if "imu" not in self.actual.description.frames:
             raise RobotModelError(f"{self.actual.name!r} has no inertial measurement unit")
-        told = self.read()
-        return ImuReading(told.sampled["orientation"], told.orientation, told.angular_velocity, told.specific_force)
+        read = self.read()
+        return ImuReading(read.sampled["orientation"], read.orientation, read.angular_velocity, read.specific_force)
 
     @property
     def shown_cameras(self) -> tuple[str, ...]:
@@ -79,12 +79,12 @@ class SimulatedSenses(RobotInterface):
 
     def read_images(self, cameras: Sequence[str]) -> dict[str, ImageReading]:
         """Return what several cameras see at one time."""
-        pictures = self._cameras.look([self._known_camera(name) for name in cameras])
+        pictures = self._cameras.look([self._checked_camera(name) for name in cameras])
         return {name: ImageReading(own.time, own.camera, own.color.numpy()) for name, own in pictures.items()}
 
     def read_depth(self, camera: str) -> ImageReading:
         """Return how far what a camera sees is; see ``CameraInterface``."""
-        picture = self._cameras.look((self._known_camera(camera),))[camera]
+        picture = self._cameras.look((self._checked_camera(camera),))[camera]
         return ImageReading(picture.time, picture.camera, picture.depth.numpy())
 
     def camera_info(self, camera: str = "head") -> Camera:

@@ -25,18 +25,18 @@ def quaternions_of(rotations: np.ndarray) -> np.ndarray:
     m = np.moveaxis(rotations, (-2, -1), (0, 1))
     trace = m[0, 0] + (m[1, 1] + m[2, 2])
     found = np.empty((*trace.shape, 4))
-    turns_little = trace > 0.0
-    root = np.sqrt(np.where(turns_little, trace, 0.0) + 1.0)
+    by_trace = trace > 0.0
+    root = np.sqrt(np.where(by_trace, trace, 0.0) + 1.0)
     found[..., 3], scale = 0.5 * root, 0.5 / root
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         found[..., i] = (m[k, j] - m[j, k]) * scale
-    if turns_little.all():
+    if by_trace.all():
         return found
-    largest = np.where(m[1, 1] > m[0, 0], 1, 0)
-    largest = np.where(m[2, 2] > np.where(largest == 1, m[1, 1], m[0, 0]), 2, largest)
+    axis = np.where(m[1, 1] > m[0, 0], 1, 0)
+    axis = np.where(m[2, 2] > np.where(axis == 1, m[1, 1], m[0, 0]), 2, axis)
     for i in range(3):
-        own = ~turns_little & (largest == i)
+        own = ~by_trace & (axis == i)
         if own.any():
             j, k = (i + 1) % 3, (i + 2) % 3
             root = np.sqrt(m[i, i][own] - m[j, j][own] - m[k, k][own] + 1.0)

@@ -28,11 +28,11 @@ FRAMES = 2
 """Frames one after the other in which a robot must be out of balance before it makes a step."""
 INSIDE = 0.01
 """[m] By which the capture point is to be inside the soles' outline after a step, or another one follows."""
-LEAST = 0.4
+MIN_SHARE = 0.4
 """Share of the soles' outline that the centre of mass of a robot and its load stays in, standing."""
 LIFTED = 3e-3
 """[m] How far above the other a sole may be that bears nothing, and still stands."""
-MOST_STEPS = 8
+MAX_STEPS = 8
 """That it makes for one push."""
 
 
@@ -115,7 +115,7 @@ class Stabiliser:
     ) -> Footing:  # fmt: skip
         """Return the footing at the end of a frame, with the step that the robot begins or goes on with."""
         was, span = before.footing, time - before.time
-        if was is not None and was.step is not None and was.step.is_over:
+        if was is not None and was.step is not None and was.step.is_finished:
             was = None  # what is wanted begins anew from where the robot stands
         soles = self._soles_of((q, pressed), wanted)
         footing = found_footing(was, soles, self._weight, span, self._lean(q, wanted, soles, load))
@@ -143,7 +143,7 @@ class Stabiliser:
             return replace(footing, step=step)
         outline = convex_outline(np.concatenate([pendulum.outlines[k] for k in bearing]))
         frames = was.frames + 1 if outside(outline, point, BEYOND if step is None else -INSIDE) else 0
-        if frames >= FRAMES and (step is None or step.count < MOST_STEPS):
+        if frames >= FRAMES and (step is None or step.count < MAX_STEPS):
             bears = footing.bears if step is None else tuple(True for _ in self._feet)
             found = lifted(pendulum, bears, time, 1 if step is None else step.count + 1)
             step, frames = found or step, 0
@@ -190,7 +190,7 @@ class Stabiliser:
         ]
         outline = convex_outline(np.concatenate(corners))
         middle = outline.mean(axis=0)
-        back = (nearest_in(middle + LEAST * (outline - middle), both) - both) * (1.0 + load.mass / self._mass)
+        back = (nearest_in(middle + MIN_SHARE * (outline - middle), both) - both) * (1.0 + load.mass / self._mass)
         return np.array([*back, 0.0])
 
     def _soles_of(self, actual: tuple[np.ndarray, np.ndarray] | None, wanted: RobotState) -> Soles:

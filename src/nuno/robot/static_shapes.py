@@ -34,7 +34,7 @@ class Obstacle:
     parts: tuple[SolidPart, ...]
     middle: np.ndarray
     half: np.ndarray
-    touched: np.ndarray
+    collides: np.ndarray
 
     @property
     def is_plane(self) -> bool:
@@ -74,7 +74,7 @@ class StaticShapes:
         self._version: int | None = None
         self._made: dict[Body, tuple[Any, tuple[SolidPart, ...], np.ndarray, np.ndarray]] = {}
         self.obstacles: tuple[Obstacle, ...] = ()
-        self._led: tuple[Obstacle, ...] = ()
+        self._moving: tuple[Obstacle, ...] = ()
         self._number = 0
         self._seen: list[tuple[Any, ...]] = [()]
 
@@ -84,7 +84,7 @@ class StaticShapes:
         if version != self._version:
             self._version = version
             self._renew()
-        return (self._number, *[own.path for own in self._led]) if self._led else (self._number,)
+        return (self._number, *[own.path for own in self._moving]) if self._moving else (self._number,)
 
     def _renew(self) -> None:
         found, made = [], {}
@@ -93,8 +93,8 @@ class StaticShapes:
             is_other = body in self._own or getattr(body, "_links", None) is not None
             if is_other or body.is_dynamic or body.shape.is_cloth or not body.group:
                 continue
-            touched = np.array([self._world._rules.touch(link, body) for link in self._links], dtype=bool)
-            if not touched.any():
+            collides = np.array([self._world._rules.touch(link, body) for link in self._links], dtype=bool)
+            if not collides.any():
                 continue
             before = self._made.get(body)
             if before is None or before[0] is not body.shape:
@@ -103,12 +103,12 @@ class StaticShapes:
                 before = (body.shape, solid_parts(body.shape), 0.5 * (low + high), 0.5 * (high - low))
             made[body] = before
             # a body that is moved has other arrays from then on, never other numbers in the same
-            obstacle = Obstacle(body, *before[1:], touched)
+            obstacle = Obstacle(body, *before[1:], collides)
             found.append(obstacle)
             # a body that is moved has other arrays from then on, never other numbers in the same
-            seen.append((body, *before[1:], *(() if obstacle.path else body.pose()), touched.tobytes()))
+            seen.append((body, *before[1:], *(() if obstacle.path else body.pose()), collides.tobytes()))
         self._made, self.obstacles = made, tuple(found)
-        self._led = tuple(own for own in found if own.path is not None)
+        self._moving = tuple(own for own in found if own.path is not None)
         same = len(seen) == len(self._seen) and all(
             len(a) == len(b) and all(x is y or (isinstance(x, bytes) and x == y) for x, y in zip(a, b, strict=True))
             for a, b in zip(seen, self._seen, strict=True)

@@ -223,17 +223,17 @@ class TrajectoryController:
     def save(self) -> tuple[Any, ...]:
         """Return all that it is, for ``load``."""
         goal = self.goal
-        told = None if goal is None else (goal.status, goal.code, goal.text, goal.feedback)
-        return self.piece, self._spline, self._next, self.tolerances, goal, told
+        outcome = None if goal is None else (goal.status, goal.code, goal.text, goal.feedback)
+        return self.piece, self._spline, self._next, self.tolerances, goal, outcome
 
     def load(self, saved: tuple[Any, ...]) -> None:
         """Become what it was; a goal that came since is given up."""
-        piece, spline, after, tolerances, goal, told = saved
+        piece, spline, after, tolerances, goal, outcome = saved
         if self.goal is not None and self.goal is not goal:
             self.goal.finish(GoalStatus.PREEMPTED, ResultCode.INVALID_GOAL, "the world was restored")
         self.piece, self._spline, self._next, self.tolerances, self.goal = piece, spline, after, tolerances, goal
         if goal is not None:
-            goal.status, goal.code, goal.text, goal.feedback = told
+            goal.status, goal.code, goal.text, goal.feedback = outcome
 
     def _within_limits(self, trajectory: JointTrajectory) -> JointTrajectory:
         if self.limits is None:

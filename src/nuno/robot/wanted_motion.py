@@ -109,7 +109,7 @@ class WantedMotion:
             return
         if self.gait.is_walking:
             self.gait.interrupt()
-        if step.is_over:
+        if step.is_finished:
             self._stand_on(state)
             self.gait.resume()
 

@@ -35,7 +35,7 @@ def limp(**changed):
 
 
 @DEVICES
-@pytest.mark.parametrize("cell", [0.01, 0.02, 0.04])
+@pytest.mark.parametrize("cell", [pytest.param(0.01, marks=pytest.mark.long), 0.02, 0.04])
 def test_the_edges_of_a_box_do_not_cut_into_a_limp_cloth(cell, device):
     """Geometry: every point of the surface stays half a thickness from the edges, not the vertices alone."""
     count = round(0.4 / cell)

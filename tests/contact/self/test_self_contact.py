@@ -50,7 +50,13 @@ def lifted(picks: list[int], seconds: float, margin: float | None = None, **mate
 
 @pytest.mark.parametrize(
     "material",
-    [{}, {"thickness": 0.002}, {"thickness": 0.006}, {"bending_rigidity": 2e-5}, {"bending_rigidity": 2e-3}],
+    [
+        {},
+        pytest.param({"thickness": 0.002}, marks=pytest.mark.long),
+        pytest.param({"thickness": 0.006}, marks=pytest.mark.long),
+        pytest.param({"bending_rigidity": 2e-5}, marks=pytest.mark.long),
+        {"bending_rigidity": 2e-3},
+    ],
     ids=str,
 )
 def test_no_triangles_cross_after_a_lift(material: dict[str, float]) -> None:

@@ -19,7 +19,7 @@ from ros1.control_definitions import message_class
 
 ACTION = "control_msgs/FollowJointTrajectory"
 CHECKSUM = "bc4f9b743838566551c0390c65f1a248"  # of control_msgs/FollowJointTrajectoryAction, as that package has it
-PATIENCE = 20.0
+PATIENCE = 120.0
 
 
 def trajectory(joints, positions, seconds):

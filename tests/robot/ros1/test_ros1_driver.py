@@ -22,7 +22,7 @@ from nuno.robot.wire.server import RobotServer
 HERE = Path(__file__).parent
 sys.path.append(str(HERE.parent / "wire"))
 FOLDER = str(Path(nuno.__file__).parent / "robot")
-PATIENCE = 90.0
+PATIENCE = 300.0
 
 
 def has_ros1(python):

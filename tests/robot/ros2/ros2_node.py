@@ -13,7 +13,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-PATIENCE = 20.0
+PATIENCE = 120.0
 """[s] For two participants to find each other on a loaded machine; most do in a tenth of a second."""
 RELIABLE = Qos(Policy.Reliability.Reliable(10**9), Policy.History.KeepLast(10), Policy.Durability.Volatile)
 BEST_EFFORT = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(5))

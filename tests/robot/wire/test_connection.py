@@ -202,7 +202,7 @@ def test_sending_from_several_threads(other_side):
             thread.start()
         for thread in threads:
             thread.join()
-        assert done.wait(20.0)
+        assert done.wait(PATIENCE)
     for name in range(4):
         assert [own["k"] for own in got if own["of"] == name] == list(range(100))
 

@@ -174,8 +174,8 @@ def main() -> int:
     reader = threading.Thread(target=wire.read, args=(sys.stdin,), daemon=True)
     reader.start()
     node = wire.ask("/rosapi/node_details", node="/nuno")
-    listed = wire.ask("/rosapi/topics")
-    kinds = {topic: kind.replace("/msg/", "/") for topic, kind in zip(listed["topics"], listed["types"], strict=True)}
+    topics = wire.ask("/rosapi/topics")
+    kinds = {topic: kind.replace("/msg/", "/") for topic, kind in zip(topics["topics"], topics["types"], strict=True)}
     rospy.set_param("/robot_description", json.loads(wire.ask("/rosapi/get_param", name="robot_description")["value"]))
     kept: list[Any] = []
     for name in node["publishing"]:

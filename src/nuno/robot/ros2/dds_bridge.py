@@ -17,9 +17,9 @@ Fields = dict[str, Any]
 
 KEPT = 10
 """Messages of a topic that wait for a slow reader; the oldest go first. ROS' own default."""
-READ_MOST = 200
+MAX_SAMPLES = 200
 """Messages that are read of one topic at once."""
-LARGEST_DOMAIN = 232
+MAX_DOMAIN = 232
 LOCAL = """<CycloneDDS><Domain id="any"><General><AllowMulticast>false</AllowMulticast>
 <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
 <Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>
@@ -118,7 +118,7 @@ class DdsBridge:
         """Return the messages, or requests of a service, that have come since the last call; faulty ones are logged."""
         kind, reader = self._readers[topic]
         try:
-            samples = reader.take(N=READ_MOST)
+            samples = reader.take(N=MAX_SAMPLES)
         except Exception as error:  # what a program sent that has the type's name and another layout
             logger.warning("a message on %s could not be read: %s: %s", topic, type(error).__name__, error)
             return []
@@ -142,7 +142,7 @@ class DdsBridge:
     def _reader(self, name: str, kind: str) -> Any:
         from cyclonedds.sub import DataReader
 
-        return DataReader(self._participant, self._topic(name, kind), qos=_quality(False, READ_MOST))
+        return DataReader(self._participant, self._topic(name, kind), qos=_quality(False, MAX_SAMPLES))
 
     def _topic(self, name: str, kind: str) -> Any:
         from cyclonedds.topic import Topic
@@ -167,7 +167,7 @@ def _checked_domain(domain: int | None) -> int:
     if domain is None:
         text = os.environ.get("ROS_DOMAIN_ID") or "0"
         given = int(text) if text.isdecimal() else text
-    if isinstance(given, bool) or not isinstance(given, int) or not 0 <= given <= LARGEST_DOMAIN:
+    if isinstance(given, bool) or not isinstance(given, int) or not 0 <= given <= MAX_DOMAIN:
         what = "ROS_DOMAIN_ID" if domain is None else "domain"
-        raise InvalidInputError(f"{what} must be a whole number in [0, {LARGEST_DOMAIN}], got {given!r}")
+        raise InvalidInputError(f"{what} must be a whole number in [0, {MAX_DOMAIN}], got {given!r}")
     return given

@@ -84,7 +84,7 @@ def from_dds(kind: str, message: Any) -> Fields:
             own = field["kind"]
             found[field["name"]] = [from_dds(own, part) for part in value] if field["many"] else from_dds(own, value)
         else:
-            found[field["name"]] = _listed(field["kind"], value) if field["many"] else value
+            found[field["name"]] = _sequence(field["kind"], value) if field["many"] else value
     return found
 
 
@@ -118,7 +118,7 @@ def _bytes(given: Any, count: str) -> bytes:
     return bytes(int(count or 0)) if given is None else bytes(given)
 
 
-def _listed(kind: str, value: Any) -> Any:
+def _sequence(kind: str, value: Any) -> Any:
     return bytes(value) if kind == "uint8" else list(value)
 
 

@@ -141,5 +141,5 @@ class FollowAction:
         return {"goal_id": {"uuid": bytes.fromhex(goal)}, "stamp": self._states[goal]["stamp"]}
 
     def _tell_status(self) -> None:
-        told = [{"goal_info": self._info(goal), "status": own["status"]} for goal, own in self._states.items()]
-        self._bridge.publish(self._status, {"status_list": told})
+        statuses = [{"goal_info": self._info(goal), "status": own["status"]} for goal, own in self._states.items()]
+        self._bridge.publish(self._status, {"status_list": statuses})

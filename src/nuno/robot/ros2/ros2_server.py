@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from nuno.robot.interface import RobotInterface
-from nuno.robot.known_joints import TICK
+from nuno.robot.reported_joints import TICK
 from nuno.robot.ros2.dds_bridge import DdsBridge
 from nuno.robot.ros2.definitions import DEFINITIONS
 from nuno.robot.ros2.follow_action import FollowAction

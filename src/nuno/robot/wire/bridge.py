@@ -11,7 +11,7 @@ from typing import Any
 
 from nuno.errors import MessageError, MissingPackageError, NotConnectedError
 from nuno.robot.wire.bridge_client import Client, Subscription, frame_of
-from nuno.robot.wire.outbox import KEPT, KEPT_MOST
+from nuno.robot.wire.outbox import KEPT, MAX_KEPT
 from nuno.robot.wire.protocol import FROM_CLIENTS, Message, decode, encode
 
 logger = logging.getLogger(__name__)
@@ -196,7 +196,7 @@ class Bridge:
         wanted = client.subscriptions.setdefault(topic, Subscription())
         wanted.ids.add(message.get("id"))
         wanted.interval = max(0.0, 0.001 * (message.get("throttle_rate") or 0.0))
-        wanted.keep = min(message.get("queue_length") or KEPT, KEPT_MOST)
+        wanted.keep = min(message.get("queue_length") or KEPT, MAX_KEPT)
         self._subscribers.setdefault(topic, {})[client] = wanted
         if topic in self._latched:
             client.write(self._latched[topic])

@@ -13,7 +13,7 @@ from nuno.robot.wire.protocol import Message, encode
 
 logger = logging.getLogger(__name__)
 
-TOLD = 20
+MAX_WARNINGS = 20
 """So many of what one client does wrong the log warns of; nobody is to fill disks."""
 AHEAD = 2**15
 """[bytes] That are handed to the system before it has taken them; what comes after that waits in the outbox."""
@@ -59,7 +59,7 @@ class Client:
         self._loop, self._thread = asyncio.get_running_loop(), threading.get_ident()
         self._frames: list[bytes] = []  # of this turn of the event loop
         self._gathered = 0  # their size [bytes]
-        self._largest = 0  # message that was written [bytes]
+        self._max_frame = 0  # message that was written [bytes]
         self._complaints = 0
 
     def __repr__(self) -> str:
@@ -96,7 +96,7 @@ class Client:
         """Send what waits, as far as the client reads; give up one that takes nothing."""
         while self.outbox and self._waiting() < AHEAD:
             self._write(self.outbox.pop())
-        if self._waiting() > AHEAD + self._largest + CONTROL:
+        if self._waiting() > AHEAD + self._max_frame + CONTROL:
             self.abort("it reads too slowly")
 
     def abort(self, reason: str) -> None:
@@ -109,13 +109,13 @@ class Client:
     def answer(self, request: Message, values: Any, good: bool = True) -> None:
         """Answer the call of a service; what went wrong, where it did, is a text."""
         answer = {"op": "service_response", "service": request["service"], "values": values, "result": good}
-        self.send(answer | told(request))
+        self.send(answer | identity_of(request))
 
     def complain(self, text: str, identity: str | int | None = None) -> None:
         """Tell the client what was wrong with a message of its."""
         self._complaints += 1
-        logger.log(logging.WARNING if self._complaints <= TOLD else logging.DEBUG, "%s: %s", self.name, text)
-        self.send({"op": "status", "level": "error", "msg": text} | told({"id": identity}))
+        logger.log(logging.WARNING if self._complaints <= MAX_WARNINGS else logging.DEBUG, "%s: %s", self.name, text)
+        self.send({"op": "status", "level": "error", "msg": text} | identity_of({"id": identity}))
 
     def _waiting(self) -> int:
         size: int = self.connection.transport.get_write_buffer_size()
@@ -124,7 +124,7 @@ class Client:
     def _write(self, frame: bytes) -> None:
         if not self._frames:
             self._loop.call_soon(self.flush)
-        self._largest = max(self._largest, len(frame))
+        self._max_frame = max(self._max_frame, len(frame))
         self._frames.append(frame)
         self._gathered += len(frame)
 
@@ -136,6 +136,6 @@ def frame_of(text: str) -> bytes:
     return Frame(Opcode.TEXT, text.encode()).serialize(mask=False)
 
 
-def told(message: Message) -> Message:
+def identity_of(message: Message) -> Message:
     """Return the id of a message, for the answer; empty where it has none."""
     return {} if message.get("id") is None else {"id": message["id"]}

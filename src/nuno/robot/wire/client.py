@@ -70,7 +70,7 @@ class WireRobot(RobotInterface):
     ) -> None:  # fmt: skip
         self.names, self._controllers = names or Names(), controllers
         self._state: JointState | None = None
-        self._told: dict[str, float] = {}  # by joint, when a state last told of it [s]
+        self._reported: dict[str, float] = {}  # by joint, when a state last told of it [s]
         self._status: dict[str, bool] = {}  # by controller
         self._stream: VelocityStream | None = None
         self._has_odometry: bool | None = None
@@ -235,7 +235,7 @@ class WireRobot(RobotInterface):
         """
         topic = self.names.full(self.names.odometry)
         if self._has_odometry is None:
-            self._has_odometry = topic in (self._newest.listed("topics", topic) or ())
+            self._has_odometry = topic in (self._newest.names_of("topics", topic) or ())
         if not self._has_odometry:
             return self._newest.peek(topic, ros.ODOMETRY, _read_odometry) or Coordinates(*self.robot.pose())
         place: Coordinates = self._newest.read(topic, ros.ODOMETRY, _read_odometry)
@@ -312,13 +312,13 @@ class WireRobot(RobotInterface):
         It is asked for compressed; nothing comes of a camera that nobody looks through. The camera's pixels are those
         that the robot publishes, where it does; where it is, the model tells.
         """
-        topic = self.names.full(self.names.compressed, camera=self._known_camera(camera))
+        topic = self.names.full(self.names.compressed, camera=self._checked_camera(camera))
         time, image = self._newest.take(topic, images.COMPRESSED_IMAGE, images.read_compressed)
         return ImageReading(time, self.camera_info(camera), image)
 
     def read_depth(self, camera: str) -> ImageReading:
         """Return the first depth image of a camera that comes from now on; see ``CameraInterface``."""
-        topic = self.names.full(self.names.depth, camera=self._known_camera(camera))
+        topic = self.names.full(self.names.depth, camera=self._checked_camera(camera))
         time, image = self._newest.take(topic, images.IMAGE, images.read_image)
         return ImageReading(time, self.camera_info(camera), image)
 
@@ -327,10 +327,10 @@ class WireRobot(RobotInterface):
         own = super().camera_info(camera)
         topic = self.names.full(self.names.camera_info, camera=camera)
         if camera not in self._pixels:  # they do not change
-            known = topic in (self._newest.listed("topics", topic) or ())
+            known = topic in (self._newest.names_of("topics", topic) or ())
             self._pixels[camera] = self._newest.take(topic, images.CAMERA_INFO, dict) if known else None
-        told = self._pixels[camera]
-        return own if told is None else images.read_camera_info(told, own)
+        reported = self._pixels[camera]
+        return own if reported is None else images.read_camera_info(reported, own)
 
     # Inside
 
@@ -338,14 +338,14 @@ class WireRobot(RobotInterface):
         state = ros.read_joint_state(fields)
         self._clock.hear(state.time)
         before = self._state
-        self._told.update(dict.fromkeys(state.names, state.time))
+        self._reported.update(dict.fromkeys(state.names, state.time))
         if before is not None and not set(before.names) <= set(state.names):  # several topics' worth in one
             kept = [k for k, name in enumerate(before.names) if name not in state.names]
             joined = [np.append(getattr(state, what), getattr(before, what)[kept])
                       for what in ("positions", "velocities", "efforts")]  # fmt: skip
             names = (*state.names, *(before.names[k] for k in kept))
             # as old as the oldest joint in it: who waits for a fresh state waits for all topics
-            state = JointState(min(self._told[name] for name in names), names, *joined)
+            state = JointState(min(self._reported[name] for name in names), names, *joined)
         self._state = state
         self._newest.tell()
 

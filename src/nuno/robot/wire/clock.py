@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from nuno.errors import MessageError
-from nuno.robot.known_joints import TICK
+from nuno.robot.reported_joints import TICK
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.connection import Connection
 from nuno.robot.wire.names import CLOCK_KIND, STEPPED, Names

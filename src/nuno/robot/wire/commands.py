@@ -16,7 +16,7 @@ from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.interface import RobotInterface
 from nuno.robot.joint_interface import Controller
 from nuno.robot.wire import messages as ros
-from nuno.robot.wire.bridge_client import Client, told
+from nuno.robot.wire.bridge_client import Client, identity_of
 from nuno.robot.wire.broadcast import Broadcast, motion_fields
 from nuno.robot.wire.names import GO_VELOCITY, Names
 from nuno.robot.wire.protocol import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, Message
@@ -30,7 +30,7 @@ Fields = dict[str, Any]
 Started = tuple[Goal, Callable[[Goal], Fields], Callable[[], None]]
 """A goal, what returns its result's fields, and what cancels it."""
 
-TOLD = {
+END_STATUSES = {
     GoalStatus.SUCCEEDED: SUCCEEDED, GoalStatus.PREEMPTED: CANCELED, GoalStatus.RECALLED: CANCELED,
     GoalStatus.ABORTED: ABORTED, GoalStatus.LOST: ABORTED,
 }  # fmt: skip
@@ -53,7 +53,7 @@ class Running:
         result: Returns the result's fields once it is done.
         cancel: Ends it.
         feedback: Returns the feedback's fields; None where the client wants none.
-        told: When feedback was last sent [s] of the robot's clock.
+        feedback_time: When feedback was last sent [s] of the robot's clock.
     """
 
     client: Client
@@ -63,7 +63,7 @@ class Running:
     result: Callable[[Goal], Fields]
     cancel: Callable[[], None]
     feedback: Callable[[], Fields] | None = None
-    told: float = -np.inf
+    feedback_time: float = -np.inf
 
 
 class Commands:
@@ -94,7 +94,7 @@ class Commands:
         self._joints: dict[str, list[str]] = {}
         self._further = dict(services)
         self._services: dict[str, Callable[[Fields], Fields]] = {
-            "/controller_manager/list_controllers": lambda _: {"controller": _listed(controllers)},
+            "/controller_manager/list_controllers": lambda _: {"controller": _controller_states(controllers)},
         }
         for controller in controllers:
             action = names.full(controller["controller_action"])
@@ -137,7 +137,7 @@ class Commands:
             if own.goal.is_done:
                 self._running.remove(own)
                 self._answer(own)
-            elif own.feedback is not None and now >= own.told + FEEDBACK_INTERVAL - 1e-9:
+            elif own.feedback is not None and now >= own.feedback_time + FEEDBACK_INTERVAL - 1e-9:
                 self._tell(own, now)
 
     def leave(self, client: Client) -> None:
@@ -195,16 +195,16 @@ class Commands:
 
     def _tell(self, own: Running, now: float) -> None:
         assert own.feedback is not None
-        own.told = now
+        own.feedback_time = now
         feedback = {"op": "action_feedback", "action": own.action, "values": own.feedback()}
-        own.client.send(feedback | told({"id": own.identity}))
+        own.client.send(feedback | identity_of({"id": own.identity}))
 
     def _answer(self, own: Running) -> None:
         accepted = own.goal.status != GoalStatus.REJECTED
         own.client.send({
             "op": "action_result", "action": own.action, "values": own.result(own.goal),
-            "status": TOLD[own.goal.status] if accepted else UNKNOWN, "result": accepted,
-        } | told({"id": own.identity}))  # fmt: skip
+            "status": END_STATUSES[own.goal.status] if accepted else UNKNOWN, "result": accepted,
+        } | identity_of({"id": own.identity}))  # fmt: skip
 
     def _motion(self, action: str) -> Fields:
         joints = self._joints.get(action)
@@ -313,7 +313,7 @@ class Commands:
             code = ResultCode.INVALID_JOINTS if isinstance(error, KeyError) else ResultCode.INVALID_GOAL
             values = {"error_code": int(code), "error_string": text}
             result = {"op": "action_result", "action": message["action"], "values": values, "status": UNKNOWN}
-            client.send(result | {"result": False} | told(message))
+            client.send(result | {"result": False} | identity_of(message))
         else:
             client.complain(text, message.get("id"))
 
@@ -326,7 +326,7 @@ def _base_result(goal: Goal) -> Fields:
     return {"error_code": 0 if goal.succeeded else 1, "error_msg": goal.text}
 
 
-def _listed(controllers: list[Controller]) -> list[Fields]:
+def _controller_states(controllers: list[Controller]) -> list[Fields]:
     return [
         {
             "name": own["controller_type"], "state": "active",

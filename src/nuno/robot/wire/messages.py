@@ -37,7 +37,7 @@ GO_VELOCITY = "nuno_msgs/action/GoVelocity"
 
 NUMBERS = (float, int)
 """Types of numbers in JSON; bool is another."""
-LARGEST = 2.0**31 - 1.0  # [s] what the wire has 32 bits for
+MAX_TIME = 2.0**31 - 1.0  # [s] what the wire has 32 bits for
 
 
 # Fields of messages that were received
@@ -120,7 +120,7 @@ def seconds(message: Any, path: str, default: float | None = None) -> float:
 
 def time_fields(time: float) -> Fields:
     """Return a time or duration [s] as builtin_interfaces has it."""
-    whole = round(min(max(time, -LARGEST), LARGEST) * 1e9)
+    whole = round(min(max(time, -MAX_TIME), MAX_TIME) * 1e9)
     return {"sec": whole // 10**9, "nanosec": whole % 10**9}
 
 

@@ -32,7 +32,7 @@ class Newest:
         self.count = 0  # of all that came
         self._news = threading.Condition()
         self._latest: dict[str, Any] = {}  # by topic
-        self._known: dict[str, list[str] | None] = {}  # what there is; None where that is not told
+        self._names: dict[str, list[str] | None] = {}  # what there is; None where that is not told
 
     def tell(self) -> None:
         """Wake those that wait."""
@@ -115,16 +115,16 @@ class Newest:
 
     def is_there(self, what: str, name: str) -> bool:
         """Return True if the robot has one of its "topics" or "action_servers"; true where it does not tell."""
-        known = self.listed(what, name)
-        return known is None or name in known
+        names = self.names_of(what, name)
+        return names is None or name in names
 
-    def listed(self, what: str, name: str) -> list[str] | None:
+    def names_of(self, what: str, name: str) -> list[str] | None:
         """Return the robot's actions or topics, None where untold; asked for again if a name is not among them."""
-        if what not in self._known or name not in (self._known[what] or (name,)):
+        if what not in self._names or name not in (self._names[what] or (name,)):
             try:
                 answer = self.connection.call(f"/rosapi/{what}", "", {})
-                self._known[what] = [str(own) for own in ros.field(answer, what, list, default=[])]
+                self._names[what] = [str(own) for own in ros.field(answer, what, list, default=[])]
             except (RefusedError, RobotTimeoutError) as error:
                 logger.warning("it cannot be known which %s there are: %s", what.replace("_", " "), error)
-                self._known[what] = None
-        return self._known[what]
+                self._names[what] = None
+        return self._names[what]

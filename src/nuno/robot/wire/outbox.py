@@ -6,7 +6,7 @@ from collections import Counter, deque
 
 KEPT = 16
 """Publications of one topic that wait for a slow reader, unless it asks for another number; the oldest go first."""
-KEPT_MOST = 100
+MAX_KEPT = 100
 """The greatest number that it may ask for: they are kept in this program's memory."""
 LIMIT = 1000
 """So many texts that may not be dropped wait for a slow reader, and no more."""

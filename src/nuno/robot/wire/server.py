@@ -14,7 +14,7 @@ import numpy as np
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
-from nuno.robot.known_joints import TICK
+from nuno.robot.reported_joints import TICK
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.bridge_client import Client
@@ -34,7 +34,7 @@ SHARE = 2.0
 """Times as long as a publication takes, at least, until the next: many subscribers slow it down, not the clock."""
 STALE = 0.5
 """[s] Of the robot's time, at most, between two publications."""
-ROUNDS = 3
+LOOP_PASSES = 3
 """Of the event loop, that a message needs from the socket to its handler; so many pass before a tick that is due."""
 PATIENCE = 1e-3
 """[s] Between two looks at whether a program has given the robot's lock back."""
@@ -209,7 +209,7 @@ class RobotServer:
         """Let clients be served until the next tick is due; without anyone who waits, it never is."""
         if self._factor is None:
             await self._asked.wait()
-        for _ in range(ROUNDS):
+        for _ in range(LOOP_PASSES):
             await asyncio.sleep(0.0)
         if self._factor is not None and (left := self._next_tick - time.perf_counter()) > 0.0:
             await asyncio.sleep(left)

@@ -1,4 +1,4 @@
-"""KnownJoints: the joints of a robot as it tells of them, from the newest joint state that came."""
+"""ReportedJoints: the joints of a robot as it tells of them, from the newest joint state that came."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Angles = ArrayLike | Mapping[str, float]
 """Of all joints in the order of ``joint_names``, or by name; a model of scikit-robot stands for its own, by names."""
 
 
-class KnownJoints(ABC):
+class ReportedJoints(ABC):
     """The joints of a robot, and a clock to wait on until more is known of them.
 
     Angle vectors are as in ``JointInterface``.
@@ -49,7 +49,7 @@ class KnownJoints(ABC):
     def __init__(self, robot: Humanoid) -> None:
         self.robot = robot.copy()
         self.joint_state: JointState | None = None
-        self._order_told = False
+        self._order_reported = False
         self._joints = frozenset(self.robot.joint_names)
         self._velocities = np.zeros(len(self.robot.joint_names))
         self._efforts = np.zeros(len(self.robot.joint_names))
@@ -231,8 +231,8 @@ class KnownJoints(ABC):
                 f"{upper[k]:.4f}: is the vector in another model's order? The order here is that of joint_names; a "
                 "scikit-robot model itself, or a mapping from names, is taken by names"
             )
-        if len(wanted) and not self._order_told and "skrobot" in sys.modules:
-            self._order_told = True
+        if len(wanted) and not self._order_reported and "skrobot" in sys.modules:
+            self._order_reported = True
             logger.warning(
                 "a vector without names is taken in the order of joint_names, %s first; scikit-robot's models have "
                 "another: pass the model itself, or a mapping", self.robot.joint_names[0],
