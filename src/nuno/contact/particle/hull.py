@@ -8,6 +8,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.lanes import absolute, add, anywhere, choose, div, full_like, maximum, minimum, mul, sub  # noqa: F401
+from nuno.numbers.vec3 import dot, vec3
 from nuno.state.cloth_state import Shapes
 
 FAR = wp.constant(1.0e6)
@@ -69,3 +70,73 @@ def way_into_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, ux: Any, uy: A
         ny = choose(later, f[1], ny)
         nz = choose(later, f[2], nz)
     return gap, nx, ny, nz, choose(relative_to, zero, minimum(latest, earliest - latest))
+
+
+@wp.func
+def beside_box(p: Any, h: Any, half: Any):
+    """Return how far a box about p (half sides h) is from the box of half sides ``half`` about the origin [m]."""
+    x = absolute(p.x) - h.x - half.x
+    y = absolute(p.y) - h.y - half.y
+    z = absolute(p.z) - h.z - half.z
+    return maximum(maximum(x, y), z)
+
+
+@wp.func
+def meets_ridges(shapes: Shapes, s: int, p: Any, h: Any, ball: Any):
+    """Return by how far edges and corners of a convex hull may be in a box about p of half sides h [m].
+
+    What is in it is no farther from p than ``ball`` [m], either. A point on an edge is on two planes of faces, a corner
+    on three, and none is outside of any plane.
+
+    Returns:
+        Two numbers, positive where an edge may be there, and where a corner may. Else none is nearer than they say.
+    """
+    apart = -full_like(p.x, FAR)
+    first = apart
+    second = apart
+    third = apart
+    all_seen = int(1)
+    ends = shapes.faces[s]
+    for k in range(ends[0], ends[1]):
+        f = shapes.planes[k]
+        height = p.x * f[0] + p.y * f[1] + p.z * f[2] - f[3]
+        reach = minimum(ball, h.x * wp.abs(f[0]) + h.y * wp.abs(f[1]) + h.z * wp.abs(f[2]))
+        apart = maximum(apart, height - reach)
+        if not anywhere(ball - apart):
+            all_seen = 0
+            break
+        top = height + reach
+        lower = minimum(first, top)
+        first = maximum(first, top)
+        lowest = minimum(second, lower)
+        second = maximum(second, lower)
+        third = maximum(third, lowest)
+    if all_seen == 0:
+        return -apart, -apart
+    return minimum(second, -apart), minimum(third, -apart)
+
+
+@wp.func
+def outermost_of_hull(shapes: Shapes, s: int, a: Any, n: Any):
+    """Return the corner of a convex hull that is the farthest towards a plane through a of unit normal n.
+
+    Returns:
+        The corner, and the plane's normal away from the hull.
+    """
+    one = full_like(n.x, 1.0)
+    ends = shapes.corner_ends[s]
+    most = -one * FAR
+    least = one * FAR
+    top = a
+    bottom = a
+    for k in range(ends[0], ends[1]):
+        c = shapes.corners[k]
+        height = n.x * c[0] + n.y * c[1] + n.z * c[2]
+        higher = height - most
+        most = choose(higher, height, most)
+        top = vec3(choose(higher, c[0], top.x), choose(higher, c[1], top.y), choose(higher, c[2], top.z))
+        lower = least - height
+        least = choose(lower, height, least)
+        bottom = vec3(choose(lower, c[0], bottom.x), choose(lower, c[1], bottom.y), choose(lower, c[2], bottom.z))
+    above = dot(n, a) * 2.0 - most - least
+    return choose(above, top, bottom), n * choose(above, one, -one)
