@@ -82,8 +82,7 @@ class ParticleSolver(ParticleState):
                 setattr(shapes, name, wp.zeros(1, dtype=float, device=self.device))
             shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
             shapes.faces = shapes.corner_ends = wp.zeros(1, dtype=wp.vec2i, device=self.device)
-            shapes.planes = wp.zeros(1, dtype=wp.vec4, device=self.device)
-            shapes.corners = wp.zeros(1, dtype=wp.vec3, device=self.device)
+            shapes.planes = shapes.corners = wp.zeros(1, dtype=wp.vec4, device=self.device)
         else:
             shapes = colliders.shapes
         self._colliders, self.shapes = colliders, shapes

@@ -234,7 +234,8 @@ class Shapes:
 
     What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
     each, ``shape_speed`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
-    outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners`` [m].
+    outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners``:
+    places, and the cells from which on each is sharp [m], the least first.
     """
 
     count: int
@@ -247,7 +248,7 @@ class Shapes:
     faces: wp.array(dtype=wp.vec2i)
     planes: wp.array(dtype=wp.vec4)
     corner_ends: wp.array(dtype=wp.vec2i)
-    corners: wp.array(dtype=wp.vec3)
+    corners: wp.array(dtype=wp.vec4)
     slot: wp.array(dtype=int)
     pose: wp.array(dtype=float)
     timing: wp.array(dtype=int)

@@ -16,6 +16,7 @@ from nuno.errors import BodyStateError
 from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
+from nuno.tables.hull_tables import hull_tables
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ class Colliders:
         table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
         ends = np.zeros((2, max(1, len(bodies)), 2), dtype=np.int32)
-        planes, corners = [np.zeros((1, 4), dtype=np.float32)], [np.zeros((1, 3), dtype=np.float32)]
+        planes, corners = [np.zeros((1, 4), dtype=np.float32)], [np.zeros((1, 4), dtype=np.float32)]
         for k, body in enumerate(bodies):
             row = table[:, k]
             row[:, 15] = body.friction
@@ -105,7 +106,7 @@ class Colliders:
             primitive, centre = _describe(body), np.zeros(3)
             if isinstance(body.shape, Hull) and not body.is_deformed:
                 kinds[k] = HULL
-                hull, centre, row[:, 12:15] = _hull(body.shape)
+                *hull, centre, row[:, 12:15] = hull_tables(body.shape)
                 for numbers, own, first_last in zip((planes, corners), hull, ends[:, k], strict=True):
                     first = sum(map(len, numbers))
                     first_last[:] = first, first + len(own)
@@ -139,7 +140,7 @@ class Colliders:
         shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
         shapes.faces, shapes.corner_ends = (wp.array(pair, dtype=wp.vec2i, device=device) for pair in ends)
         shapes.planes = wp.array(np.concatenate(planes), dtype=wp.vec4, device=device)
-        shapes.corners = wp.array(np.concatenate(corners), dtype=wp.vec3, device=device)
+        shapes.corners = wp.array(np.concatenate(corners), dtype=wp.vec4, device=device)
         shapes.slot = wp.array(slots, dtype=int, device=device)
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
@@ -256,31 +257,6 @@ def _centred(points: np.ndarray, faces: np.ndarray, device: str) -> tuple[Any, n
         indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
     )
     return mesh, middle, 0.5 * (high - low)
-
-
-@lru_cache(maxsize=256)
-def _hull(shape: Hull) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
-    """A hull's planes (k, 4) and corners (m, 3) about its bounding box's middle; the middle, and the half sides."""
-    points = shape.mesh()[0]
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = 0.5 * (low + high)
-    planes = in_separating_order(shape.planes)
-    planes[:, 3] -= planes[:, :3] @ middle
-    return (planes.astype(np.float32), (points - middle).astype(np.float32)), middle, 0.5 * (high - low)
-
-
-def in_separating_order(planes: np.ndarray) -> np.ndarray:
-    """Return planes (k, 4) in an order in which each looks elsewhere than all before it.
-
-    What is beside a hull is then found to be so by the first few.
-    """
-    order = [0]
-    likeness = planes[:, :3] @ planes[0, :3]
-    for _ in range(1, len(planes)):
-        likeness[order[-1]] = np.inf
-        order.append(int(np.argmin(likeness)))
-        likeness = np.maximum(likeness, planes[:, :3] @ planes[order[-1], :3])
-    return np.array(planes[order])
 
 
 def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarray]:

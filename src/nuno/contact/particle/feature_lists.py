@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CYLINDER, FAR, HULL, PLANE
-from nuno.contact.particle.hull import beside_box, meets_ridges
+from nuno.contact.particle.hull import beside_box, meets_corners, meets_ridges
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
 from nuno.numbers.lanes import absolute, add, anywhere, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
@@ -61,8 +61,8 @@ def stands_between(
         beside = beside_box(p, h, vec3(sa, sb, sc))
         if not anywhere(-beside):
             return -beside, -beside
-        ridge, corner = meets_ridges(shapes, s, p, h, ball)
-        return minimum(ridge, -beside), minimum(corner, -beside)
+        ridge = minimum(meets_ridges(shapes, s, p, h, ball), -beside)
+        return ridge, minimum(meets_corners(shapes, s, p, ball, broad / ROUND), ridge)
     x = absolute(p.x)
     y = absolute(p.y)
     z = absolute(p.z)

@@ -17,7 +17,7 @@ import warp as wp
 from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, SPHERE, distance_solid
 from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
-from nuno.contact.particle.hull import outermost_of_hull
+from nuno.contact.particle.hull import beside_box, meets_corners, outermost_corner
 from nuno.contact.particle.hull_ridges import hull_edge_point
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
@@ -258,21 +258,27 @@ def triangle_point(
     o = (way + m) * third
     far = maximum(dot(way - o, way - o), dot(m - o, m - o))
     size = sqrt(maximum(dot(o, o), far)) + h.reach
-    _along, on = stands_between(
-        shapes, s, h.kind, a + o, vec3(size, size, size), size, h.size.x, h.size.y, h.size.z, h.broad
-    )  # fmt: skip
-    due_after(t, entry, travelled, on)
+    around = vec3(size, size, size)
     bj = zero
     bk = zero
+    n = cross(way, m)
     point = vec3(zero, zero, zero)
     normal = vec3(zero, zero, zero)
     gap = zero
+    on = size
+    if h.kind == HULL:
+        on = minimum(meets_corners(shapes, s, a + o, size, cell), -beside_box(a + o, around, h.size))
+        if anywhere(on):
+            point, normal = outermost_corner(shapes, s, a, n * (one / sqrt(dot(n, n) + 1.0e-20)), cell)
+            on = minimum(on, h.reach + dot(point - a, normal))
+    else:
+        _along, on = stands_between(
+            shapes, s, h.kind, a + o, around, size, h.size.x, h.size.y, h.size.z, h.broad
+        )  # fmt: skip
+    due_after(t, entry, travelled, on)
     if anywhere(on):
-        n = cross(way, m)
         nn = dot(n, n) + 1.0e-20
-        if h.kind == HULL:
-            point, normal = outermost_of_hull(shapes, s, a, n * (one / sqrt(nn)))
-        else:
+        if h.kind != HULL:
             # away from the shape's middle
             normal = n * (choose(dot(n, a), one, -one) / sqrt(nn))
             point = outermost(h.kind, normal, h.size.x, h.size.y, h.size.z)

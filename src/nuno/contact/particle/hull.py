@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.numbers.lanes import absolute, add, anywhere, choose, div, full_like, maximum, minimum, mul, sub  # noqa: F401
+from nuno.numbers.lanes import absolute, add, anywhere, choose, div, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, vec3
 from nuno.state.cloth_state import Shapes
 
@@ -83,18 +83,14 @@ def beside_box(p: Any, h: Any, half: Any):
 
 @wp.func
 def meets_ridges(shapes: Shapes, s: int, p: Any, h: Any, ball: Any):
-    """Return by how far edges and corners of a convex hull may be in a box about p of half sides h [m].
+    """Return by how far edges of a convex hull may be in a box about p of half sides h [m]; below zero: apart.
 
-    What is in it is no farther from p than ``ball`` [m], either. A point on an edge is on two planes of faces, a corner
-    on three, and none is outside of any plane.
-
-    Returns:
-        Two numbers, positive where an edge may be there, and where a corner may. Else none is nearer than they say.
+    What is in it is no farther from p than ``ball`` [m], either. A point on an edge is on the planes of two faces, and
+    outside of none.
     """
     apart = -full_like(p.x, FAR)
     first = apart
     second = apart
-    third = apart
     all_seen = int(1)
     ends = shapes.faces[s]
     for k in range(ends[0], ends[1]):
@@ -106,19 +102,32 @@ def meets_ridges(shapes: Shapes, s: int, p: Any, h: Any, ball: Any):
             all_seen = 0
             break
         top = height + reach
-        lower = minimum(first, top)
+        second = maximum(second, minimum(first, top))
         first = maximum(first, top)
-        lowest = minimum(second, lower)
-        second = maximum(second, lower)
-        third = maximum(third, lowest)
     if all_seen == 0:
-        return -apart, -apart
-    return minimum(second, -apart), minimum(third, -apart)
+        return -apart
+    return minimum(second, -apart)
 
 
 @wp.func
-def outermost_of_hull(shapes: Shapes, s: int, a: Any, n: Any):
-    """Return the corner of a convex hull that is the farthest towards a plane through a of unit normal n.
+def meets_corners(shapes: Shapes, s: int, p: Any, ball: Any, cell: float):
+    """Return by how far corners of a convex hull, sharp to cells [m], are in a ball about p [m]; below zero: apart."""
+    least = full_like(p.x, FAR)
+    ends = shapes.corner_ends[s]
+    for k in range(ends[0], ends[1]):
+        c = shapes.corners[k]
+        if cell < c[3]:
+            break
+        x = p.x - c[0]
+        y = p.y - c[1]
+        z = p.z - c[2]
+        least = minimum(least, x * x + y * y + z * z)
+    return ball - sqrt(least)
+
+
+@wp.func
+def outermost_corner(shapes: Shapes, s: int, a: Any, n: Any, cell: float):
+    """Return a hull's corner, of those sharp to cells [m], farthest towards a plane through a of unit normal n.
 
     Returns:
         The corner, and the plane's normal away from the hull.
@@ -131,6 +140,8 @@ def outermost_of_hull(shapes: Shapes, s: int, a: Any, n: Any):
     bottom = a
     for k in range(ends[0], ends[1]):
         c = shapes.corners[k]
+        if cell < c[3]:
+            break
         height = n.x * c[0] + n.y * c[1] + n.z * c[2]
         higher = height - most
         most = choose(higher, height, most)
@@ -138,5 +149,6 @@ def outermost_of_hull(shapes: Shapes, s: int, a: Any, n: Any):
         lower = least - height
         least = choose(lower, height, least)
         bottom = vec3(choose(lower, c[0], bottom.x), choose(lower, c[1], bottom.y), choose(lower, c[2], bottom.z))
+    # a plane through the hull is nearer to the side that it is out of by less
     above = dot(n, a) * 2.0 - most - least
     return choose(above, top, bottom), n * choose(above, one, -one)

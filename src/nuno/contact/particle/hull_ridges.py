@@ -36,8 +36,11 @@ FLUSH = wp.constant(1.0e-7)
 """[m] Of the lowest point, the error that is left."""
 ALIKE = wp.constant(1.0e-4)
 """Difference of two planes' slopes along an edge below which they count as one face."""
-NEXT = wp.constant(0.05)
+NEXT = wp.constant(0.2)
 """Part of an edge by which its second point must be away from the first."""
+FLAT = wp.constant(1.0 / 3.0)
+"""An edge over faces that turn by less than this, 19 degrees, is left to its vertices: it cuts in by a twelfth of its
+length at most, as a diagonal does into a ball of three cells."""
 
 
 def _make(name: str, number: type, vector: type) -> Any:
@@ -87,8 +90,6 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
     apart = -one * FAR
     first = -one * FAR
     second = -one * FAR
-    na = vec3(zero, zero, one)
-    nb = vec3(zero, zero, one)
     ends = shapes.faces[s]
     all_seen = int(1)
     for k in range(ends[0], ends[1]):
@@ -106,11 +107,9 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
         above = begin - ha
         ha = choose(above, begin, ha)
         da = choose(above, slope, da)
-        na = vec3(choose(above, f[0], na.x), choose(above, f[1], na.y), choose(above, f[2], na.z))
         above = end - hb
         hb = choose(above, end, hb)
         db = choose(above, slope, db)
-        nb = vec3(choose(above, f[0], nb.x), choose(above, f[1], nb.y), choose(above, f[2], nb.z))
     if all_seen == 0:
         touch.near = -apart
         touch.on = -apart
@@ -122,7 +121,8 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
     part = (cb - ca) / minimum(da - db, tiny)
     lowest = choose(minimum(-da, db), ca + da * part, ha)
     near = minimum(minimum(second + h.reach, -maximum(apart, beside)), h.reach - minimum(minimum(ha, hb), lowest))
-    on = minimum(minimum(-da, db) + h.reach - h.radius, near)
+    length = sqrt(dot(way, way)) - tiny
+    on = minimum(minimum(minimum(-da, db) + h.reach - h.radius, near), db - da - length * FLAT)
     touch.near = near
     touch.on = on
     if not anywhere(on):
@@ -137,44 +137,51 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
         p = a + at * way
         height = -one * FAR
         slope = zero
-        n = na
         for k in range(ends[0], ends[1]):
             f = shapes.planes[k]
             own = p.x * f[0] + p.y * f[1] + p.z * f[2] - f[3]
             above = own - height
             height = choose(above, own, height)
             slope = choose(above, way.x * f[0] + way.y * f[1] + way.z * f[2], slope)
-            n = vec3(choose(above, f[0], n.x), choose(above, f[1], n.y), choose(above, f[2], n.z))
-        if not anywhere(minimum(on, height - maximum(ca + da * at, cb + db * at) - FLUSH)):
+        # each world stops where it would alone
+        open = minimum(on, height - maximum(ca + da * at, cb + db * at) - FLUSH)
+        if not anywhere(open):
             break
+        rises = minimum(open, slope)
+        falls = minimum(open, choose(slope, -one, one))
         c = height - slope * at
-        high = choose(slope, at, high)
-        cb = choose(slope, c, cb)
-        db = choose(slope, slope, db)
-        nb = choose(slope, n, nb)
-        low = choose(slope, low, at)
-        ca = choose(slope, ca, c)
-        da = choose(slope, da, slope)
-        na = choose(slope, na, n)
-        part = (cb - ca) / minimum(da - db, tiny)
+        high = choose(rises, at, high)
+        cb = choose(rises, c, cb)
+        db = choose(rises, slope, db)
+        low = choose(falls, at, low)
+        ca = choose(falls, c, ca)
+        da = choose(falls, slope, da)
+        part = choose(open, (cb - ca) / minimum(da - db, tiny), part)
     flatter = absolute(db) - absolute(da)
     c = choose(flatter, ca, cb)
     d = choose(flatter, da, db)
-    n = choose(flatter, na, nb)
     # the lowest point is where that piece ends downwards; a second may be at its other end
     down = choose(d, -one, one)
     if point_index > 0:
         down = -down
-    alike = sqrt(dot(way, way)) * ALIKE
+    alike = length * ALIKE
     at = down * FAR
     other = -down * FAR
     do = d + down
+    n = vec3(zero, zero, one)
     no = n
+    least = one * FAR
     for k in range(ends[0], ends[1]):
         f = shapes.planes[k]
         steeper = way.x * f[0] + way.y * f[1] + way.z * f[2] - d
+        lower = c - (a.x * f[0] + a.y * f[1] + a.z * f[2] - f[3])
+        # the piece's own plane
+        miss = absolute(steeper) + absolute(lower)
+        closer = least - miss
+        least = choose(closer, miss, least)
+        n = vec3(choose(closer, f[0], n.x), choose(closer, f[1], n.y), choose(closer, f[2], n.z))
         side = steeper * down
-        own = (c - (a.x * f[0] + a.y * f[1] + a.z * f[2] - f[3])) / choose(absolute(steeper) - alike, steeper, one)
+        own = lower / choose(absolute(steeper) - alike, steeper, one)
         nearer = minimum(side - alike, (at - own) * down)
         at = choose(nearer, own, at)
         do = choose(nearer, d + steeper, do)
@@ -182,7 +189,7 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
         other = choose(minimum(-side - alike, (own - other) * down), own, other)
     at = maximum(zero, minimum(one, at))
     other = maximum(zero, minimum(one, other))
-    from_other = absolute(at - other) - maximum(h.radius * 2.0 / (sqrt(dot(way, way)) - tiny), one * NEXT)
+    from_other = absolute(at - other) - maximum(h.radius * 2.0 / length, one * NEXT)
     if point_index > 0:
         on = minimum(on, from_other)
     elif anywhere(minimum(on, from_other)):
