@@ -16,7 +16,7 @@ from nuno.errors import BodyStateError
 from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
-from nuno.tables.hull_tables import hull_tables
+from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ class Colliders:
         slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
         table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
-        ends = np.zeros((2, max(1, len(bodies)), 2), dtype=np.int32)
-        planes, corners = [np.zeros((1, 4), dtype=np.float32)], [np.zeros((1, 4), dtype=np.float32)]
+        hulls: dict[int, HullTable] = {}
         for k, body in enumerate(bodies):
             row = table[:, k]
             row[:, 15] = body.friction
@@ -106,11 +105,8 @@ class Colliders:
             primitive, centre = _describe(body), np.zeros(3)
             if isinstance(body.shape, Hull) and not body.is_deformed:
                 kinds[k] = HULL
-                *hull, centre, row[:, 12:15] = hull_tables(body.shape)
-                for numbers, own, first_last in zip((planes, corners), hull, ends[:, k], strict=True):
-                    first = sum(map(len, numbers))
-                    first_last[:] = first, first + len(own)
-                    numbers.append(own)
+                hulls[k] = hull = hull_table(body.shape)
+                centre, row[:, 12:15] = hull.middle, hull.half
                 row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
                 position = position + quat.rotate(quaternion, centre)
             elif primitive is None:
@@ -138,9 +134,7 @@ class Colliders:
         shapes.kind = wp.array(kinds, dtype=int, device=device)
         shapes.table = wp.array(table.ravel(), dtype=float, device=device)
         shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
-        shapes.faces, shapes.corner_ends = (wp.array(pair, dtype=wp.vec2i, device=device) for pair in ends)
-        shapes.planes = wp.array(np.concatenate(planes), dtype=wp.vec4, device=device)
-        shapes.corners = wp.array(np.concatenate(corners), dtype=wp.vec4, device=device)
+        put_hulls(shapes, hulls, len(bodies), device)
         shapes.slot = wp.array(slots, dtype=int, device=device)
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)

@@ -1,12 +1,17 @@
-"""Convex hulls as tables: the planes of their faces, and their corners with the cells to which they are sharp."""
+"""Convex hulls as tables: planes of faces, a grid that finds the highest, and corners with the cells that see them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+import warp as wp
 
 from nuno.shapes.shape import Hull
+from nuno.state.cloth_state import Shapes
 
 SAGITTA = 1.0 / 24.0
 """Of a cell's side: as deep as a cell's edge cuts into a ball of three cells, which is left to the vertices."""
@@ -16,24 +21,97 @@ DIRECTIONS = 6
 """Lines through a corner along which the surface about it is looked at."""
 ON_PLANE = 1e-7
 """[m] A corner that is nearer to a face's plane than this is the face's."""
+FEW = 16
+"""Planes up to which all are looked at, without a grid."""
+AROUND = 0.04
+"""[m] How far around a hull its grid goes: as far as edges that touch it reach out."""
+CELLS = 24
+"""Cells along the longest side of a grid."""
+ROUNDING = 1e-5
+"""[m] By which cells overlap: a point may be said to be in the next one."""
+DEEP = 0.02
+"""[m] What is deeper in is rarely asked for, and has no list."""
+
+
+@dataclass(frozen=True, eq=False)
+class HullTable:
+    """A hull in a frame about the middle of its bounding box.
+
+    Attributes:
+        planes: (k, 4) float32, of its faces, outward normals and distances [m].
+        corners: (m, 4) float32, places and from which side of cells on each is sharp [m], the least first.
+        middle: (3,) float [m], of the box, in the shape's frame.
+        half: (3,) float [m], the box's half sides.
+        low: (4,) float32, the grid's low corner [m], and its cells a metre.
+        cells: (3,) int, cells of the grid along x, y and z; 0 for no grid.
+        counts: (cells,) int, how many planes each cell has; 0 for all.
+        listed: (sum of counts,) int32, their numbers.
+    """
+
+    planes: np.ndarray
+    corners: np.ndarray
+    middle: np.ndarray
+    half: np.ndarray
+    low: np.ndarray
+    cells: np.ndarray
+    counts: np.ndarray
+    listed: np.ndarray
 
 
 @lru_cache(maxsize=256)
-def hull_tables(shape: Hull) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return a hull's tables about the middle of its bounding box.
-
-    Returns:
-        Planes (k, 4) of its faces, outward normals and distances [m]; corners (m, 4), places and from which side of
-        cells on each is sharp [m], the least first; the box's middle (3,) and half sides (3,).
-    """
+def hull_table(shape: Hull) -> HullTable:
+    """Return a hull's table."""
     points = shape.mesh()[0]
     low, high = points.min(axis=0), points.max(axis=0)
-    middle = 0.5 * (low + high)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
     planes = in_separating_order(shape.planes)
     planes[:, 3] -= planes[:, :3] @ middle
     corners = np.column_stack([points - middle, sharp_from(points - middle, planes)])
     corners = corners[np.argsort(corners[:, 3], kind="stable")]
-    return planes.astype(np.float32), corners.astype(np.float32), middle, 0.5 * (high - low)
+    planes, corners = planes.astype(np.float32), corners.astype(np.float32)
+    return HullTable(planes, corners, middle, half, *_grid(planes.astype(float), half))
+
+
+def _grid(planes: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``low``, ``cells``, ``counts`` and ``listed`` of a `HullTable`."""
+    low = half + AROUND
+    side = 2.0 * low.max() / CELLS
+    cells = np.ceil(2.0 * low / side).astype(int) if len(planes) > FEW else np.zeros(3, int)
+    numbers = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, 3)
+    heights = ((numbers + 0.5) * side - low) @ planes[:, :3].T - planes[:, 3]
+    reach = (0.5 * side + ROUNDING) * np.abs(planes[:, :3]).sum(axis=1)
+    # somewhere in a cell a plane may be the highest, if it comes higher than another one is in all of the cell
+    least = (heights - reach).max(axis=1, initial=-np.inf)
+    kept = (heights + reach > least[:, None]) & ((heights + reach).max(axis=1, initial=-np.inf) > -DEEP)[:, None]
+    corner = np.append(-low, 1.0 / side).astype(np.float32)
+    return corner, cells, kept.sum(axis=1), np.nonzero(kept)[1].astype(np.int32)
+
+
+def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device: Any) -> None:
+    """Set what the table of ``count`` shapes has of those that are hulls, by their numbers."""
+    faces, corner_ends = (np.zeros((max(1, count), 2), dtype=np.int32) for _ in range(2))
+    grids, lows = np.zeros((max(1, count), 4), dtype=np.int32), np.zeros((max(1, count), 4), dtype=np.float32)
+    # none of these is empty on a device
+    planes, corners = [np.zeros((1, 4), dtype=np.float32)], [np.zeros((1, 4), dtype=np.float32)]
+    counts, listed = [np.zeros(1, dtype=int)], [np.zeros(1, dtype=np.int32)]
+    for k, hull in hulls.items():
+        for ends, numbers, own in ((faces, planes, hull.planes), (corner_ends, corners, hull.corners)):
+            first = sum(map(len, numbers))
+            ends[k] = first, first + len(own)
+            numbers.append(own)
+        grids[k] = sum(map(len, counts)), *hull.cells
+        lows[k] = hull.low
+        counts.append(hull.counts)
+        listed.append(hull.listed)
+    # a cell's list begins where that before it ends; one number stands before all
+    cell_ends = 1 + np.concatenate([[0], np.cumsum(np.concatenate(counts))])
+    shapes.faces, shapes.corner_ends = (wp.array(ends, dtype=wp.vec2i, device=device) for ends in (faces, corner_ends))
+    shapes.planes, shapes.corners, shapes.hull_low = (
+        wp.array(each, dtype=wp.vec4, device=device) for each in (np.concatenate(planes), np.concatenate(corners), lows)
+    )
+    shapes.hull_grid = wp.array(grids, dtype=wp.vec4i, device=device)
+    shapes.cell_ends = wp.array(cell_ends.astype(np.int32), dtype=int, device=device)
+    shapes.cell_planes = wp.array(np.concatenate(listed), dtype=int, device=device)
 
 
 def in_separating_order(planes: np.ndarray) -> np.ndarray:
@@ -59,7 +137,7 @@ def sharp_from(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
 
     Args:
         corners: (m, 3) [m].
-        planes: (k, 4), as `hull_tables` returns.
+        planes: (k, 4), as in a `HullTable`.
     """
     normals, offsets = planes[:, :3], planes[:, 3]
     angles = np.arange(2 * DIRECTIONS) * (np.pi / DIRECTIONS)

@@ -8,7 +8,7 @@ from nuno.contact.particle.hull_ridges import FLAT, hull_edge_point
 from nuno.numbers.vec3 import vec3
 from nuno.shapes.shape import Box, Hull
 from nuno.state.cloth_state import Shapes
-from nuno.tables.hull_tables import hull_tables, sharp_from
+from nuno.tables.hull_tables import hull_table, put_hulls, sharp_from
 
 CELL, REACH = 0.04, 0.005
 ROUNDING = 2e-7  # [m] of floats of 0.2 m, a few of them added
@@ -41,22 +41,20 @@ def touch_edges(
 
 def touched(hull, start, way, which=0):
     """Return what is found of edges (n, 3): (n, 4) and (n, 3), in the frame of the hull's table."""
-    planes, _, _, half = hull_tables(hull)
-    shapes = Shapes()
-    shapes.faces = wp.array([[0, len(planes)]], dtype=wp.vec2i, device="cpu")
-    shapes.planes = wp.array(planes, dtype=wp.vec4, device="cpu")
+    table, shapes = hull_table(hull), Shapes()
+    put_hulls(shapes, {0: table}, 1, "cpu")
     count = len(start)
     numbers, normals = (wp.zeros(count, dtype=kind, device="cpu") for kind in (wp.vec4, wp.vec3))
     edges = [wp.array(each.astype(np.float32), dtype=wp.vec3, device="cpu") for each in (start, way)]
     wp.launch(
-        touch_edges, dim=count, inputs=[shapes, *edges, wp.vec3(*half), which, numbers, normals], device="cpu"
+        touch_edges, dim=count, inputs=[shapes, *edges, wp.vec3(*table.half), which, numbers, normals], device="cpu"
     )  # fmt: skip
     return numbers.numpy(), normals.numpy()
 
 
 def random_edges(rng, hull, count=400):
     """Return edges that pass by a hull's corners and faces, a little outside or inside."""
-    middle = hull_tables(hull)[2]
+    middle = hull_table(hull).middle
     corners = hull.mesh()[0] - middle
     pick = corners[rng.integers(len(corners), size=(count, 3))]
     weights = rng.dirichlet(np.ones(3), count)
@@ -72,7 +70,7 @@ def test_an_edge_meets_a_ridge_at_the_distance_of_two_lines():
     tried = 0
     for _ in range(20):
         hull = Hull.of(rng.normal(scale=0.04, size=(12, 3)))
-        planes = hull_tables(hull)[0].astype(float)
+        planes = hull_table(hull).planes.astype(float)
         start, way = random_edges(rng, hull)
         numbers, normals = touched(hull, start, way)
         parts = np.linspace(0.0, 1.0, 801)
@@ -141,12 +139,12 @@ def test_an_edge_over_a_bar_lies_on_both_of_its_edges():
 def test_corners_are_sharp_to_cells_that_are_not_small_beside_their_curvature():
     """Rule: those of a box to all cells, of a ball with many faces from a third of its radius on, flat ones never."""
     rng = np.random.default_rng(7)
-    box = hull_tables(Hull.of(Box((0.3, 0.1, 0.1)).mesh()[0]))[1]
+    box = hull_table(Hull.of(Box((0.3, 0.1, 0.1)).mesh()[0])).corners
     assert (box[:, 3] < 0.0011).all()
     points = rng.normal(size=(4000, 3))
     points *= 0.12 / np.linalg.norm(points, axis=1)[:, None]
     # faces are 6 mm wide: those of cells of 40 mm are many; the steps of cells are a quarter apart
-    far = hull_tables(Hull.of(points))[1][:, 3]
+    far = hull_table(Hull.of(points)).corners[:, 3]
     assert np.median(far) == np.float32(np.clip(np.median(far), 0.032, 0.05))
     planes = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.1]])
     # beside the corner in the middle of a face nothing falls before the box does

@@ -12,7 +12,8 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
-from nuno.contact.particle.hull import FAR, beside_box
+from nuno.contact.particle.hull import beside_box
+from nuno.contact.particle.hull_grid import top_plane
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
     add,
@@ -82,121 +83,94 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
     touch.on = -beside
     if not anywhere(-beside):
         return touch
-    # heights of both ends, and the slopes there; which of all planes it may reach
-    ha = -one * FAR
-    hb = -one * FAR
-    da = zero
-    db = zero
-    apart = -one * FAR
-    first = -one * FAR
-    second = -one * FAR
-    ends = shapes.faces[s]
-    all_seen = int(1)
-    for k in range(ends[0], ends[1]):
-        f = shapes.planes[k]
-        slope = way.x * f[0] + way.y * f[1] + way.z * f[2]
-        begin = a.x * f[0] + a.y * f[1] + a.z * f[2] - f[3]
-        end = begin + slope
-        apart = maximum(apart, minimum(begin, end) - h.reach)
-        if not anywhere(0.25 * cell - apart):
-            all_seen = 0
-            break
-        top = maximum(begin, end)
-        second = maximum(second, minimum(first, top))
-        first = maximum(first, top)
-        above = begin - ha
-        ha = choose(above, begin, ha)
-        da = choose(above, slope, da)
-        above = end - hb
-        hb = choose(above, end, hb)
-        db = choose(above, slope, db)
-    if all_seen == 0:
-        touch.near = -apart
-        touch.on = -apart
-        return touch
+    # heights of both ends, and the slopes there
+    high_at_a, na = top_plane(shapes, s, a, -beside)
+    high_at_b, nb = top_plane(shapes, s, a + way, -beside)
+    da = dot(na, way)
+    db = dot(nb, way)
     tiny = -one * 1.0e-12
     # both pieces as lines: at the edge's start they are at ca and cb
-    ca = ha
-    cb = hb - db
+    ca = high_at_a
+    cb = high_at_b - db
     part = (cb - ca) / minimum(da - db, tiny)
-    lowest = choose(minimum(-da, db), ca + da * part, ha)
-    near = minimum(minimum(second + h.reach, -maximum(apart, beside)), h.reach - minimum(minimum(ha, hb), lowest))
+    lowest = minimum(minimum(high_at_a, high_at_b), choose(minimum(-da, db), ca + da * part, high_at_a))
+    near = choose(-beside, minimum(h.reach - lowest, -beside), -beside)
     length = sqrt(dot(way, way)) - tiny
     on = minimum(minimum(minimum(-da, db) + h.reach - h.radius, near), db - da - length * FLAT)
     touch.near = near
     touch.on = on
     if not anywhere(on):
         return touch
-    low = zero
-    high = one
+    # the pieces at the ends, for the second point
+    first_c = ca
+    first_d = da
+    first_n = na
+    last_c = cb
+    last_d = db
+    last_n = nb
+    # where it rises or falls all along, it is lowest at an end
+    part = choose(da, zero, choose(-db, one, part))
     cuts = int(CUTS)  # a variable, or Warp would unroll the loop
     for _k in range(cuts):
-        # where it rises or falls all along, it is lowest at an end
-        part = choose(da, zero, choose(-db, one, part))
-        at = maximum(low, minimum(high, part))
-        p = a + at * way
-        height = -one * FAR
-        slope = zero
-        for k in range(ends[0], ends[1]):
-            f = shapes.planes[k]
-            own = p.x * f[0] + p.y * f[1] + p.z * f[2] - f[3]
-            above = own - height
-            height = choose(above, own, height)
-            slope = choose(above, way.x * f[0] + way.y * f[1] + way.z * f[2], slope)
+        part = maximum(zero, minimum(one, part))
+        height, n = top_plane(shapes, s, a + part * way, on)
         # each world stops where it would alone
-        open = minimum(on, height - maximum(ca + da * at, cb + db * at) - FLUSH)
-        if not anywhere(open):
+        above = minimum(on, height - maximum(ca + da * part, cb + db * part) - FLUSH)
+        if not anywhere(above):
             break
-        rises = minimum(open, slope)
-        falls = minimum(open, choose(slope, -one, one))
-        c = height - slope * at
-        high = choose(rises, at, high)
+        slope = dot(n, way)
+        rises = minimum(above, slope)
+        falls = minimum(above, choose(slope, -one, one))
+        c = height - slope * part
         cb = choose(rises, c, cb)
         db = choose(rises, slope, db)
-        low = choose(falls, at, low)
+        nb = choose(rises, n, nb)
         ca = choose(falls, c, ca)
         da = choose(falls, slope, da)
-        part = choose(open, (cb - ca) / minimum(da - db, tiny), part)
+        na = choose(falls, n, na)
+        part = choose(above, (cb - ca) / minimum(da - db, tiny), part)
+    at = maximum(zero, minimum(one, part))
+    # the flatter piece, the other one, and which way the flatter one goes on from there: to the edge's end, or its start
     flatter = absolute(db) - absolute(da)
     c = choose(flatter, ca, cb)
     d = choose(flatter, da, db)
-    # the lowest point is where that piece ends downwards; a second may be at its other end
-    down = choose(d, -one, one)
-    if point_index > 0:
-        down = -down
-    alike = length * ALIKE
-    at = down * FAR
-    other = -down * FAR
-    do = d + down
-    n = vec3(zero, zero, one)
-    no = n
-    least = one * FAR
-    for k in range(ends[0], ends[1]):
-        f = shapes.planes[k]
-        steeper = way.x * f[0] + way.y * f[1] + way.z * f[2] - d
-        lower = c - (a.x * f[0] + a.y * f[1] + a.z * f[2] - f[3])
-        # the piece's own plane
-        miss = absolute(steeper) + absolute(lower)
-        closer = least - miss
-        least = choose(closer, miss, least)
-        n = vec3(choose(closer, f[0], n.x), choose(closer, f[1], n.y), choose(closer, f[2], n.z))
-        side = steeper * down
-        own = lower / choose(absolute(steeper) - alike, steeper, one)
-        nearer = minimum(side - alike, (at - own) * down)
-        at = choose(nearer, own, at)
-        do = choose(nearer, d + steeper, do)
-        no = vec3(choose(nearer, f[0], no.x), choose(nearer, f[1], no.y), choose(nearer, f[2], no.z))
-        other = choose(minimum(-side - alike, (own - other) * down), own, other)
-    at = maximum(zero, minimum(one, at))
-    other = maximum(zero, minimum(one, other))
-    from_other = absolute(at - other) - maximum(h.radius * 2.0 / length, one * NEXT)
-    if point_index > 0:
-        on = minimum(on, from_other)
-    elif anywhere(minimum(on, from_other)):
+    n = choose(flatter, na, nb)
+    do = choose(flatter, db, da)
+    no = choose(flatter, nb, na)
+    onwards = choose(flatter, choose(da, one, -one), choose(-db, -one, one))
+    # the piece at that end of the edge: there, or before, the flatter one ends
+    ce = choose(onwards, last_c, first_c)
+    de = choose(onwards, last_d, first_d)
+    ne = choose(onwards, last_n, first_n)
+    apart = maximum(h.radius * 2.0 / length, one * NEXT)
+    turned = absolute(de - d) - length * ALIKE
+    other = (ce - c) / choose(turned, d - de, one)
+    two = minimum(minimum(on, turned), absolute(other - at) - apart)
+    if anywhere(two):
         touch.more = 1
+    if point_index > 0:
+        on = two
+        for _k in range(cuts):
+            other = maximum(zero, minimum(one, other))
+            height, n_there = top_plane(shapes, s, a + other * way, on)
+            above = minimum(on, height - (c + d * other) - FLUSH)
+            if not anywhere(above):
+                break
+            slope = dot(n_there, way)
+            ce = choose(above, height - slope * other, ce)
+            de = choose(above, slope, de)
+            ne = choose(above, n_there, ne)
+            turned = absolute(de - d) - length * ALIKE
+            on = minimum(on, choose(above, turned, one))
+            other = choose(above, (ce - c) / choose(turned, d - de, one), other)
+        other = maximum(zero, minimum(one, other))
+        on = minimum(on, absolute(other - at) - apart)
+        at = other
+        do = de
+        no = ne
     gap = c + d * at
     # square to the edge, or as near to it as a mean of both normals comes
-    share = maximum(zero, minimum(one, do / (do - d)))
+    share = maximum(zero, minimum(one, do / choose(absolute(do - d) + tiny, do - d, one)))
     across = n * share + no * (one - share)
     size = sqrt(dot(across, across) + 1.0e-20)
     # what is deeper in has gone past the hull's edge
