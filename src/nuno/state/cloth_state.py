@@ -236,8 +236,8 @@ class Shapes:
     each, ``shape_speed`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
     outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners``:
     places, and the cells from which on each is sharp [m], the least first. Its ``hull_grid`` has a first cell and the
-    cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a metre; cell c has, of the numbers of
-    ``cell_planes``, those from ``cell_ends[c]`` to the next.
+    cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a metre; cell c has, of the hull's
+    planes, those of ``cell_planes`` from ``cell_ends[c]`` to the next.
     """
 
     count: int

@@ -15,10 +15,12 @@ from nuno.state.cloth_state import Shapes
 
 SAGITTA = 1.0 / 24.0
 """Of a cell's side: as deep as a cell's edge cuts into a ball of three cells, which is left to the vertices."""
-SCALES = 1e-3 * 1.25 ** np.arange(32)
-"""[m] Sides of cells for which corners are looked at, 1 mm to 1 m."""
-DIRECTIONS = 6
+SCALES = 1e-3 * 1.5 ** np.arange(17)
+"""[m] Sides of cells for which corners are looked at, 1 mm to 0.66 m."""
+DIRECTIONS = 4
 """Lines through a corner along which the surface about it is looked at."""
+NEAREST, OTHERS = 32, 256
+"""Planes that are looked at for a corner: the nearest ones, and of many others some from all sides."""
 ON_PLANE = 1e-7
 """[m] A corner that is nearer to a face's plane than this is the face's."""
 FEW = 16
@@ -29,6 +31,8 @@ CELLS = 24
 """Cells along the longest side of a grid."""
 ROUNDING = 1e-5
 """[m] By which cells overlap: a point may be said to be in the next one."""
+AT_ONCE = 1_000_000
+"""Cells times planes that are looked at at once."""
 DEEP = 0.02
 """[m] What is deeper in is rarely asked for, and has no list."""
 
@@ -78,13 +82,18 @@ def _grid(planes: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     side = 2.0 * low.max() / CELLS
     cells = np.ceil(2.0 * low / side).astype(int) if len(planes) > FEW else np.zeros(3, int)
     numbers = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, 3)
-    heights = ((numbers + 0.5) * side - low) @ planes[:, :3].T - planes[:, 3]
     reach = (0.5 * side + ROUNDING) * np.abs(planes[:, :3]).sum(axis=1)
-    # somewhere in a cell a plane may be the highest, if it comes higher than another one is in all of the cell
-    least = (heights - reach).max(axis=1, initial=-np.inf)
-    kept = (heights + reach > least[:, None]) & ((heights + reach).max(axis=1, initial=-np.inf) > -DEEP)[:, None]
+    kept = [np.zeros((0, len(planes)), dtype=bool)]
+    for some in np.array_split(numbers, 1 + len(numbers) * len(planes) // AT_ONCE):
+        heights = ((some + 0.5) * side - low) @ planes[:, :3].T - planes[:, 3]
+        # somewhere in a cell a plane may be the highest, if it comes higher than another one is in all of the cell
+        highest = heights + reach
+        least = (heights - reach).max(axis=1, initial=-np.inf)
+        near = highest.max(axis=1, initial=-np.inf) > -DEEP
+        kept.append((highest > least[:, None]) & near[:, None])
+    listed = [np.nonzero(some)[1] for some in kept]
     corner = np.append(-low, 1.0 / side).astype(np.float32)
-    return corner, cells, kept.sum(axis=1), np.nonzero(kept)[1].astype(np.int32)
+    return corner, cells, np.concatenate([some.sum(axis=1) for some in kept]), np.concatenate(listed).astype(np.int32)
 
 
 def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device: Any) -> None:
@@ -139,20 +148,24 @@ def sharp_from(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
         corners: (m, 3) [m].
         planes: (k, 4), as in a `HullTable`.
     """
-    normals, offsets = planes[:, :3], planes[:, 3]
     angles = np.arange(2 * DIRECTIONS) * (np.pi / DIRECTIONS)
     found = np.full(len(corners), np.inf)
+    few = planes[:: max(1, len(planes) // OTHERS)]
     for k, corner in enumerate(corners):
-        under = normals @ corner - offsets
-        n = normals[under > -ON_PLANE].sum(axis=0)
+        under = planes[:, :3] @ corner - planes[:, 3]
+        n = planes[under > -ON_PLANE, :3].sum(axis=0)
         n /= np.linalg.norm(n)
         first = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
         first /= np.linalg.norm(first)
         ways = np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * np.cross(n, first)
+        near = planes
+        if len(planes) > NEAREST + OTHERS:
+            near = np.concatenate([planes[np.argpartition(-under, NEAREST)[:NEAREST]], few])
         # down to the planes that look up from beside the corner: (scales, ways, planes)
-        up = normals @ n
-        steps = 0.5 * SCALES[:, None, None] * (ways @ normals.T)
-        falls = ((under + steps)[:, :, up > 1e-3] / up[up > 1e-3]).max(axis=2)
+        up = near[:, :3] @ n
+        near, up = near[up > 1e-3], up[up > 1e-3]
+        steps = 0.5 * SCALES[:, None, None] * (ways @ near[:, :3].T)
+        falls = ((near[:, :3] @ corner - near[:, 3] + steps) / up).max(axis=2)
         least = 0.5 * (falls[:, :DIRECTIONS] + falls[:, DIRECTIONS:]).min(axis=1)
         sharp = least > SAGITTA * SCALES
         if sharp.any():

@@ -27,6 +27,7 @@ def top_of(shapes: Shapes, s: int, x: float, y: float, z: float):
     best = wp.vec4(-FAR, 0.0, 0.0, 1.0)
     begin = int(0)
     end = int(0)
+    ends = shapes.faces[s]
     grid = shapes.hull_grid[s]
     if grid[1] > 0:
         low = shapes.hull_low[s]
@@ -39,9 +40,8 @@ def top_of(shapes: Shapes, s: int, x: float, y: float, z: float):
             end = shapes.cell_ends[cell + 1]
     if begin < end:
         for c in range(begin, end):
-            best = higher(best, shapes.planes[shapes.cell_planes[c]], x, y, z)
+            best = higher(best, shapes.planes[ends[0] + shapes.cell_planes[c]], x, y, z)
     else:
-        ends = shapes.faces[s]
         for f in range(ends[0], ends[1]):
             best = higher(best, shapes.planes[f], x, y, z)
     return best

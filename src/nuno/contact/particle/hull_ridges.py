@@ -130,7 +130,7 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
         na = choose(falls, n, na)
         part = choose(above, (cb - ca) / minimum(da - db, tiny), part)
     at = maximum(zero, minimum(one, part))
-    # the flatter piece, the other one, and which way the flatter one goes on from there: to the edge's end, or its start
+    # the flatter piece, the other one, and the way the flatter one goes on: to the edge's end, or its start
     flatter = absolute(db) - absolute(da)
     c = choose(flatter, ca, cb)
     d = choose(flatter, da, db)
