@@ -139,8 +139,8 @@ class Colliders:
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
         shapes.shape_speed = wp.zeros(1, dtype=float, device=device)
-        sharp = (kinds == BOX) | (kinds == CYLINDER) | (kinds == HULL)
-        curved = np.where(sharp, 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
+        edged = (kinds == BOX) | (kinds == CYLINDER) | (kinds == HULL)
+        curved = np.where(edged, 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
         keys = [body.key for body in bodies]
         return cls(shapes, keys, meshes, kinematic, centres, float(curved.min()))
 

@@ -49,7 +49,7 @@ class HullTable:
         low: (4,) float32, the grid's low corner [m], and its cells a metre.
         cells: (3,) int, cells of the grid along x, y and z; 0 for no grid.
         counts: (cells,) int, how many planes each cell has; 0 for all.
-        listed: (sum of counts,) int32, their numbers.
+        cell_planes: (sum of counts,) int32, their numbers.
     """
 
     planes: np.ndarray
@@ -59,7 +59,7 @@ class HullTable:
     low: np.ndarray
     cells: np.ndarray
     counts: np.ndarray
-    listed: np.ndarray
+    cell_planes: np.ndarray
 
 
 @lru_cache(maxsize=256)
@@ -70,14 +70,14 @@ def hull_table(shape: Hull) -> HullTable:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     planes = in_separating_order(shape.planes)
     planes[:, 3] -= planes[:, :3] @ middle
-    corners = np.column_stack([points - middle, sharp_from(points - middle, planes)])
+    corners = np.column_stack([points - middle, corner_scales(points - middle, planes)])
     corners = corners[np.argsort(corners[:, 3], kind="stable")]
     planes, corners = planes.astype(np.float32), corners.astype(np.float32)
     return HullTable(planes, corners, middle, half, *_grid(planes.astype(float), half))
 
 
 def _grid(planes: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return ``low``, ``cells``, ``counts`` and ``listed`` of a `HullTable`."""
+    """Return ``low``, ``cells``, ``counts`` and ``cell_planes`` of a `HullTable`."""
     low = half + AROUND
     side = 2.0 * low.max() / CELLS
     cells = np.ceil(2.0 * low / side).astype(int) if len(planes) > FEW else np.zeros(3, int)
@@ -91,9 +91,14 @@ def _grid(planes: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray,
         least = (heights - reach).max(axis=1, initial=-np.inf)
         near = highest.max(axis=1, initial=-np.inf) > -DEEP
         kept.append((highest > least[:, None]) & near[:, None])
-    listed = [np.nonzero(some)[1] for some in kept]
+    cell_planes = [np.nonzero(some)[1] for some in kept]
     corner = np.append(-low, 1.0 / side).astype(np.float32)
-    return corner, cells, np.concatenate([some.sum(axis=1) for some in kept]), np.concatenate(listed).astype(np.int32)
+    return (
+        corner,
+        cells,
+        np.concatenate([some.sum(axis=1) for some in kept]),
+        np.concatenate(cell_planes).astype(np.int32),
+    )
 
 
 def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device: Any) -> None:
@@ -102,7 +107,7 @@ def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device
     grids, lows = np.zeros((max(1, count), 4), dtype=np.int32), np.zeros((max(1, count), 4), dtype=np.float32)
     # none of these is empty on a device
     planes, corners = [np.zeros((1, 4), dtype=np.float32)], [np.zeros((1, 4), dtype=np.float32)]
-    counts, listed = [np.zeros(1, dtype=int)], [np.zeros(1, dtype=np.int32)]
+    counts, cell_planes = [np.zeros(1, dtype=int)], [np.zeros(1, dtype=np.int32)]
     for k, hull in hulls.items():
         for ends, numbers, own in ((faces, planes, hull.planes), (corner_ends, corners, hull.corners)):
             first = sum(map(len, numbers))
@@ -111,7 +116,7 @@ def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device
         grids[k] = sum(map(len, counts)), *hull.cells
         lows[k] = hull.low
         counts.append(hull.counts)
-        listed.append(hull.listed)
+        cell_planes.append(hull.cell_planes)
     # a cell's list begins where that before it ends; one number stands before all
     cell_ends = 1 + np.concatenate([[0], np.cumsum(np.concatenate(counts))])
     shapes.faces, shapes.corner_ends = (wp.array(ends, dtype=wp.vec2i, device=device) for ends in (faces, corner_ends))
@@ -120,7 +125,7 @@ def put_hulls(shapes: Shapes, hulls: Mapping[int, HullTable], count: int, device
     )
     shapes.hull_grid = wp.array(grids, dtype=wp.vec4i, device=device)
     shapes.cell_ends = wp.array(cell_ends.astype(np.int32), dtype=int, device=device)
-    shapes.cell_planes = wp.array(np.concatenate(listed), dtype=int, device=device)
+    shapes.cell_planes = wp.array(np.concatenate(cell_planes), dtype=int, device=device)
 
 
 def in_separating_order(planes: np.ndarray) -> np.ndarray:
@@ -137,7 +142,7 @@ def in_separating_order(planes: np.ndarray) -> np.ndarray:
     return np.array(planes[order])
 
 
-def sharp_from(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
+def corner_scales(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Return from which side of cells on (m,) [m] the corners of a hull stand through triangles; inf for never.
 
     Of cells of side h, the vertices about a corner are some h / 2 away. Along the line through it on which the surface
@@ -167,7 +172,7 @@ def sharp_from(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
         steps = 0.5 * SCALES[:, None, None] * (ways @ near[:, :3].T)
         falls = ((near[:, :3] @ corner - near[:, 3] + steps) / up).max(axis=2)
         least = 0.5 * (falls[:, :DIRECTIONS] + falls[:, DIRECTIONS:]).min(axis=1)
-        sharp = least > SAGITTA * SCALES
-        if sharp.any():
-            found[k] = SCALES[sharp.argmax()]
+        stands_out = least > SAGITTA * SCALES
+        if stands_out.any():
+            found[k] = SCALES[stands_out.argmax()]
     return found

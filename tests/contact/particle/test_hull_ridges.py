@@ -9,7 +9,7 @@ from nuno.contact.particle.hull_ridges import FLAT, hull_edge_point
 from nuno.numbers.vec3 import vec3
 from nuno.shapes.shape import Box, Hull
 from nuno.state.cloth_state import Shapes
-from nuno.tables.hull_tables import hull_table, put_hulls, sharp_from
+from nuno.tables.hull_tables import corner_scales, hull_table, put_hulls
 
 CELL, REACH = 0.04, 0.005
 ROUNDING = 2e-7  # [m] of floats of 0.2 m, a few of them added
@@ -144,8 +144,8 @@ def test_corners_are_sharp_to_cells_that_are_not_small_beside_their_curvature():
     assert (box[:, 3] < 0.0011).all()
     ball = Hull.of(trimesh.creation.icosphere(subdivisions=4, radius=0.12).vertices)
     # its faces meet at 4 degrees; the sides of cells that are looked at are half as long again each time
-    far = sharp_from(ball.mesh()[0][:100], ball.planes)
+    far = corner_scales(ball.mesh()[0][:100], ball.planes)
     assert 0.04 / 1.5 < far.min() <= far.max() < 0.04 * 1.5
     planes = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.1]])
     # beside the corner in the middle of a face nothing falls before the box does
-    assert sharp_from(np.zeros((1, 3)), planes)[0] >= 0.19
+    assert corner_scales(np.zeros((1, 3)), planes)[0] >= 0.19

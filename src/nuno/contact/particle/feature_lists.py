@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CYLINDER, FAR, HULL, PLANE
-from nuno.contact.particle.hull import beside_box, meets_corners, meets_ridges
+from nuno.contact.particle.hull import box_clearance, meets_corners, meets_ridges
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
 from nuno.numbers.lanes import absolute, add, anywhere, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
@@ -58,10 +58,10 @@ def stands_between(
         triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
     """
     if kind == HULL:
-        beside = beside_box(p, h, vec3(sa, sb, sc))
-        if not anywhere(-beside):
-            return -beside, -beside
-        ridge = minimum(meets_ridges(shapes, s, p, h, ball), -beside)
+        clearance = box_clearance(p, h, vec3(sa, sb, sc))
+        if not anywhere(-clearance):
+            return -clearance, -clearance
+        ridge = minimum(meets_ridges(shapes, s, p, h, ball), -clearance)
         return ridge, minimum(meets_corners(shapes, s, p, ball, broad / ROUND), ridge)
     x = absolute(p.x)
     y = absolute(p.y)

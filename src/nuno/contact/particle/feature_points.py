@@ -17,7 +17,7 @@ import warp as wp
 from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, SPHERE, distance_solid
 from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
-from nuno.contact.particle.hull import beside_box, meets_corners, outermost_corner
+from nuno.contact.particle.hull import box_clearance, meets_corners, outermost_corner
 from nuno.contact.particle.hull_ridges import hull_edge_point
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
@@ -267,7 +267,7 @@ def triangle_point(
     gap = zero
     on = size
     if h.kind == HULL:
-        on = minimum(meets_corners(shapes, s, a + o, size, cell), -beside_box(a + o, around, h.size))
+        on = minimum(meets_corners(shapes, s, a + o, size, cell), -box_clearance(a + o, around, h.size))
         if anywhere(on):
             point, normal = outermost_corner(shapes, s, a, n * (one / sqrt(dot(n, n) + 1.0e-20)), cell)
             on = minimum(on, h.reach + dot(point - a, normal))

@@ -73,7 +73,7 @@ def way_into_hull(shapes: Shapes, s: int, x: Any, y: Any, z: Any, ux: Any, uy: A
 
 
 @wp.func
-def beside_box(p: Any, h: Any, half: Any):
+def box_clearance(p: Any, h: Any, half: Any):
     """Return how far a box about p (half sides h) is from the box of half sides ``half`` about the origin [m]."""
     x = absolute(p.x) - h.x - half.x
     y = absolute(p.y) - h.y - half.y

@@ -1,4 +1,4 @@
-"""Where an edge of a cloth or soft body is nearest to a convex hull: across the hull's own edges.
+"""An edge of a cloth or soft body at its nearest to a convex hull: across the hull's own edges.
 
 Along a straight edge the height above the hull, the largest of those above the planes of its faces, is convex and made
 of straight pieces. Two pieces meet at the lowest point, one that falls and one that rises. The mean of their planes'
@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
-from nuno.contact.particle.hull import beside_box
+from nuno.contact.particle.hull import box_clearance
 from nuno.contact.particle.hull_grid import top_plane
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
@@ -78,14 +78,14 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
     touch.more = int(0)
     reach = vec3(h.reach, h.reach, h.reach)
     half = vec3(absolute(way.x), absolute(way.y), absolute(way.z)) * 0.5 + reach
-    beside = beside_box(a + way * 0.5, half, h.size)
-    touch.near = -beside
-    touch.on = -beside
-    if not anywhere(-beside):
+    clearance = box_clearance(a + way * 0.5, half, h.size)
+    touch.near = -clearance
+    touch.on = -clearance
+    if not anywhere(-clearance):
         return touch
     # heights of both ends, and the slopes there
-    high_at_a, na = top_plane(shapes, s, a, -beside)
-    high_at_b, nb = top_plane(shapes, s, a + way, -beside)
+    high_at_a, na = top_plane(shapes, s, a, -clearance)
+    high_at_b, nb = top_plane(shapes, s, a + way, -clearance)
     da = dot(na, way)
     db = dot(nb, way)
     tiny = -one * 1.0e-12
@@ -94,7 +94,7 @@ def hull_edge_point(h: Any, shapes: Shapes, s: int, a: Any, way: Any, point_inde
     cb = high_at_b - db
     part = (cb - ca) / minimum(da - db, tiny)
     lowest = minimum(minimum(high_at_a, high_at_b), choose(minimum(-da, db), ca + da * part, high_at_a))
-    near = choose(-beside, minimum(h.reach - lowest, -beside), -beside)
+    near = choose(-clearance, minimum(h.reach - lowest, -clearance), -clearance)
     length = sqrt(dot(way, way)) - tiny
     on = minimum(minimum(minimum(-da, db) + h.reach - h.radius, near), db - da - length * FLAT)
     touch.near = near
