@@ -23,6 +23,8 @@ NEAREST, OTHERS = 32, 256
 """Planes that are looked at for a corner: the nearest ones, and of many others some from all sides."""
 ON_PLANE = 1e-7
 """[m] A corner that is nearer to a face's plane than this is the face's."""
+SPARE = 5e-4
+"""[m] Corners that stand out of the hull of the others by no more than this are left to vertices and edges."""
 FEW = 16
 """Planes up to which all are looked at, without a grid."""
 AROUND = 0.04
@@ -70,7 +72,8 @@ def hull_table(shape: Hull) -> HullTable:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     planes = in_separating_order(shape.planes)
     planes[:, 3] -= planes[:, :3] @ middle
-    corners = np.column_stack([points - middle, corner_scales(points - middle, planes)])
+    outer = outer_corners(points - middle)
+    corners = np.column_stack([outer, corner_scales(outer, planes)])
     corners = corners[np.argsort(corners[:, 3], kind="stable")]
     planes, corners = planes.astype(np.float32), corners.astype(np.float32)
     return HullTable(planes, corners, middle, half, *_grid(planes.astype(float), half))
@@ -140,6 +143,26 @@ def in_separating_order(planes: np.ndarray) -> np.ndarray:
         order.append(int(np.argmin(likeness)))
         likeness = np.maximum(likeness, planes[:, :3] @ planes[order[-1], :3])
     return np.array(planes[order])
+
+
+def outer_corners(points: np.ndarray) -> np.ndarray:
+    """Return those of a hull's corners (n, 3) whose own hull leaves none out by more than ``SPARE``."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    ways = np.stack(np.meshgrid(*3 * [(-1.0, 0.0, 1.0)]), axis=-1).reshape(-1, 3)
+    chosen = np.unique((points @ ways.T).argmax(axis=0))
+    for _ in range(len(points)):
+        try:
+            planes = ConvexHull(points[chosen]).equations
+        except QhullError:  # those are in one plane
+            return points
+        heights = points @ planes[:, :3].T + planes[:, 3]
+        farthest = heights.argmax(axis=0)
+        farthest = farthest[heights.max(axis=0) > SPARE]
+        if not len(farthest):
+            break
+        chosen = np.union1d(chosen, farthest)
+    return points[chosen]
 
 
 def corner_scales(corners: np.ndarray, planes: np.ndarray) -> np.ndarray:
