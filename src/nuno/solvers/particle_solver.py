@@ -76,13 +76,14 @@ class ParticleSolver(ParticleState):
         if colliders is None:
             shapes = Shapes()
             shapes.count = shapes.stride = shapes.mesh_stride = shapes.pose_stride = 0
-            for name in ("kind", "slot", "timing"):
+            for name in ("kind", "slot", "timing", "cell_ends", "cell_planes"):
                 setattr(shapes, name, wp.zeros(2, dtype=int, device=self.device))
             for name in ("table", "pose", "shape_speed"):
                 setattr(shapes, name, wp.zeros(1, dtype=float, device=self.device))
             shapes.mesh = wp.zeros(1, dtype=wp.uint64, device=self.device)
-            shapes.faces = wp.zeros(1, dtype=wp.vec2i, device=self.device)
-            shapes.planes = wp.zeros(1, dtype=wp.vec4, device=self.device)
+            shapes.faces = shapes.corner_ends = wp.zeros(1, dtype=wp.vec2i, device=self.device)
+            shapes.planes = shapes.corners = shapes.hull_low = wp.zeros(1, dtype=wp.vec4, device=self.device)
+            shapes.hull_grid = wp.zeros(1, dtype=wp.vec4i, device=self.device)
         else:
             shapes = colliders.shapes
         self._colliders, self.shapes = colliders, shapes

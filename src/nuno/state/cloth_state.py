@@ -234,7 +234,10 @@ class Shapes:
 
     What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
     each, ``shape_speed`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
-    outward normal and the distance from the hull's origin [m].
+    outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners``:
+    places, and the cells from which on each is sharp [m], the least first. Its ``hull_grid`` has a first cell and the
+    cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a metre; cell c has, of the hull's
+    planes, those of ``cell_planes`` from ``cell_ends[c]`` to the next.
     """
 
     count: int
@@ -246,6 +249,12 @@ class Shapes:
     mesh: wp.array(dtype=wp.uint64)
     faces: wp.array(dtype=wp.vec2i)
     planes: wp.array(dtype=wp.vec4)
+    corner_ends: wp.array(dtype=wp.vec2i)
+    corners: wp.array(dtype=wp.vec4)
+    hull_grid: wp.array(dtype=wp.vec4i)
+    hull_low: wp.array(dtype=wp.vec4)
+    cell_ends: wp.array(dtype=int)
+    cell_planes: wp.array(dtype=int)
     slot: wp.array(dtype=int)
     pose: wp.array(dtype=float)
     timing: wp.array(dtype=int)

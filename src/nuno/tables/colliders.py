@@ -16,6 +16,7 @@ from nuno.errors import BodyStateError
 from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
+from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Colliders:
         count: Number of shapes.
         keys: The keys of their bodies, in the table's order.
         kinematic: Bodies with a slot, in the slots' order.
-        min_radius: The least with which any sphere, capsule, box or cylinder is curved [m]; 0 for those with edges.
+        min_radius: The least with which any ball, capsule or other convex shape is curved [m]; 0 for those with edges.
     """
 
     def __init__(
@@ -95,8 +96,7 @@ class Colliders:
         slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
         table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
-        faces = np.zeros((max(1, len(bodies)), 2), dtype=np.int32)
-        planes = [np.zeros((1, 4), dtype=np.float32)]
+        hulls: dict[int, HullTable] = {}
         for k, body in enumerate(bodies):
             row = table[:, k]
             row[:, 15] = body.friction
@@ -105,10 +105,8 @@ class Colliders:
             primitive, centre = _describe(body), np.zeros(3)
             if isinstance(body.shape, Hull) and not body.is_deformed:
                 kinds[k] = HULL
-                own, centre, row[:, 12:15] = _hull(body.shape)
-                faces[k, 0] = sum(map(len, planes))
-                faces[k, 1] = faces[k, 0] + len(own)
-                planes.append(own)
+                hulls[k] = hull = hull_table(body.shape)
+                centre, row[:, 12:15] = hull.middle, hull.half
                 row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
                 position = position + quat.rotate(quaternion, centre)
             elif primitive is None:
@@ -136,13 +134,13 @@ class Colliders:
         shapes.kind = wp.array(kinds, dtype=int, device=device)
         shapes.table = wp.array(table.ravel(), dtype=float, device=device)
         shapes.mesh = wp.array(ids.ravel(), dtype=wp.uint64, device=device)
-        shapes.faces = wp.array(faces, dtype=wp.vec2i, device=device)
-        shapes.planes = wp.array(np.concatenate(planes), dtype=wp.vec4, device=device)
+        put_hulls(shapes, hulls, len(bodies), device)
         shapes.slot = wp.array(slots, dtype=int, device=device)
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
         shapes.shape_speed = wp.zeros(1, dtype=float, device=device)
-        curved = np.where((kinds == BOX) | (kinds == CYLINDER), 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
+        edged = (kinds == BOX) | (kinds == CYLINDER) | (kinds == HULL)
+        curved = np.where(edged, 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
         keys = [body.key for body in bodies]
         return cls(shapes, keys, meshes, kinematic, centres, float(curved.min()))
 
@@ -253,31 +251,6 @@ def _centred(points: np.ndarray, faces: np.ndarray, device: str) -> tuple[Any, n
         indices=wp.array(np.asarray(faces, np.int32).ravel(), dtype=int, device=device),
     )
     return mesh, middle, 0.5 * (high - low)
-
-
-@lru_cache(maxsize=256)
-def _hull(shape: Hull) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A hull's planes (k, 4) about the middle of its bounding box; the middle, and the half sides."""
-    points = shape.mesh()[0]
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = 0.5 * (low + high)
-    planes = in_separating_order(shape.planes)
-    planes[:, 3] -= planes[:, :3] @ middle
-    return planes.astype(np.float32), middle, 0.5 * (high - low)
-
-
-def in_separating_order(planes: np.ndarray) -> np.ndarray:
-    """Return planes (k, 4) in an order in which each looks elsewhere than all before it.
-
-    What is beside a hull is then found to be so by the first few.
-    """
-    order = [0]
-    likeness = planes[:, :3] @ planes[0, :3]
-    for _ in range(1, len(planes)):
-        likeness[order[-1]] = np.inf
-        order.append(int(np.argmin(likeness)))
-        likeness = np.maximum(likeness, planes[:, :3] @ planes[order[-1], :3])
-    return np.array(planes[order])
 
 
 def _meshes_of(body: Body, device: str) -> tuple[list[Any], np.ndarray, np.ndarray]:

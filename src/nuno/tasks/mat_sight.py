@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 
 from nuno.shapes.shape import Hull, Shape
-from nuno.tables.colliders import in_separating_order
+from nuno.tables.hull_tables import in_separating_order
 from nuno.tasks.arm_tracks import ArmTracks
 
 FAR = wp.constant(1.0e6)

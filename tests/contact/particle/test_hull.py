@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import nuno
 from nuno.bodies.body import Body
@@ -79,19 +80,20 @@ def test_a_soft_block_rubs_on_a_hull_as_on_a_box(angle):
 
 def test_a_cloth_on_a_moving_hull_is_that_on_a_mesh():
     """Another method: a mesh of the same triangles, which is searched."""
-    ball = nuno.sphere(0.1)
+    # so round, and met by cells so small, that a hull's edges and corners are left to the vertices, as a mesh's are
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
     ends = {}
     for kind in ("mesh", "hull"):
         world = nuno.World(device="cpu")
         shape = Hull.of(ball.vertices)
         shape = shape if kind == "hull" else nuno.TriangleMesh(*shape.mesh())
         under = world.add(Body(shape, name="ball", friction=0.8))
-        sheet = world.add(nuno.sheet((0.3, 0.3), cells=(10, 10), position=(0, 0, 0.11)))
+        sheet = world.add(nuno.sheet((0.3, 0.3), cells=(20, 20), position=(0, 0, 0.11)))
         world.attach(sheet, nuno.Cloth(thickness=THICKNESS, air_drag=4.0, friction=0.8))
         world.move(under, nuno.Path([0.0, 0.4], [[0, 0, 0], [0.05, 0, 0.02]]))
         world.run(0.6)
         ends[kind] = sheet.vertices
-    # a drape repeats itself no better: the mesh's own is 0.8 mm from itself in the mean, laid 0.01 mm to the side
+    # a drape repeats itself no better: the mesh's own is 0.65 mm from itself in the mean, laid 0.01 mm to the side
     assert np.abs(ends["mesh"] - ends["hull"]).mean() < 1.5e-3
     assert ends["hull"][:, 2].max() > 0.1  # it has not fallen off
 

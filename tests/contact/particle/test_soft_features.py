@@ -286,6 +286,7 @@ def test_small_shapes_alone_are_sharp():
     for shape, sharp in (
         (nuno.plane(), False), (nuno.sphere(3.1 * cell), False), (nuno.sphere(2.9 * cell), True),
         (nuno.capsule(2.9 * cell, 1.0), True), (nuno.cylinder(1.0, 1.0), True), (nuno.box((1, 1, 1)), True),
+        (nuno.Body(nuno.Hull.of(nuno.box((1, 1, 1)).vertices)), True),
     ):  # fmt: skip
         solver.set_colliders(Colliders.from_bodies([nuno.plane(), shape]))
         assert solver._has_features == sharp

@@ -6,16 +6,16 @@ without a look at them: an element sleeps until anything may have come as near a
 again few are pushed.
 
 So the threads of a block first queue what is active (`nuno.contact.particle.feature_queue`). Then a thread takes an
-element, at a box two do, for at two of its edges an element has two points; all find those at once, as they do not
-depend on pushes, and only then do they push, one colour after the other. What is more than the queue has room for comes
-a colour at a time, with the same bits. On the CPU a thread takes one after the other.
+element, at a box or a hull two do, for at two of its edges an element has two points; all find those at once, as they
+do not depend on pushes, and only then do they push, one colour after the other. What is more than the queue has room
+for comes a colour at a time, with the same bits. On the CPU a thread takes one after the other.
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.contact.particle.distances import BOX, FAR
+from nuno.contact.particle.distances import BOX, FAR, HULL
 from nuno.contact.particle.feature_lists import DUE, EARLIEST, TRAVELLED
 from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
@@ -83,9 +83,9 @@ def push_elements(
     h = feature_pose(like, t, run, shapes, s)
     edges = topo.side.shape[0]
     colours = topo.feature_colour.shape[0] - 1
-    # of a box's edges each has two points
+    # at a box or a hull each edge has two points
     points = int(1)
-    if h.kind == BOX and shares_work(size):
+    if (h.kind == BOX or h.kind == HULL) and shares_work(size):
         points = 2
     together = size / points
     mine = rank / points
@@ -127,14 +127,18 @@ def push_elements(
                     i = corners[0]
                     j = corners[1]
                     k = corners[2]
-                    on, bj, bk, point, normal, gap = triangle_point(t, h, entry, travelled, i, j, k, run.cell)
+                    on, bj, bk, point, normal, gap = triangle_point(
+                        t, h, shapes, s, entry, travelled, i, j, k, run.cell
+                    )  # fmt: skip
                     bi = one - bj - bk
             elif element >= 0:
                 ends = topo.side[element]
                 i = ends[0]
                 j = ends[1]
                 k = i
-                on, more, bj, point, normal, gap = edge_point(t, h, entry, travelled, i, j, point_index, run.cell)
+                on, more, bj, point, normal, gap = edge_point(
+                    t, h, shapes, s, entry, travelled, i, j, point_index, run.cell
+                )  # fmt: skip
                 bi = one - bj
             if shares_work(size):
                 more = 0

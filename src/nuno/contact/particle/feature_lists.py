@@ -1,17 +1,18 @@
 """Shapes that are sharp or small enough to stand through between vertices, and the edges and triangles near them.
 
-Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box, the rim of a cylinder
-and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found which of
-those may come that near within the frame (`nuno.contact.particle.feature_contact` looks at them); where a cloth lies on
-a table, far from its rim, that is one question about its bounding box. What does not touch changes no bit, so that it
-does not matter what else is listed.
+Vertices alone keep a cloth off a flat face, and off a ball many cells wide. The edge of a box or a hull, the rim of a
+cylinder and a ball as small as a cell touch the cloth's edges and triangles between them. Once a frame it is found
+which of those may come that near within the frame (`nuno.contact.particle.feature_contact` looks at them); where a
+cloth lies on a table, far from its rim, that is one question about its bounding box. What does not touch changes no
+bit, so that it does not matter what else is listed.
 """
 
 from typing import Any
 
 import warp as wp
 
-from nuno.contact.particle.distances import BOX, CYLINDER, FAR, PLANE
+from nuno.contact.particle.distances import BOX, CYLINDER, FAR, HULL, PLANE
+from nuno.contact.particle.hull import box_clearance, meets_corners, meets_ridges
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
 from nuno.numbers.lanes import absolute, add, anywhere, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
@@ -46,14 +47,22 @@ def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
 
 @wp.func
 def stands_between(
-    kind: int, p: Any, h: Any, sa: Any, sb: Any, sc: Any, broad: float
+    shapes: Shapes, s: int, kind: int, p: Any, h: Any, ball: Any, sa: Any, sb: Any, sc: Any, broad: float
 ):  # fmt: skip
     """Return True if what is within a box about p (half sides h, all in the shape's frame) may touch between vertices.
+
+    It is in a ball about p of radius ``ball`` [m], too.
 
     Returns:
         Two numbers, positive where it may: between the ends of an edge, as along an edge of a box, and inside of a
         triangle, as at its corner. A radius of ``broad`` [m] or more counts as flat.
     """
+    if kind == HULL:
+        clearance = box_clearance(p, h, vec3(sa, sb, sc))
+        if not anywhere(-clearance):
+            return -clearance, -clearance
+        ridge = minimum(meets_ridges(shapes, s, p, h, ball), -clearance)
+        return ridge, minimum(meets_corners(shapes, s, p, ball, broad / ROUND), ridge)
     x = absolute(p.x)
     y = absolute(p.y)
     z = absolute(p.z)
@@ -119,7 +128,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
     for near in range(t.shape_list[0]):
         s = t.shape_list[1 + near]
         kind = shapes.kind[s]
-        if kind < PLANE:
+        if kind < PLANE or kind == HULL:
             centre, r = pose_of(like, t, shapes, s, clock)
             extent = three_of(like, t, shapes, s * COLUMNS + 12)
             # the cloth's box as the shape sees it
@@ -132,7 +141,10 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                 absolute(r.x.y) * w.x + absolute(r.y.y) * w.y + absolute(r.z.y) * w.z + grow,
                 absolute(r.x.z) * w.x + absolute(r.y.z) * w.y + absolute(r.z.z) * w.z + grow,
             )
-            along, point = stands_between(kind, transposed_mul(r, middle), h, extent.x, extent.y, extent.z, broad)
+            ball = sqrt(h.x * h.x + h.y * h.y + h.z * h.z)
+            along, point = stands_between(
+                shapes, s, kind, transposed_mul(r, middle), h, ball, extent.x, extent.y, extent.z, broad
+            )  # fmt: skip
             if anywhere(along):
                 if found == 0:
                     for i in range(rank, topo.particles, size):
@@ -143,11 +155,11 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                 for i in range(rank, topo.particles, size):
                     p = transposed_mul(r, position(t, i) - centre)
                     along, point = stands_between(
-                        kind, p, vec3(around, around, around), extent.x, extent.y, extent.z, broad
+                        shapes, s, kind, p, vec3(around, around, around), around, extent.x, extent.y, extent.z, broad
                     )  # fmt: skip
                     if anywhere(along):
                         at_once, _point = stands_between(
-                            kind, p, vec3(soon, soon, soon), extent.x, extent.y, extent.z, broad
+                            shapes, s, kind, p, vec3(soon, soon, soon), soon, extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
                         slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK))
                         mark = t.feature_mark[i]

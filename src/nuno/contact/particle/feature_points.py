@@ -14,9 +14,11 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, SPHERE, distance_solid
+from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, SPHERE, distance_solid
 from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
+from nuno.contact.particle.hull import box_clearance, meets_corners, outermost_corner
+from nuno.contact.particle.hull_ridges import hull_edge_point
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
     add,
@@ -33,6 +35,7 @@ from nuno.numbers.lanes import (  # noqa: F401
     to_float,
 )
 from nuno.numbers.vec3 import cross, dot, start_position, transposed_mul, vec3
+from nuno.state.cloth_state import Shapes
 
 STEPS = wp.constant(6)
 """Tangents looked at between two ends: the distance of a 40 mm edge from what is round by 4 mm, or from the edge of a
@@ -138,7 +141,9 @@ def due_after(t: Any, entry: int, travelled: float, near: Any):
 
 
 @wp.func
-def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, point_index: int, cell: float):
+def edge_point(
+    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: float, i: int, j: int, point_index: int, cell: float
+):  # fmt: skip
     """Return an edge's point nearest to a shape: 0 or 1 (``point_index``), for over two edges of a box it has two.
 
     Returns:
@@ -151,8 +156,14 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
     one = full_like(like, 1.0)
     a = transposed_mul(h.rotation, to_float(start_position(t, i) - h.centre))
     way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
+    if h.kind == HULL:
+        touch = hull_edge_point(h, shapes, s, a, way, point_index, cell)
+        due_after(t, entry, travelled, touch.near)
+        return touch.on, touch.more, touch.at, touch.point, touch.normal, touch.gap
     half = vec3(absolute(way.x) * 0.5 + h.reach, absolute(way.y) * 0.5 + h.reach, absolute(way.z) * 0.5 + h.reach)
-    on, _point = stands_between(h.kind, a + way * 0.5, half, h.size.x, h.size.y, h.size.z, h.broad)
+    on, _point = stands_between(
+        shapes, s, h.kind, a + way * 0.5, half, h.reach, h.size.x, h.size.y, h.size.z, h.broad
+    )  # fmt: skip
     tiny = -full_like(like, 1.0e-12)
     part = zero
     near = on
@@ -228,7 +239,9 @@ def edge_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, poi
 
 
 @wp.func
-def triangle_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int, k: int, cell: float):
+def triangle_point(
+    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: float, i: int, j: int, k: int, cell: float
+):  # fmt: skip
     """Return where a shape's outermost point meets a triangle, as shares of the ways from i to j and to k.
 
     Returns:
@@ -245,19 +258,30 @@ def triangle_point(t: Any, h: Any, entry: int, travelled: float, i: int, j: int,
     o = (way + m) * third
     far = maximum(dot(way - o, way - o), dot(m - o, m - o))
     size = sqrt(maximum(dot(o, o), far)) + h.reach
-    _along, on = stands_between(h.kind, a + o, vec3(size, size, size), h.size.x, h.size.y, h.size.z, h.broad)
-    due_after(t, entry, travelled, on)
+    around = vec3(size, size, size)
     bj = zero
     bk = zero
+    n = cross(way, m)
     point = vec3(zero, zero, zero)
     normal = vec3(zero, zero, zero)
     gap = zero
+    on = size
+    if h.kind == HULL:
+        on = minimum(meets_corners(shapes, s, a + o, size, cell), -box_clearance(a + o, around, h.size))
+        if anywhere(on):
+            point, normal = outermost_corner(shapes, s, a, n * (one / sqrt(dot(n, n) + 1.0e-20)), cell)
+            on = minimum(on, h.reach + dot(point - a, normal))
+    else:
+        _along, on = stands_between(
+            shapes, s, h.kind, a + o, around, size, h.size.x, h.size.y, h.size.z, h.broad
+        )  # fmt: skip
+    due_after(t, entry, travelled, on)
     if anywhere(on):
-        n = cross(way, m)
         nn = dot(n, n) + 1.0e-20
-        # away from the shape's middle
-        normal = n * (choose(dot(n, a), one, -one) / sqrt(nn))
-        point = outermost(h.kind, normal, h.size.x, h.size.y, h.size.z)
+        if h.kind != HULL:
+            # away from the shape's middle
+            normal = n * (choose(dot(n, a), one, -one) / sqrt(nn))
+            point = outermost(h.kind, normal, h.size.x, h.size.y, h.size.z)
         d = point - a
         gap = -dot(d, normal)
         # weights of the vertices where the shape's point is over the triangle
