@@ -1,7 +1,7 @@
 """Talos moves a towel that it holds by a corner, and a world in its head keeps step by joint angles and depth images.
 
 The real world is another one here: its towel is heavier, stiffer and finer. The head reads the robot's joint angles
-ten times a second, leads its own robot's links there, and corrects its towel by what a camera at the head sees.
+ten times a second, leads its own robot's links there, and corrects its towel by what a camera across the table sees.
 
 Run: python examples/follow_in_hand.py [--out FOLDER]
 """
@@ -21,7 +21,7 @@ WAY = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.22), (0.05, -0.12, 0.26), (0.05, 0
 options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 options.add_argument("--out", type=Path, help="a folder for a picture")
 out = options.parse_args().out
-camera = nuno.Camera.look_at((0.1, 0.0, 1.65), (0.6, 0.05, TOP + 0.1), 1.0, width=320, height=240)
+camera = nuno.Camera.look_at((1.35, -0.3, 1.4), (0.55, 0.1, TOP + 0.1), 0.75, width=320, height=240)
 
 
 def over(way):

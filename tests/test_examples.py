@@ -17,6 +17,7 @@ LONG = {
     "all_kinds",
     "carry_mat",
     "closed_loop",
+    "follow_in_hand",
     "hold_garment",
     "pick_outline",
     "talos_fold",

@@ -203,7 +203,7 @@ def test_a_captured_case_is_picked(tmp_path):
     world.add(nuno.box((0.8, 1.2, 0.04), position=(0.0, 0.0, HEIGHT - 0.02)))
     towel = world.add(nuno.sheet((0.2, 0.3), (14, 21), position=(0.1, 0.0, HEIGHT + 0.0025)))
     corner = towel.vertices[0].copy()
-    hand = corner + (0.02, 0.03, 0.25)
+    hand = corner + np.array([0.02, 0.03, 0.25])
     world.attach(towel, nuno.Cloth(bending_rigidity=1e-4, area_density=0.25))
     world.grip(towel, [0], to=nuno.Path([0.1, 1.6], [corner, hand], interpolation="minimum_jerk"))
     world.run(4.0)

@@ -1,4 +1,4 @@
-"""Robots under random operations: imagined, restored and adopted ones go on with the same bits, hands that close too."""
+"""Robots under random operations: imagined, restored and adopted ones go on with the same bits, their hands too."""
 
 import numpy as np
 import pytest

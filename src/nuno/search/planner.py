@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 METHODS = ("cem", "mppi")
 SMALLEST = 1e-3
 """Share of its first value that a standard deviation keeps at least."""
-_told: WeakSet[World] = WeakSet()
+_warned: WeakSet[World] = WeakSet()
 """Worlds of which was said that their plans are imagined too roughly."""
 
 
@@ -144,8 +144,8 @@ def plan(
             mean = np.einsum("n,nkd->kd", weights / weights.sum(), knots)
         history.append(lowest)
         log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
-    if hurried and world not in _told:
-        _told.add(world)
+    if hurried and world not in _warned:
+        _warned.add(world)
         held = sorted(driver.robot.name for driver in world.drivers if getattr(driver, "is_dynamic", False))
         log.warning(
             "the plan's cost was imagined without going through fast frames of %s a second time, as the world itself "

@@ -171,7 +171,7 @@ class Colliders:
         shape_speed = 0.0
         for rows, alike in _alike_or_not(place, turn):
             own = slice(0, 1) if alike else slice(None)
-            shape_speed = max(shape_speed, self._fill(rows, place[own, rows], turn[own, rows], schedule.times))
+            shape_speed = max(shape_speed, self._write_keys(rows, place[own, rows], turn[own, rows], schedule.times))
         if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
             self._shape_speed_on_cpu[0] = shape_speed
         else:
@@ -203,7 +203,7 @@ class Colliders:
             self._path_batch = (keys, own, rows)
         return self._path_batch[1], self._path_batch[2]
 
-    def _fill(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> float:
+    def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> float:
         """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s]."""
         frames = len(times) // 2
         # the short way round between neighbours, which the kernels blend number by number
