@@ -146,7 +146,8 @@ def plan(
         log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
     if hurried and world not in _warned:
         _warned.add(world)
-        held = sorted(driver.robot.name for driver in world.drivers if getattr(driver, "is_dynamic", False))
+        drivers: list[Any] = [driver for driver in world.drivers if getattr(driver, "is_dynamic", False)]
+        held = sorted(driver.robot.name for driver in drivers)
         log.warning(
             "the plan's cost was imagined without going through fast frames of %s a second time, as the world itself "
             "does%s: what is carried out will cost something else; imagine with thorough=True, or plan slower motions",

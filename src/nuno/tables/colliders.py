@@ -170,8 +170,9 @@ class Colliders:
             place += quat.rotate(turn, self._centres[:, :, None])
         shape_speed = 0.0
         for rows, alike in _alike_or_not(place, turn):
-            own = slice(0, 1) if alike else slice(None)
-            shape_speed = max(shape_speed, self._write_keys(rows, place[own, rows], turn[own, rows], schedule.times))
+            which = slice(0, 1) if alike else slice(None)
+            speed = self._write_keys(rows, place[which, rows], turn[which, rows], schedule.times)
+            shape_speed = max(shape_speed, speed)
         if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
             self._shape_speed_on_cpu[0] = shape_speed
         else:
