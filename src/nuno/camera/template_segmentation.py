@@ -15,7 +15,7 @@ from nuno.errors import ClothNotFoundError
 
 AGREE = 0.85
 """IoU from which colours and outline have found the same; then the colours' mask counts, which is finer."""
-BESIDE = 0.03
+STRAYS = 0.03
 """Of the root of the shape's area, how far the colours' mask may lie beside it: a cloth is not quite flat,"""
 LUMP = 0.01
 """and share of the area that lies farther from which on something else of its colour touches it."""
@@ -63,7 +63,7 @@ def _without_lumps(mask: np.ndarray, shape: np.ndarray) -> np.ndarray:
     import cv2
 
     area = float(shape.sum())
-    reach = max(2, round(BESIDE * area**0.5))
+    reach = max(2, round(STRAYS * area**0.5))
     near = cv2.dilate(shape.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)).astype(bool)
     return mask & near if (mask & ~near).sum() > LUMP * area else mask
 
