@@ -5,6 +5,8 @@ The follower begins 4 mm and 0.7 degrees off, with another material, mesh and su
 an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
 
 Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--device cuda:0] [--strip FILE]
+With ``--unseen 11 12 13`` (seeds) cloths, hands and the camera's place are drawn anew: sequences on which nothing was
+chosen.
 Trackers: "follow", "masks" (the same without depth), "futures" (six materials in a batch), "open loop", and "cpd"
 (coherent point drift, Myronenko and Song 2010, by the package pycpd: pip install pycpd), from frame to frame.
 """
@@ -12,6 +14,7 @@ Trackers: "follow", "masks" (the same without depth), "futures" (six materials i
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import logging
 import time as clock
@@ -19,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from moving_cloths import CELLS, ENGINES, MOTIONS, RADIUS, SIZE, TOP, motion, resampled, truth
+from moving_cloths import CELLS, ENGINES, MOTIONS, RADIUS, TOP, Motion, motion, resampled, truth
 
 import nuno
 
@@ -37,55 +40,65 @@ GUESSES = tuple(
 )
 
 
-def seen(engine: str, name: str, hidden: bool) -> dict[str, Any]:
+def camera_of(seed: int | None) -> nuno.Camera:
+    """Return the camera; with a seed, where it draws it."""
+    if seed is None:
+        return CAMERA
+    x, y, z, turn = np.random.default_rng([seed, 99]).uniform((-0.1, 0.6, 0.6, -1.0), (0.1, 0.85, 0.95, 1.0))
+    eye = np.array((np.sin(turn) * y + x, -np.cos(turn) * y, TOP + z))
+    return nuno.Camera.look_at(eye, (0.0, 0.0, TOP + 0.1), 0.85, width=320, height=240)
+
+
+def seen(engine: str, name: str, hidden: bool, seed: int | None = None) -> dict[str, Any]:
     """Return the truth of a sequence at the images' times, and the images: masks, depths [m] and what is hidden."""
-    times, vertices = truth(engine, name)
+    times, vertices = truth(engine, name, seed)
+    hands_, camera = motion(name, seed), camera_of(seed)
     every = round(PERIOD * (len(times) - 1) / times[-1])
     times, vertices = times[::every], vertices[::every]
     world = nuno.World(device="cpu")
     world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
     cells = CELLS[engine]
-    towel = world.add(nuno.sheet(SIZE, cells, name="towel", position=(0, 0, TOP + RADIUS[engine])))
+    towel = world.add(nuno.sheet(hands_.size, cells, name="towel", position=(0, 0, TOP + RADIUS[engine])))
     order = np.argsort(_order(towel, vertices[0].reshape(-1, 3)))
     world.attach(towel)
-    hands = add_hands(world, name, RADIUS[engine], np.zeros(3), follow=False)
+    hands = add_hands(world, hands_, RADIUS[engine], np.zeros(3), follow=False)
     board = world.add(nuno.box((0.4, 0.005, 0.3), name="board", position=(0, 0, -5.0)))
     rng = np.random.default_rng(7)
     masks, depths = [], []
     for time, shape in zip(times, vertices, strict=True):
         world.set_vertices(towel, shape.reshape(-1, 3)[order])
-        for body, start, move in zip(hands[0], hands[1], motion(name).at(time), strict=True):
+        for body, start, move in zip(hands[0], hands[1], hands_.at(time), strict=True):
             body.locate(start + move)
         if hidden:
             middle = shape.reshape(-1, 3).mean(axis=0)
-            eye = CAMERA.camera_to_world[:3, 3]
+            eye = camera.camera_to_world[:3, 3]
             at = middle + 0.3 * (eye - middle) + (0.2, 0.0, 0.0)
             board.locate(at if HIDDEN[0] <= time < HIDDEN[1] else (0.0, 0.0, -5.0))
-        mask = world.masks(CAMERA, towel).numpy()
+        mask = world.masks(camera, towel).numpy()
         edge = mask ^ _shifted(mask)
         masks.append(mask ^ (edge & (rng.random(mask.shape) < 0.3)))
-        depth = world.depth(CAMERA).numpy()
+        depth = world.depth(camera).numpy()
         depth[~np.isfinite(depth)] = np.nan
         depth = depth + NOISE * depth**2 * rng.standard_normal(depth.shape)
         depth[rng.random(depth.shape) < 0.02] = np.nan
         depths.append(depth)
     mine = resampled(vertices, OWN_CELLS)
     covered = np.array([hidden and HIDDEN[0] <= time < HIDDEN[1] for time in times])
-    boards = _board_masks(world, board, times, vertices, hidden)
+    boards = _board_masks(world, board, times, vertices, hidden, camera)
     return {"times": times, "masks": masks, "depths": depths, "truth": mine, "covered": covered, "engine": engine,
-            "motion": name, "board_mask": boards}  # fmt: skip
+            "motion": hands_, "camera": camera, "board_mask": boards}  # fmt: skip
 
 
-def _board_masks(world: Any, board: Any, times: Any, vertices: Any, hidden: bool) -> list[Any]:
+def _board_masks(world: Any, board: Any, times: Any, vertices: Any, hidden: bool, camera: Any) -> list[Any]:
     """Return where the board is in each image, for masks alone, which do not tell it from the table."""
     found = []
     for time, shape in zip(times, vertices, strict=True):
         if not (hidden and HIDDEN[0] <= time < HIDDEN[1]):
             found.append(None)
             continue
-        middle, eye = shape.reshape(-1, 3).mean(axis=0), CAMERA.camera_to_world[:3, 3]
+        middle, eye = shape.reshape(-1, 3).mean(axis=0), camera.camera_to_world[:3, 3]
         board.locate(middle + 0.3 * (eye - middle) + (0.2, 0.0, 0.0))
-        found.append(world.masks(CAMERA, board).numpy())
+        found.append(world.masks(camera, board).numpy())
     return found
 
 
@@ -98,10 +111,11 @@ def _order(towel: Any, points: np.ndarray) -> np.ndarray:
     return np.linalg.norm(towel.vertices[None, :, :2] - points[:, None, :2], axis=-1).argmin(axis=1)
 
 
-def add_hands(world: Any, name: str, radius: float, error: np.ndarray, follow: bool) -> tuple[list[Any], np.ndarray]:
+def add_hands(
+    world: Any, hands: Motion, radius: float, error: np.ndarray, follow: bool
+) -> tuple[list[Any], np.ndarray]:
     """Put balls into a world where the hands of a motion begin; on their paths, if they follow them."""
-    hands = motion(name)
-    starts = np.array([[(u - 0.5) * SIZE[0], (v - 0.5) * SIZE[1], TOP + radius] for u, v in hands.held]) + error
+    starts = add_starts(hands, radius) + error
     balls = []
     for k, start in enumerate(starts):
         ball = world.add(nuno.sphere(0.014, name=f"hand_{k}", position=start))
@@ -111,20 +125,19 @@ def add_hands(world: Any, name: str, radius: float, error: np.ndarray, follow: b
     return balls, starts
 
 
-def own_world(name: str, radius: float, blind: bool = False, device: str = "cpu") -> tuple[nuno.World, nuno.Body]:
+def own_world(hands: Motion, radius: float, blind: bool = False, device: str = "cpu") -> tuple[nuno.World, nuno.Body]:
     """Return the world that a follower has: the table, the hands on their paths, and the cloth about where it is.
 
     A blind one knows of no hands.
     """
     world = nuno.World(device=device)
     world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
-    towel = world.add(nuno.sheet(SIZE, OWN_CELLS, name="towel", position=(*OFFSET, TOP + 0.002)))
+    towel = world.add(nuno.sheet(hands.size, OWN_CELLS, name="towel", position=(*OFFSET, TOP + 0.002)))
     towel.rotate(TURN, "z", wrt="world")
     world.attach(towel)
     if blind:
         return world, towel
-    balls, starts = add_hands(world, name, radius, np.array(HAND_ERROR), follow=True)
-    hands = motion(name)
+    balls, starts = add_hands(world, hands, radius, np.array(HAND_ERROR), follow=True)
     for ball, start, way in zip(balls, starts, hands.moves, strict=True):
         world.ignore_contact(towel, ball)
         world.grip(towel, towel.closest(start), to=nuno.Path(hands.times, start + way))
@@ -143,7 +156,7 @@ def track(
     world, towel = own_world(case["motion"], RADIUS[case["engine"]], blind, device)
     if tracker == "futures":
         options = {"materials": GUESSES, "iterations": 1, **options}
-    follower = nuno.follow(world, towel, CAMERA, **options)
+    follower = nuno.follow(world, towel, case["camera"], **options)
     found, spent = [], []
     seconds = clock.process_time if device == "cpu" else clock.perf_counter
     for time, mask, depth, board in zip(case["times"], case["masks"], case["depths"], case["board_mask"], strict=True):
@@ -165,11 +178,12 @@ def _drift(case: dict[str, Any]) -> tuple[np.ndarray, float]:
 
     _, towel = own_world(case["motion"], RADIUS[case["engine"]])
     now, found, spent = towel.vertices, [], []
-    rays = CAMERA.rays(np.stack(np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height)), axis=-1).astype(float))
+    camera = case["camera"]
+    rays = camera.rays(np.stack(np.meshgrid(np.arange(camera.width), np.arange(camera.height)), axis=-1).astype(float))
     for mask, depth in zip(case["masks"], case["depths"], strict=True):
         chosen = np.argwhere(mask & np.isfinite(depth))[::6]
         begin = clock.process_time()
-        points = CAMERA.camera_to_world[:3, 3] + rays[tuple(chosen.T)] * depth[tuple(chosen.T)][:, None]
+        points = camera.camera_to_world[:3, 3] + rays[tuple(chosen.T)] * depth[tuple(chosen.T)][:, None]
         if len(points) > 20:
             now = (
                 DeformableRegistration(
@@ -199,10 +213,10 @@ def strip(case: dict[str, Any], found: dict[str, np.ndarray], path: Path) -> Non
         for k in columns:
             world.set_vertices(towel, shapes[k])
             hands = [body for body in world.bodies if body.name.startswith("hand")]
-            moves = motion(case["motion"]).at(case["times"][k])
-            for body, start, move in zip(hands, add_starts(case), moves, strict=True):
+            moves = case["motion"].at(case["times"][k])
+            for body, start, move in zip(hands, add_starts(case["motion"], RADIUS[case["engine"]]), moves, strict=True):
                 body.locate(start + move)
-            image = nuno.take_picture(world, CAMERA, samples=2).color.numpy()[40:, 40:280].copy()
+            image = nuno.take_picture(world, case["camera"], samples=2).color.numpy()[40:, 40:280].copy()
             text = f"{label} {case['times'][k]:.1f} s"
             cv2.putText(image, text, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (20, 20, 20), 1)
             row.append(image)
@@ -210,15 +224,15 @@ def strip(case: dict[str, Any], found: dict[str, np.ndarray], path: Path) -> Non
     cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
 
 
-def add_starts(case: dict[str, Any]) -> np.ndarray:
+def add_starts(hands: Motion, radius: float) -> np.ndarray:
     """Return where the hands of a sequence begin, (hands, 3) [m]."""
-    held = motion(case["motion"]).held
-    return np.array([[(u - 0.5) * SIZE[0], (v - 0.5) * SIZE[1], TOP + RADIUS[case["engine"]]] for u, v in held])
+    return np.array([[(u - 0.5) * hands.size[0], (v - 0.5) * hands.size[1], TOP + radius] for u, v in hands.held])
 
 
 def resampled_order(towel: Any) -> np.ndarray:
     """Return which row of what ``resampled`` gives each vertex of a sheet is."""
-    axes = [np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, OWN_CELLS, strict=True)]
+    size = np.ptp(towel.shape.mesh()[0][:, :2], axis=0)
+    axes = [np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(size, OWN_CELLS, strict=True)]
     flat = np.stack(np.meshgrid(*axes), axis=-1)
     rest = towel.shape.mesh()[0][:, :2]
     return np.linalg.norm(rest[:, None] - flat.reshape(1, -1, 2), axis=-1).argmin(axis=1)
@@ -232,39 +246,38 @@ def main() -> None:
     parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
     parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
     parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
+    parser.add_argument("--unseen", nargs="+", type=int, metavar="SEED", help="other cloths, hands and cameras")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--strip", type=Path, help="a picture: truth, follower and open loop, of the first sequence")
     options = parser.parse_args()
     logging.disable(logging.WARNING)
     rows = []
-    print("engine   motion  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
-    for engine in options.engines:
-        for name in options.motions:
-            for hidden in (False, True):
-                case = seen(engine, name, hidden)
-                towel = own_world(name, RADIUS[engine])[1]
-                shapes = {}
-                for tracker in options.trackers:
-                    found, spent = track(tracker, case, options.blind, options.device)
-                    shapes[tracker] = found
-                    off = 1000.0 * errors(found, case, towel)
-                    covered = float(off[case["covered"]].mean()) if hidden else float("nan")
-                    row = {"engine": engine, "motion": name, "hidden": hidden, "tracker": tracker}
-                    row |= {"mean_mm": float(off.mean()), "worst_mm": float(off.max())}
-                    rows.append(row | {"hidden_mm": covered, "cpu_s": spent})
-                    figures = f"{off.mean():6.1f} {off.max():6.1f} {covered:6.1f}  {spent:18.3f}"
-                    print(f"{engine:8} {name:7} {hidden!s:7} {tracker:10} {figures}", flush=True)
-                if options.strip and len(rows) == len(options.trackers):
-                    shown = {each: shapes[each] for each in ("follow", "open loop") if each in shapes}
-                    strip(case, shown, options.strip)
+    wanted = itertools.product(options.unseen or [None], options.engines, options.motions, (False, True))
+    print("engine   motion  seed  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
+    for seed, engine, name, hidden in wanted:
+        case, shapes = seen(engine, name, hidden, seed), {}
+        towel = own_world(case["motion"], RADIUS[engine])[1]
+        for tracker in options.trackers:
+            found, spent = track(tracker, case, options.blind, options.device)
+            shapes[tracker] = found
+            off = 1000.0 * errors(found, case, towel)
+            covered = float(off[case["covered"]].mean()) if hidden else float("nan")
+            row = {"engine": engine, "motion": name, "seed": seed, "hidden": hidden, "tracker": tracker}
+            row |= {"mean_mm": float(off.mean()), "worst_mm": float(off.max())}
+            rows.append(row | {"hidden_mm": covered, "cpu_s": spent})
+            figures = f"{off.mean():6.1f} {off.max():6.1f} {covered:6.1f}  {spent:18.3f}"
+            print(f"{engine:8} {name:7} {seed!s:5} {hidden!s:7} {tracker:10} {figures}", flush=True)
+            if options.json:
+                options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        if options.strip and len(rows) == len(options.trackers):
+            shown = {each: shapes[each] for each in ("follow", "open loop") if each in shapes}
+            strip(case, shown, options.strip)
     for tracker in options.trackers:
         own = [row for row in rows if row["tracker"] == tracker]
         print(
             f"{tracker}: mean {np.mean([r['mean_mm'] for r in own]):.1f} mm, worst sequence "
             f"{max(r['mean_mm'] for r in own):.1f} mm, hidden {np.nanmean([r['hidden_mm'] for r in own]):.1f} mm"
         )
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""Cost of robots in imagined worlds: ``python benchmarks/imagined_robots.py [--dynamics] [--device cuda:0]``.
+"""Cost of robots in imagined worlds: ``python benchmarks/imagined_robots.py [--dynamics] [--same] [--device cuda:0]``.
 
 Talos stands before a table with a towel of 0.6 m; its arms go to postures of their own in every world for 1 s, and
-two corners of the towel are led. By turns with and without the robot, the same worlds otherwise; CPU seconds of all
-threads, which other work on the machine changes little, and the wall clock. Without ``--dynamics`` the robot is
-kinematic.
+two corners of the towel are led. With ``--same`` the arms of all worlds go to the same postures, and only the towel is
+led elsewhere. By turns with and without the robot, the same worlds otherwise; CPU seconds of all threads, which other
+work on the machine changes little, and the wall clock. Without ``--dynamics`` the robot is kinematic.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def room(with_robot: bool, dynamics: bool, cells: int, device: str) -> nuno.Worl
     return world
 
 
-def begin(world: nuno.World, worlds: int, cells: int) -> nuno.World:
+def begin(world: nuno.World, worlds: int, cells: int, same: bool = False) -> nuno.World:
     """A batch on its way."""
     futures = world.imagine(worlds)
     n, span = cells + 1, futures.time + np.array([0.0, 1.0])
@@ -48,27 +48,32 @@ def begin(world: nuno.World, worlds: int, cells: int) -> nuno.World:
     if futures.drivers:
         robot = futures.robot
         names, now = list(robot.joint_names), robot.angle_vector()
-        turn = np.random.default_rng(1).uniform(-0.2, 0.2, (worlds, len(ARMS)))
+        turn = np.random.default_rng(1).uniform(-0.2, 0.2, (1 if same else worlds, len(ARMS)))
         robot.angle_vector({name: now[:, names.index(name)] + turn[:, k] for k, name in enumerate(ARMS)}, 1.0)
     return futures
 
 
-def measure(
-    worlds: int, dynamics: bool, cells: int, repeats: int, seconds: float, device: str
-) -> dict[str, Any]:  # fmt: skip
+def measure(worlds: int, asked: argparse.Namespace) -> dict[str, Any]:
     """CPU and wall seconds of a simulated second, with and without robots."""
-    rooms = {own: room(own, dynamics, cells, device) for own in (True, False)}
+    dynamics, cells, seconds = asked.dynamics, asked.cells, asked.seconds
+    rooms = {True: room(True, dynamics, cells, asked.device), False: room(False, dynamics, cells, asked.device)}
     cpu: dict[bool, list[float]] = {True: [], False: []}
     wall: dict[bool, list[float]] = {True: [], False: []}
-    for _ in range(repeats):
+    for _ in range(asked.repeats):
         for with_robot, world in rooms.items():
-            futures = begin(world, worlds, cells)
+            futures = begin(world, worlds, cells, asked.same)
             futures.run(1.0 / 60.0, progress=False)
             clock, core = time.perf_counter(), time.process_time()
             futures.run(seconds, progress=False)
             cpu[with_robot].append((time.process_time() - core) / seconds)
             wall[with_robot].append((time.perf_counter() - clock) / seconds)
-    row: dict[str, Any] = {"worlds": worlds, "dynamics": dynamics, "cells": cells, "device": device}
+    row: dict[str, Any] = {
+        "worlds": worlds,
+        "dynamics": dynamics,
+        "cells": cells,
+        "same": asked.same,
+        "device": asked.device,
+    }
     for name, with_robot in (("with", True), ("without", False)):
         row[f"cpu_s_{name}"], row[f"wall_s_{name}"] = (statistics.median(own[with_robot]) for own in (cpu, wall))
     ratios = [a / b - 1.0 for a, b in zip(cpu[True], cpu[False], strict=True)]
@@ -79,6 +84,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--worlds", nargs="+", type=int)
     options.add_argument("--dynamics", action="store_true", help="robots with weight")
+    options.add_argument("--same", action="store_true", help="the same commands in all worlds")
     options.add_argument("--cells", type=int, default=20)
     options.add_argument("--device", default="cpu")
     options.add_argument("--repeats", type=int, default=3)
@@ -90,7 +96,7 @@ def main() -> None:
     print("| worlds | CPU s a simulated s, with robots | without | more by | wall s with | all worlds over real time |")
     print("|---|---|---|---|---|---|")
     for worlds in asked.worlds or ([8, 64] if asked.dynamics else [36]):
-        row = measure(worlds, asked.dynamics, asked.cells, asked.repeats, asked.seconds, asked.device)
+        row = measure(worlds, asked)
         rows.append(row)
         print(
             f"| {worlds} | {row['cpu_s_with']:.2f} | {row['cpu_s_without']:.2f} | {row['robots_share']:.0%} | "

@@ -1,7 +1,8 @@
 """Cloths that hands fold, lift, drag and shake, as engines move them: vertices at 30 Hz, the truth of following.
 
 Engines: "nuno" (another material, mesh and substep than a follower assumes), "mujoco" (flex) and "newton" (VBD), where
-they are installed. Each motion is one or two hands on paths that are known; see ``benchmarks/following.py``.
+they are installed. Each motion is one or two hands on paths that are known; see ``benchmarks/following.py``. With a
+seed, size, bending, mass, friction, hands and their paths, and how long those take, are drawn anew.
 """
 
 from __future__ import annotations
@@ -22,19 +23,48 @@ ENGINES = ("nuno", "mujoco", "newton")
 
 @dataclass(frozen=True)
 class Motion:
-    """Hands: (hands, 2) where they hold the cloth as (u, v), and where they are then, (hands, k, 3) [m] from there."""
+    """Hands: (hands, 2) where they hold the cloth as (u, v), and where they are then, (hands, k, 3) [m] from there.
+
+    And the cloth's size [m], and bending rigidity and mass over those of an engine's own cloth, and friction.
+    """
 
     held: np.ndarray
     times: np.ndarray
     moves: np.ndarray
+    size: tuple[float, float] = SIZE
+    stiffer: float = 1.0
+    heavier: float = 1.0
+    friction: float = 0.4
 
     def at(self, time: float) -> np.ndarray:
         """Return how far the hands are from where they began, (hands, 3) [m]."""
         return np.stack([[np.interp(time, self.times, way[:, k]) for k in range(3)] for way in self.moves])
 
 
-def motion(name: str) -> Motion:
-    """Return one of the motions, 3.5 s long."""
+def motion(name: str, seed: int | None = None) -> Motion:
+    """Return one of the motions, 3.5 s long; with a seed, as it draws it."""
+    return _usual(name) if seed is None else _drawn(name, np.random.default_rng([seed, MOTIONS.index(name)]))
+
+
+def _drawn(name: str, rng: np.random.Generator) -> Motion:
+    """Return a motion of another cloth by another edge or corner, by another way and in another time."""
+    usual = _usual(name)
+    size = (float(rng.uniform(0.28, 0.55)), float(rng.uniform(0.22, 0.42)))
+    scale = np.array([size[0] / SIZE[0], size[1] / SIZE[1], 1.0]) * rng.uniform(0.75, 1.15, 3)
+    speed = rng.uniform(0.85, 1.35)
+    clock = np.minimum(speed * usual.times, usual.times[-1])
+    moves = np.stack([usual.at(time) for time in clock], axis=1) * scale
+    held = usual.held.copy()
+    for axis in range(2):  # from the other side, towards this one
+        if rng.random() < 0.5:
+            held[:, axis], moves[..., axis] = 1.0 - held[:, axis], -moves[..., axis]
+    return Motion(
+        held, usual.times, moves, size, float(4.0 ** rng.uniform(-1.0, 1.0)), float(rng.uniform(0.6, 1.6)),
+        float(rng.uniform(0.2, 0.7)),
+    )  # fmt: skip
+
+
+def _usual(name: str) -> Motion:
     times = np.linspace(0.0, 3.5, 211)
     s = np.clip((times - 0.3) / 2.2, 0.0, 1.0)
     s = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)  # minimum jerk
@@ -55,17 +85,17 @@ def motion(name: str) -> Motion:
     return Motion(np.array([[0.0, 0.0], [0.0, 1.0]]), times, np.stack([way, way]))
 
 
-def flat(cells: tuple[int, int], height: float) -> np.ndarray:
-    """Return the vertices (ny + 1, nx + 1, 3) [m] of the cloth flat on the table."""
-    x, y = (np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(SIZE, cells, strict=True))
+def flat(cells: tuple[int, int], height: float, size: tuple[float, float]) -> np.ndarray:
+    """Return the vertices (ny + 1, nx + 1, 3) [m] of a cloth flat on the table."""
+    x, y = (np.linspace(-0.5 * s, 0.5 * s, n + 1) for s, n in zip(size, cells, strict=True))
     return np.stack([*np.meshgrid(x, y), np.full((len(y), len(x)), TOP + height)], axis=-1)
 
 
 @lru_cache(maxsize=1)
-def truth(engine: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+def truth(engine: str, name: str, seed: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return times (k,) [s] and vertices (k, ny + 1, nx + 1, 3) [m] of a motion as an engine has it."""
     makers = {"nuno": _nuno, "mujoco": _mujoco, "newton": _newton}
-    hands = motion(name)
+    hands = motion(name, seed)
     times = np.arange(0.0, hands.times[-1] + 1e-9, 1.0 / RATE)
     return times, makers[engine](hands, times, CELLS[engine], RADIUS[engine])
 
@@ -93,12 +123,16 @@ def _nuno(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: floa
 
     world = nuno.World(device="cpu", substeps=45)
     world.add(nuno.box((1.2, 1.2, 0.04), position=(0, 0, TOP - 0.02)))
-    towel = world.add(nuno.sheet(SIZE, cells, position=(0, 0, TOP + radius)))
+    towel = world.add(nuno.sheet(hands.size, cells, position=(0, 0, TOP + radius)))
     material = nuno.Cloth(
-        area_density=0.32, bending_rigidity=2e-4, shear_stiffness=150.0, friction=0.4, thickness=2 * radius
+        area_density=0.32 * hands.heavier,
+        bending_rigidity=2e-4 * hands.stiffer,
+        shear_stiffness=150.0,
+        friction=hands.friction,
+        thickness=2 * radius,
     )
     world.attach(towel, material)
-    start = flat(cells, radius).reshape(-1, 3)
+    start = flat(cells, radius, hands.size).reshape(-1, 3)
     order = [int(np.argmin(np.linalg.norm(towel.vertices - p, axis=1))) for p in start]
     for k, way in zip(_held(hands, cells), hands.moves, strict=True):
         world.grip(towel, [order[k]], to=nuno.Path(hands.times, start[k] + way))
@@ -108,8 +142,8 @@ def _nuno(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: floa
 def _mujoco(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: float) -> np.ndarray:
     import mujoco
 
-    n, step = (cells[0] + 1, cells[1] + 1), 0.002
-    corners = flat((1, 1), radius).reshape(-1, 3)
+    n, step, stiffer = (cells[0] + 1, cells[1] + 1), 0.002, hands.stiffer**0.5  # which of bending, of a thickness
+    corners = flat((1, 1), radius, hands.size).reshape(-1, 3)
     held = [corners[int(2 * round(v) + round(u))] for u, v in hands.held]
     bodies = "".join(f'<body name="m{k}" mocap="true" pos="{p[0]} {p[1]} {p[2]}"/>' for k, p in enumerate(held))
 
@@ -122,16 +156,17 @@ def _mujoco(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: fl
     )
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>
       <option timestep="{step}" integrator="discrete" solver="Newton" tolerance="1e-6"/>
-      <worldbody><geom type="plane" size="2 2 .1" pos="0 0 {TOP}" friction="0.4"/>{bodies}
+      <worldbody><geom type="plane" size="2 2 .1" pos="0 0 {TOP}" friction="{hands.friction}"/>{bodies}
         <flexcomp name="c" type="grid" dim="2" count="{n[0]} {n[1]} 1" radius="{radius}"
-          mass="{0.25 * SIZE[0] * SIZE[1]}" pos="0 0 {TOP + radius}"
-          spacing="{SIZE[0] / cells[0]} {SIZE[1] / cells[1]} 0.1">
-          <contact selfcollide="auto" friction="0.4"/>
-          <elasticity young="1e6" poisson="0.2" thickness="1e-3" damping="0.002" elastic2d="both"/>
+          mass="{0.25 * hands.heavier * hands.size[0] * hands.size[1]}" pos="0 0 {TOP + radius}"
+          spacing="{hands.size[0] / cells[0]} {hands.size[1] / cells[1]} 0.1">
+          <contact selfcollide="auto" friction="{hands.friction}"/>
+          <elasticity young="{1e6 / stiffer}" poisson="0.2" thickness="{1e-3 * stiffer}"
+            damping="0.002" elastic2d="both"/>
         </flexcomp></worldbody><equality>{ties}</equality></mujoco>""")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    start = flat(cells, radius).reshape(-1, 3)
+    start = flat(cells, radius, hands.size).reshape(-1, 3)
     own = data.flexvert_xpos.copy()
     order = [int(np.argmin(np.linalg.norm(own - p, axis=1))) for p in start]
     assert np.abs(own[order] - start).max() < 1e-6
@@ -152,25 +187,25 @@ def _newton(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: fl
     import warp as wp
 
     wp.set_device("cpu")
-    start = flat(cells, radius).reshape(-1, 3)
+    start = flat(cells, radius, hands.size).reshape(-1, 3)
     columns = cells[0] + 1
     quads = [(j * columns + i, j * columns + i + 1) for j in range(cells[1]) for i in range(cells[0])]
     triangles = [t for a, b in quads for t in ((a, b, b + columns), (a, b + columns, a + columns))]
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, -9.81))
     builder.add_cloth_mesh(
         pos=wp.vec3(0, 0, 0), rot=wp.quat_identity(), scale=1.0, vel=wp.vec3(0, 0, 0),
-        vertices=[wp.vec3(*p) for p in start], indices=np.ravel(triangles).tolist(), density=0.2,
-        particle_radius=radius, tri_ke=1e3, tri_ka=1e3, tri_kd=1e-2, edge_ke=1e-3, edge_kd=1e-4,
+        vertices=[wp.vec3(*p) for p in start], indices=np.ravel(triangles).tolist(), density=0.2 * hands.heavier,
+        particle_radius=radius, tri_ke=1e3, tri_ka=1e3, tri_kd=1e-2, edge_ke=1e-3 * hands.stiffer, edge_kd=1e-4,
     )  # fmt: skip
     builder.color(include_bending=True)
     builder.add_ground_plane(height=TOP)
     model = builder.finalize()
-    model.soft_contact_ke, model.soft_contact_kd, model.soft_contact_mu = 1e3, 1e-3, 0.4
+    model.soft_contact_ke, model.soft_contact_kd, model.soft_contact_mu = 1e3, 1e-3, hands.friction
     held = _held(hands, cells)
     flags = model.particle_flags.numpy()
     flags[held] &= ~int(newton.ParticleFlags.ACTIVE)
     model.particle_flags.assign(flags)
-    cell = SIZE[0] / cells[0]
+    cell = hands.size[0] / cells[0]
     solver = newton.solvers.SolverVBD(
         model, iterations=10, particle_enable_self_contact=True, particle_self_contact_margin=0.2 * cell,
         particle_self_contact_gap=0.1 * cell,

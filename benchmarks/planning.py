@@ -1,6 +1,7 @@
 """Success rates of planning in imagination, and how many futures a second it imagines.
 
     python benchmarks/planning.py [--tasks flatten hang cover pull] [--seeds 0 20] [--device cpu] [--json FILE]
+    python benchmarks/planning.py --hands talos|dynamic [--tasks cover] [--rough] ...
     python benchmarks/planning.py --rate [--rollouts 512] [--device cuda] [--side 0.6] [--json FILE]
 
 The first carries out each task twice for each seed: with a fixed motion of the hands, which knows of this seed's room
@@ -8,7 +9,11 @@ only where the corners of the cloth were at the start, and with the same motion 
 imagines 24 futures (12 of the pull) in one batch, twice a plan, acts for a while, looks and plans on. The criteria
 are in docs/planning.md. With ``--json`` seeds that are in the file already are left out, so that several runs add up.
 
-The second imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, through ``nuno.plan`` with one
+The second does so with Talos' arms in the place of points (benchmarks/arm_tasks.py), without or with dynamics of the
+robot. What the last plan of a seed cost in imagination stands beside what it cost as carried out. ``--rough`` imagines
+fast frames once (``thorough=False``), as hands that are points always do here.
+
+The third imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, through ``nuno.plan`` with one
 iteration: rollouts a second, and plans a second, medians. The first plan of a row, which compiles kernels where that
 was not done, stands by itself. On CUDA only ``nuno.plans.run_double_blocks_partly`` takes long to compile.
 """
@@ -24,6 +29,7 @@ from typing import Any
 
 import numpy as np
 import warp as wp
+from arm_tasks import ARM_TASKS, DYNAMIC_TASKS
 from planning_tasks import TASKS, Task
 from tqdm import tqdm
 
@@ -40,42 +46,43 @@ def carry_out_fixed(task: Task) -> None:
             task.pair = task.corners[list(pair)]
         if (task.pair < 0).any() or task.pair[0] == task.pair[1]:
             continue  # a hand found nothing: the other one leaves its corner, too
+        task.come()
         task.act(task.world, nuno.Knots(task.now(task.world), task.fixed(seen, stage), task.horizon))
         task.world.run(task.horizon, progress=False)
         task.release()
         task.world.run(task.settle, progress=False)
 
 
-def carry_out_planned(task: Task, seed: int) -> dict[str, float]:
+def carry_out_planned(task: Task, seed: int, thorough: bool = False) -> dict[str, float]:
     """Plan and replan each stage from what is seen then; return what planning took."""
-    seconds, plans = 0.0, 0
+    seconds, plans, imagined, true = 0.0, 0, np.nan, np.nan
     for stage, pair in enumerate(task.pairs):
         if stage and task.is_solved(task.figures()):
             break
         task.pair = task.corners[list(pair)]
+        task.come()
         found = nuno.replan(
             task.world, task.act, task.judge, now=task.now, start=task.fixed(task.look(), stage), spread=task.spread,
             horizon=task.horizon, every=task.every, periods=8, shrink=True, samples=task.samples,
             iterations=task.iterations, bounds=(task.lowest, task.highest), seed=100 * seed + 10 * stage,
-            thorough=False,
+            thorough=thorough,
         )  # fmt: skip
-        task.release()
-        task.world.run(task.settle, progress=False)
+        imagined, true = found.plans[-1].cost, task.carried_out()
         seconds, plans = seconds + float(found.planning_seconds.sum()), plans + len(found.plans)
-    return {"planning_s": seconds, "plans": plans, "imagined_s": task.imagined}
+    return {"planning_s": seconds, "plans": plans, "imagined_s": task.imagined, "cost": imagined, "true_cost": true}
 
 
-def trial(name: str, seed: int, device: str) -> dict[str, Any]:
+def trial(name: str, seed: int, device: str, tasks: dict[str, type[Task]], thorough: bool) -> dict[str, Any]:
     """Both ways of one seed."""
     row: dict[str, Any] = {"task": name, "seed": seed, "device": device}
     begin, cpu = time.perf_counter(), time.process_time()
     for way in ("fixed", "planned"):
-        task = TASKS[name](seed, device)
+        task = tasks[name](seed, device)
         try:
             if way == "fixed":
                 carry_out_fixed(task)
             else:
-                row.update(carry_out_planned(task, seed))
+                row.update(carry_out_planned(task, seed, thorough))
             task.world.run(1.0, progress=False)
             figures = task.figures()
             row[way] = {"solved": bool(task.is_solved(figures)), **figures}
@@ -123,14 +130,18 @@ def measure_rate(rollouts: int, device: str, plans: int, side: float) -> dict[st
 
 def print_table(rows: list[dict[str, Any]]) -> None:
     """Print success rates by task."""
-    print("| task | seeds | fixed plan | planned and replanned | s of planning | simulated s imagined |")
-    print("|---|---|---|---|---|---|")
+    print("| task | seeds | fixed plan | replanned | s of planning | simulated s imagined | cost imagined, true |")
+    print("|---|---|---|---|---|---|---|")
     for name in TASKS:
         own = [row for row in rows if row["task"] == name]
         if own:
             solved = [sum(row[way]["solved"] for row in own) for way in ("fixed", "planned")]
             spent = [float(np.median([row.get(key, np.nan) for row in own])) for key in ("planning_s", "imagined_s")]
-            print(f"| {name} | {len(own)} | {solved[0]} | {solved[1]} | {spent[0]:.0f} | {spent[1]:.0f} |")
+            imagined, true = (np.nanmedian([row.get(key, np.nan) for row in own]) for key in ("cost", "true_cost"))
+            print(
+                f"| {name} | {len(own)} | {solved[0]} | {solved[1]} | {spent[0]:.0f} | {spent[1]:.0f} | "
+                f"{imagined:.3f}, {true:.3f} |"
+            )
 
 
 def print_rates(device: str, rollouts: list[int], asked: argparse.Namespace) -> None:
@@ -152,7 +163,9 @@ def print_rates(device: str, rollouts: list[int], asked: argparse.Namespace) -> 
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--tasks", nargs="+", default=list(TASKS), choices=list(TASKS))
+    options.add_argument("--tasks", nargs="+", help="all of these hands' when left out")
+    options.add_argument("--hands", default="points", choices=("points", "talos", "dynamic"))
+    options.add_argument("--rough", action="store_true", help="arms: imagine fast frames once")
     options.add_argument("--seeds", nargs=2, type=int, default=(0, 20), metavar=("FIRST", "END"))
     options.add_argument("--device", default="cpu")
     options.add_argument("--json", type=FilePath)
@@ -169,11 +182,16 @@ def main() -> None:
         return
     if asked.json and asked.json.exists():
         rows = json.loads(asked.json.read_text(encoding="utf-8"))
+    tasks = {"points": TASKS, "talos": ARM_TASKS, "dynamic": DYNAMIC_TASKS}[asked.hands]
+    names = asked.tasks or list(tasks)
+    if unknown := set(names) - set(tasks):
+        options.error(f"--tasks must be among {list(tasks)} with these hands, got {sorted(unknown)}")
+    thorough = asked.hands != "points" and not asked.rough
     done = {(row["task"], row["seed"]) for row in rows}
     # seed by seed, so that a run that is cut short has as many of each task
-    wanted = [(name, seed) for seed in range(*asked.seeds) for name in asked.tasks if (name, seed) not in done]
+    wanted = [(name, seed) for seed in range(*asked.seeds) for name in names if (name, seed) not in done]
     for name, seed in tqdm(wanted, unit="trial"):
-        rows.append(trial(name, seed, device))
+        rows.append(trial(name, seed, device, tasks, thorough))
         if asked.json:
             asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print_table(rows)

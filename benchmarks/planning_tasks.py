@@ -123,6 +123,16 @@ class Task(ABC):
     def believe(self, futures: World) -> None:  # noqa: B027
         """Give futures what is nominal beside the cloth's material."""
 
+    def come(self) -> None:  # noqa: B027
+        """Bring the hands to the pair of vertices; hands that are points are there."""
+
+    def carried_out(self) -> float:
+        """Open the hands, let the true world settle, and return its cost, of the same terms as in imagination."""
+        taut = float(np.asarray(self.cloth.elastic_energy))
+        self.release()
+        self.world.run(self.settle, progress=False)
+        return float(self.cost(self.world)[0]) + TAUT * taut
+
     def judge(self, futures: World) -> np.ndarray:
         """Open the hands, let all settle, and return the cost of each future; cloth that is taut before snaps away."""
         taut = np.asarray(futures.find("cloth").elastic_energy)  # [J]

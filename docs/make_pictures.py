@@ -41,7 +41,7 @@ PICTURES: dict[str, list[tuple[list[str], dict[str, str]]]] = {
 } | {
     name: [([], {f"examples/{name}.webp": f"{name}.png"})]  # for the gallery alone
     for name in (
-        "box_on_towel", "drop_on_table", "fit_material", "fold_towel", "follow_cloth", "hang_cloth",
+        "box_on_towel", "drop_on_table", "fit_material", "fold_towel", "follow_cloth", "follow_in_hand", "hang_cloth",
         "hold_by_friction", "imagine_futures", "lift_soft_cube", "load_scene", "save_and_restore", "show_world",
         "soft_cube", "sweep_towel", "talos_reach",
     )

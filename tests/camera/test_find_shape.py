@@ -149,6 +149,20 @@ def test_segmentation_by_template():
         nuno.segment_before(drawn(seed=1, clutter=False), CAMERA, TABLE, template=TOWEL)
 
 
+def test_a_small_thing_of_the_cloths_colour_that_touches_it_is_left_out():
+    """A rag of 6 x 8 cm at the rim, less than the share by which colours and outline may differ: it is no cloth.
+
+    3 % of the root of the area, by which a cloth may lie beside its outline, is 1 cm of the rag's 6.
+    """
+    rag = turned(np.array([[0.2, -0.04], [0.26, -0.04], [0.26, 0.04], [0.2, 0.04]]), 0.4, (0.02, -0.03))
+    lies = turned(TOWEL, 0.4, (0.02, -0.03))
+    found = nuno.segment_before(drawn(lies, rag, clutter=False), CAMERA, TABLE, template=TOWEL)
+    truth, other = mask_of(lies), mask_of(rag) & ~mask_of(lies)
+    assert overlap(mask_of(lies) | other, truth) > 0.85, "colours alone would count"
+    assert (found & other).sum() < 0.3 * other.sum()
+    assert overlap(found, truth) > 0.95
+
+
 def test_bad_input():
     """What cannot be searched for is named before anything is searched."""
     image = np.zeros((480, 640, 3), np.uint8)

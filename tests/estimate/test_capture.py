@@ -190,3 +190,37 @@ def test_the_command_prints_a_board(tmp_path, capsys):
     assert main(["capture", "--board", str(tmp_path / "board.png"), "--paper", "letter"]) == 0
     assert "measure" in capsys.readouterr().out
     assert len(BOARD.find(nuno.camera.image.read_image(tmp_path / "board.png"))[0]) == 24
+
+
+@pytest.mark.long
+def test_a_captured_case_is_picked(tmp_path):
+    """Files of a camera that saw a towel lifted by a corner of it: `nuno pick` on what `nuno capture` made names it.
+
+    What is lifted is a finer cloth than the estimator's, of another material; the corner's place is known exactly.
+    """
+    views, table, before, _ = images()
+    world = nuno.World(device="cpu", substeps=45)
+    world.add(nuno.box((0.8, 1.2, 0.04), position=(0.0, 0.0, HEIGHT - 0.02)))
+    towel = world.add(nuno.sheet((0.2, 0.3), (14, 21), position=(0.1, 0.0, HEIGHT + 0.0025)))
+    corner = towel.vertices[0].copy()
+    hand = corner + np.array([0.02, 0.03, 0.25])
+    world.attach(towel, nuno.Cloth(bending_rigidity=1e-4, area_density=0.25))
+    world.grip(towel, [0], to=nuno.Path([0.1, 1.6], [corner, hand], interpolation="minimum_jerk"))
+    world.run(4.0)
+    after = room(CAMERA, 1)
+    after[world.masks(CAMERA, towel).numpy()] = 50.0
+    for name, image in (("table", table), ("before", before), ("after", exposed(after)),
+                        *((f"view{k}", view) for k, view in enumerate(views))):  # fmt: skip
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image[..., ::-1])
+    arguments = ["capture", "--out", str(tmp_path / "case"), "--board-images",
+                 *(str(tmp_path / f"view{k}.png") for k in range(len(views))),
+                 *(f"--{name}={tmp_path / part}.png" for name, part in (
+                     ("board-on-table", "table"), ("before", "before"), ("after", "after"))),
+                 "--hand", *map(str, hand), "--table-height", str(HEIGHT), "--table-size", "0.8", "1.2",
+                 "--board-at", *map(str, AT)]  # fmt: skip
+    assert main(arguments) == 0
+    assert main(["pick", str(tmp_path / "case"), "--out", str(tmp_path), "--device", "cpu"]) == 0
+    told = json.loads((tmp_path / "result.json").read_text())
+    # C00 is the corner at the image's upper left, (0.2, 0.15) m; the lifted one is the other end of both sides
+    assert told["pick"] == [5, 5]
+    assert told["confidence"] > 0.8, "a corner that hangs free is a clear pick"

@@ -15,6 +15,10 @@ from nuno.errors import ClothNotFoundError
 
 AGREE = 0.85
 """IoU from which colours and outline have found the same; then the colours' mask counts, which is finer."""
+STRAYS = 0.03
+"""Of the root of the shape's area, how far the colours' mask may lie beside it: a cloth is not quite flat,"""
+LUMP = 0.01
+"""and share of the area that lies farther from which on something else of its colour touches it."""
 _INSTANCES = 4  # among which a hint chooses
 log = logging.getLogger(__name__)
 
@@ -51,7 +55,17 @@ def segment_by_template(
         )
         return mask
     same = float((mask & chosen.mask).sum()) >= AGREE * float((mask | chosen.mask).sum())
-    return mask if same else chosen.mask
+    return _without_lumps(mask, chosen.mask) if same else chosen.mask
+
+
+def _without_lumps(mask: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Return the colours' mask (h, w) bool without what sticks out of the shape: things of its colour."""
+    import cv2
+
+    area = float(shape.sum())
+    reach = max(2, round(STRAYS * area**0.5))
+    near = cv2.dilate(shape.astype(np.uint8), np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)).astype(bool)
+    return mask & near if (mask & ~near).sum() > LUMP * area else mask
 
 
 def _fits(found: FoundShape, hint: np.ndarray) -> bool:

@@ -265,13 +265,16 @@ class Humanoid(Coordinates):
         return q
 
     def configuration_of(self, angles: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Return the configuration (nq,) with angles (n,) and a base (7,): position, quaternion (x, y, z, w)."""
-        q = np.empty(self.model.nq)
-        q[:7] = base
-        q[self._rows] = angles
+        """Return the configuration (nq,) with angles (n,) and a base (7,): position, quaternion (x, y, z, w).
+
+        Of many at once where both have an axis before: (k, n) and (k, 7).
+        """
+        q = np.empty((*angles.shape[:-1], self.model.nq))
+        q[..., :7] = base
+        q[..., self._rows] = angles
         if len(self._free):
             first = self._rows[self._free]
-            q[first], q[first + 1] = np.cos(angles[self._free]), np.sin(angles[self._free])
+            q[..., first], q[..., first + 1] = np.cos(angles[..., self._free]), np.sin(angles[..., self._free])
         return q
 
     def take_configuration(self, q: np.ndarray) -> None:

@@ -45,11 +45,17 @@ class LinkBatch:
             angles: (worlds, dof) of the joints there.
         """
         worlds, count = len(angles), len(self._bodies)
-        axes, origins = (np.empty((worlds, *part.shape)) for part in (self._axes, self._origins))
-        for w, q in enumerate(configurations):
-            pin.forwardKinematics(self._model, self._data, q)
-            axes[w], origins[w] = self._axes, self._origins
-        aims = self._links.poses_at(axes, origins, angles)
+        # worlds under the same commands are in the same posture: one of them says where all their links are
+        numbers: dict[bytes, int] = {}
+        which = [numbers.setdefault(q.tobytes(), len(numbers)) for q in configurations]
+        firsts = [which.index(k) for k in range(len(numbers))]
+        axes, origins = (np.empty((len(firsts), *part.shape)) for part in (self._axes, self._origins))
+        for k, w in enumerate(firsts):
+            pin.forwardKinematics(self._model, self._data, configurations[w])
+            axes[k], origins[k] = self._axes, self._origins
+        aims = self._links.poses_at(axes, origins, angles[firsts])
+        if len(firsts) < worlds:
+            aims = (aims[0][which], aims[1][which])
         begins = self._group.arrived(self._bodies, start, (worlds,) if worlds > 1 else ())
         keys = []
         for begin, aim in zip(begins, aims, strict=True):

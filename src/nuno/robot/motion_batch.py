@@ -55,18 +55,23 @@ class MotionBatch:
         for w, (guard, own) in enumerate(zip(self._guards, self._motions, strict=True)):
             alone[w] = alone[w] or guard.is_due(own, float(joints.clock[w]), span)
         self._asked, aims, angles = np.flatnonzero(alone).tolist(), list(self._aims), motion[0].copy()
-        for w, before in enumerate(self._aims):
-            if alone[w]:
-                self._bring(w)
-                self._guards[w].before_frame(self._motions[w], span)
-                aims[w] = self._motions[w].begin(end, span, servo)
-                angles[w] = self._motions[w].robot._angles
-                continue
-            q, v, a = before.q, before.v, before.a
-            if not rests[w]:
-                q, v, a = self._robot.configuration_of(motion[0, w], q[:7]), np.zeros_like(v), np.zeros_like(a)
-                v[6:], a[6:] = motion[1:, w]
-            aims[w] = RobotState(end, q, v, a)
+        for w in self._asked:
+            self._bring(w)
+            self._guards[w].before_frame(self._motions[w], span)
+            aims[w] = self._motions[w].begin(end, span, servo)
+            angles[w] = self._motions[w].robot._angles
+        for w in np.flatnonzero(rests & ~alone).tolist():
+            before = self._aims[w]
+            aims[w] = RobotState(end, before.q, before.v, before.a)
+        moves = np.flatnonzero(~rests & ~alone)
+        if len(moves):
+            bases = np.array([self._aims[w].q[:7] for w in moves.tolist()])
+            found = np.zeros((2, len(moves), self._robot.model.nv))
+            found[:, :, 6:] = motion[1:, moves]
+            for w, q, v, a in zip(
+                moves.tolist(), self._robot.configuration_of(motion[0, moves], bases), *found, strict=True
+            ):
+                aims[w] = RobotState(end, q, v, a)
         self._pending = aims, ~alone, span, motion, desired
         return aims, angles
 

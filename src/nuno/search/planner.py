@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
+from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike
 from nuno.errors import EstimationError, InvalidInputError, NunoError
 from nuno.search.knots import LONGEST
 from nuno.validation import checked, count, finite_array, function, number
+from nuno.world.impacts import fast_cloths, forget_fast
 from nuno.world.world import World
 
 log = logging.getLogger(__name__)
@@ -20,6 +22,8 @@ log = logging.getLogger(__name__)
 METHODS = ("cem", "mppi")
 SMALLEST = 1e-3
 """Share of its first value that a standard deviation keeps at least."""
+_warned: WeakSet[World] = WeakSet()
+"""Worlds of which was said that their plans are imagined too roughly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +78,8 @@ def plan(
         seed: Of the samples.
         device: Where futures run; None is where the world runs.
         thorough: As of ``World.imagine``; without, fast motions are imagined in less time, and less
-            truly: the world itself goes through fast frames twice, and ends elsewhere.
+            truly: the world itself goes through fast frames twice, and ends elsewhere. Where the best motion has such
+            frames, a warning says so, once for a world.
 
     Raises:
         InvalidInputError: an argument out of range, or costs of another shape.
@@ -106,12 +111,15 @@ def plan(
     futures = world.imagine(n, device, thorough=thorough)
     saved = futures.save()
     found, lowest, failed, history = mean, np.inf, 0, []
+    hurried: list[str] = []  # what was too fast in the future that is kept
     for k in range(rounds):
         knots = mean + sigma * random.standard_normal((n, *shape))
         knots[0] = mean if k == 0 else found  # the start, and then the best, are always among them
         knots = np.clip(knots, low, high)
         if k:
             futures.restore(saved)
+        if not thorough:
+            forget_fast(futures.bodies)
         called("act", act, futures, knots)
         futures.run(seconds)
         costs = _checked(called("cost", cost, futures), n)
@@ -125,6 +133,8 @@ def plan(
         order = np.argsort(np.where(finite, costs, np.inf), kind="stable")
         if costs[order[0]] < lowest:
             found, lowest = knots[order[0]], float(costs[order[0]])
+            fast = {} if thorough else fast_cloths(futures.bodies)
+            hurried = [name for name, worlds in fast.items() if worlds[order[0]]]
         if method == "cem":
             chosen = knots[order[: min(best_of, int(finite.sum()))]]
             mean, sigma = chosen.mean(axis=0), np.maximum(chosen.std(axis=0), floor)
@@ -134,6 +144,15 @@ def plan(
             mean = np.einsum("n,nkd->kd", weights / weights.sum(), knots)
         history.append(lowest)
         log.debug("plan: iteration %d of %d, cost %g", k + 1, rounds, lowest)
+    if hurried and world not in _warned:
+        _warned.add(world)
+        drivers: list[Any] = [driver for driver in world.drivers if getattr(driver, "is_dynamic", False)]
+        held = sorted(driver.robot.name for driver in drivers)
+        log.warning(
+            "the plan's cost was imagined without going through fast frames of %s a second time, as the world itself "
+            "does%s: what is carried out will cost something else; imagine with thorough=True, or plan slower motions",
+            " and ".join(map(repr, hurried)), f", which {' and '.join(map(repr, held))} feels, too" if held else "",
+        )  # fmt: skip
     return Plan(found.copy(), lowest, np.array(history), mean, sigma, failed)
 
 

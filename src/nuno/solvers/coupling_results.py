@@ -121,6 +121,8 @@ class CouplingResults:
         (worlds, joints, 3) twice, and (worlds, joints).
         """
         joints, worlds = self.joints, self.world_count
+        if not joints.count:
+            return np.zeros((worlds, 0, 3)), np.zeros((worlds, 0, 3)), np.zeros((worlds, 0))
         axial = joints.total_axial.numpy().reshape(worlds, joints.count).astype(float) * self._scale
         return self._per_world(joints.total, joints.count), self._per_world(joints.total_twist, joints.count), axial
 

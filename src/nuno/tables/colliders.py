@@ -166,24 +166,15 @@ class Colliders:
                 place[:, own], turn[:, own] = places[rows], turns[rows]
         if self._has_centres:
             place += quat.rotate(turn, self._centres[:, :, None])
-        # the short way round between neighbours, which the kernels blend number by number
-        flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
-        turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
-        table = self._table
-        first = 2 * np.arange(frames + 1)
-        base = np.round(place[:, :, first] * 1024.0) / 1024.0
-        table[:, :, : frames + 1, :3] = base
-        for k in range(3):
-            # the frame that begins at the end stands still
-            which = np.minimum(first + k, 2 * frames)
-            into = table[:, :, : frames + 1, 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
-            into[..., :3] = place[:, :, which] - base
-            into[..., 3:] = turn[:, :, which]
-        shape_speed = self._shape_speed(schedule.times, place, turn)
+        shape_speed = 0.0
+        for rows, alike in _alike_or_not(place, turn):
+            which = slice(0, 1) if alike else slice(None)
+            speed = self._write_keys(rows, place[which, rows], turn[which, rows], schedule.times)
+            shape_speed = max(shape_speed, speed)
         if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
             self._shape_speed_on_cpu[0] = shape_speed
         else:
-            self.shapes.pose.assign(table.ravel())
+            self.shapes.pose.assign(self._table.ravel())
             self.shapes.shape_speed.assign(np.array([shape_speed], dtype=np.float32))
         self._times = schedule.times
 
@@ -211,10 +202,28 @@ class Colliders:
             self._path_batch = (keys, own, rows)
         return self._path_batch[1], self._path_batch[2]
 
-    def _shape_speed(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray) -> float:
-        """The fastest that any point of the kinematic bodies moves [m/s]."""
-        span = np.diff(times)
-        radii = self._radii[:, None]
+    def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> float:
+        """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s]."""
+        frames = len(times) // 2
+        # the short way round between neighbours, which the kernels blend number by number
+        flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
+        turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
+        first = 2 * np.arange(frames + 1)
+        base = np.round(place[:, :, first] * 1024.0) / 1024.0
+        keys = np.empty((*base.shape[:3], FRAME_SIZE), dtype=np.float32)
+        keys[..., :3] = base
+        for k in range(3):
+            # the frame that begins at the end stands still
+            which = np.minimum(first + k, 2 * frames)
+            into = keys[..., 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
+            into[..., :3] = place[:, :, which] - base
+            into[..., 3:] = turn[:, :, which]
+        self._table[:, rows, : frames + 1] = keys
+        return self._shape_speed(times, place, turn, self._radii[rows])
+
+    def _shape_speed(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray, radii: np.ndarray) -> float:
+        """Return the fastest that any point of kinematic bodies of some radii [m] moves [m/s]."""
+        span, radii = np.diff(times), radii[:, None]
         speed = np.linalg.norm(place[:, :, 1:] - place[:, :, :-1], axis=-1) / span
         dot = np.minimum(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 1.0)
         return float((speed + 2.0 * np.arccos(dot) / span * radii).max())
@@ -235,6 +244,14 @@ class Colliders:
             # at the end all stand still, for however long: that frame has no end
             span = round((starts[first + 1] - starts[first]) / dt) if first + 1 < len(starts) else ENDLESS
             self.shapes.timing.assign(np.array([first, max(1, span)], dtype=np.int32))
+
+
+def _alike_or_not(place: np.ndarray, turn: np.ndarray) -> list[tuple[Any, bool]]:
+    """Return which bodies (worlds, n, times, ...) are in the same place in all worlds and which are not, if any are."""
+    if len(place) == 1:
+        return [(slice(None), False)]
+    alike = (place == place[:1]).all(axis=(0, 2, 3)) & (turn == turn[:1]).all(axis=(0, 2, 3))
+    return [(np.flatnonzero(own), same) for own, same in ((alike, True), (~alike, False)) if own.any()]
 
 
 @lru_cache(maxsize=256)

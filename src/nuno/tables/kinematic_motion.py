@@ -54,16 +54,42 @@ class PathBatch:
 
     def at(self, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
         """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path.keys_around`` says of times."""
-        first, last, s = between
-        a, b, turns = self.positions[..., first, :], self.positions[..., last, :], self.quaternions
-        placed = a + s[..., None] * (b - a)
-        if turns.ndim < 4 or s.ndim == 0:
-            return placed, quat.slerp(turns[..., first, :], turns[..., last, :], s)
-        # of many worlds one instant after the other: most are at a key, where there is nothing to interpolate
-        turned = np.empty((*placed.shape[:-1], 4))
-        for k, part in enumerate(s):
-            turned[..., k, :] = quat.slerp(turns[..., first[k], :], turns[..., last[k], :], part)
-        return placed, turned
+        alike = self._alike
+        if not alike.any():
+            return _between(self.positions, self.quaternions, between)
+        one = _between(self.positions[alike, :1], self.quaternions[alike, :1], between)
+        if alike.all():
+            shape = (*self.positions.shape[:2], *one[0].shape[2:-1])
+            return np.broadcast_to(one[0], (*shape, 3)), np.broadcast_to(one[1], (*shape, 4))
+        others = _between(self.positions[~alike], self.quaternions[~alike], between)
+        found = []
+        for shared, own in zip(one, others, strict=True):
+            part = np.empty((len(alike), *own.shape[1:]))
+            part[alike], part[~alike] = shared, own
+            found.append(part)
+        return found[0], found[1]
+
+    @cached_property
+    def _alike(self) -> np.ndarray:
+        """(n,) bool, of which bodies many worlds have one path: it is worked out once."""
+        if self.positions.ndim < 4:
+            return np.zeros(len(self.positions), dtype=bool)
+        same = [(part == part[:, :1]).all(axis=(1, 2, 3)) for part in (self.positions, self.quaternions)]
+        return np.asarray(same[0] & same[1])
+
+
+def _between(positions: np.ndarray, turns: np.ndarray, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
+    """Return poses between keys, of which positions are (n, ..., k, 3) and turns (n, ..., k, 4)."""
+    first, last, s = between
+    a, b = positions[..., first, :], positions[..., last, :]
+    placed = a + s[..., None] * (b - a)
+    if turns.ndim < 4 or s.ndim == 0:
+        return placed, quat.slerp(turns[..., first, :], turns[..., last, :], s)
+    # of many worlds one instant after the other: most are at a key, where there is nothing to interpolate
+    turned = np.empty((*placed.shape[:-1], 4))
+    for k, part in enumerate(s):
+        turned[..., k, :] = quat.slerp(turns[..., first[k], :], turns[..., last[k], :], part)
+    return placed, turned
 
 
 class KinematicGroup:

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,27 @@ def are_fast(moving: dict[Body, Dynamics]) -> bool:
     """Return True if a cloth may have passed through itself for its speed since that was last forgotten, or did."""
     cloths: list[Any] = [dynamics for dynamics in moving.values() if collides_with_itself(dynamics)]
     return any((_fast_worlds(cloth) | (cloth.solver.guarded > 0)).any() for cloth in cloths)
+
+
+def forget_fast(bodies: Iterable[Body]) -> None:
+    """Let `fast_cloths` tell of what comes next."""
+    from nuno.solvers.extremes import forget_extremes
+
+    for _, dynamics in _touching_themselves(bodies):
+        forget_extremes(dynamics.solver)
+
+
+def fast_cloths(bodies: Iterable[Body]) -> dict[str, np.ndarray]:
+    """Return by name in which worlds (worlds,) bool a cloth had frames for which it was too fast, or pressed too deep.
+
+    Of worlds that go through each frame once: others forget it as they go through those frames again.
+    """
+    return {body.name: _fast_worlds(dynamics) for body, dynamics in _touching_themselves(bodies)}
+
+
+def _touching_themselves(bodies: Iterable[Body]) -> list[tuple[Body, Any]]:
+    pairs = [(body, body._dynamics) for body in bodies]
+    return [(body, dynamics) for body, dynamics in pairs if dynamics is not None and collides_with_itself(dynamics)]
 
 
 class Impacts:

@@ -1,0 +1,152 @@
+"""Robots under random operations: imagined, restored and adopted ones go on with the same bits, their hands too."""
+
+import numpy as np
+import pytest
+from lifter import lifter_in
+
+import nuno
+
+OPERATIONS = 8
+"""Of a sequence: enough that a hand that closes is told something else on the way."""
+AHEAD = 0.25
+"""[s] In which copies are compared: a hand closes within 0.2 s."""
+
+
+def lift(robot, random):
+    """Send the palm elsewhere."""
+    robot.angle_vector({"lift": random.uniform(0.0, 0.1)}, random.uniform(0.05, 0.3))
+
+
+def sequence(robot, random):
+    """Send the palm through three places."""
+    robot.angle_vector_sequence([{"lift": height} for height in random.uniform(0.0, 0.1, 3)], 0.1)
+
+
+def close(robot, random):
+    """Let the hand close, as hard as it draws."""
+    robot.start_grasp("rarm", effort=random.uniform(2.0, 40.0), wait=False)
+
+
+def open_hand(robot, random):
+    """Let the hand open, perhaps not wholly."""
+    robot.move_gripper("rarm", random.uniform(0.5, 1.0), wait=False)
+
+
+def stop(robot, random):
+    """Stop the joints."""
+    robot.cancel_angle_vector()
+
+
+def push(robot, random):
+    """Push what may be between the fingers."""
+    robot.world.push("cube", random.uniform(-0.5, 0.5, 3), duration=0.05)
+
+
+def put(robot, random):
+    """Put the cube between the fingers, or the towel."""
+    place = robot.actual.frame_pose("right_hand").position + random.uniform(-0.002, 0.002, 3)
+    robot.world.find(("cube", "towel")[random.integers(2)]).locate(place)
+
+
+def change(robot, random):
+    """Give the robot dynamics, or take them."""
+    if robot.links.are_joints:
+        robot.detach() if robot.is_dynamic else robot.attach()
+
+
+def run(robot, random):
+    """A few frames, or parts of one."""
+    robot.world.run(random.choice([1.0 / 60.0, 0.05, 0.013, 0.1]))
+
+
+def go_back(robot, random):
+    """Save, go on, and restore."""
+    saved = robot.world.save()
+    robot.world.run(0.05)
+    robot.world.restore(saved)
+
+
+def adopt(robot, random):
+    """Become one of two futures, whose palms go to different places."""
+    futures = robot.world.imagine(2)
+    futures.robot.angle_vector({"lift": random.uniform(0.0, 0.1, 2)}, 0.2)
+    futures.run(0.05)
+    robot.world.adopt(futures, int(random.integers(2)))
+
+
+CHOICES = (lift, sequence, close, close, open_hand, stop, push, put, change, run, run, go_back, adopt)
+
+
+def room(folder, dynamics):
+    """A lifter with a cube between its fingers and a towel beside it."""
+    world = nuno.World(device="cpu", substeps=8)
+    robot = lifter_in(folder, world, dynamics=dynamics)
+    cube = world.add(nuno.box((0.05,) * 3, name="cube", position=(0.0, 0.0, 1.0)))
+    world.attach(cube, nuno.Rigid(mass=0.1, friction=0.5))
+    towel = world.add(nuno.sheet((0.1, 0.1), (4, 4), name="towel", position=(0.2, 0.0, 1.0)))
+    world.attach(towel)
+    return robot
+
+
+def state_of(world, state, k=None):
+    """All that there is to see of a world and its robot, or of world k of a batch."""
+    found = {"q": state.q, "v": state.v, "a": state.a}
+    for body in world.bodies:
+        found[body.name] = body.vertices if k is None else body.vertices[k]
+    return found
+
+
+def differing(found, expected):
+    """Names of what is not equal to the bit."""
+    return [name for name, own in expected.items() if not np.array_equal(found[name], own)]
+
+
+def check(seed, folder, dynamics):
+    """Let random operations happen, then compare copies of every kind; return what differs, by name."""
+    random = np.random.default_rng(seed)
+    robot = room(folder, dynamics)
+    world, log = robot.world, []
+    for _ in range(OPERATIONS):
+        operation = CHOICES[random.integers(len(CHOICES))]
+        log.append(operation.__name__)
+        try:
+            operation(robot, random)
+        except nuno.NunoError as error:
+            log[-1] += f" ({type(error).__name__})"
+    saved, futures = world.save(), world.imagine(3)
+    world.run(AHEAD)
+    futures.run(AHEAD)
+    later, wrong = state_of(world, robot.state()), []
+    for k, state in enumerate(futures.robot.state()):
+        wrong += [f"imagined {k}: {name}" for name in differing(state_of(futures, state, k), later)]
+    world.restore(saved)
+    world.run(AHEAD)
+    wrong += [f"restored: {name}" for name in differing(state_of(world, robot.state()), later)]
+
+    # commands by world: each as its own driver carries it out; one is adopted
+    world.restore(saved)
+    futures = world.imagine(2)
+    heights = random.uniform(0.0, 0.1, 2)
+    futures.robot.angle_vector({"lift": heights}, 0.2)
+    futures.run(AHEAD)
+    ends = [state_of(futures, state, k) for k, state in enumerate(futures.robot.state())]
+    world.adopt(futures, 1)
+    wrong += [f"adopted: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
+    world.run(0.05)
+    futures.run(0.05)
+    ends[1] = state_of(futures, futures.robot.state()[1], 1)
+    wrong += [f"adopted, later: {name}" for name in differing(state_of(world, robot.state()), ends[1])]
+    return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong]
+
+
+@pytest.mark.parametrize("dynamics", [False, True], ids=["kinematic", "dynamic"])
+def test_copies_of_a_few_random_robots(tmp_path, dynamics):
+    """Of the same, so many as take seconds."""
+    assert [each for seed in range(2) for each in check(seed, tmp_path, dynamics)] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("dynamics", [False, True], ids=["kinematic", "dynamic"])
+def test_copies_of_random_robots(tmp_path, dynamics):
+    """Twenty sequences each: imagined, restored, commanded by world and adopted robots, equal now and later."""
+    assert [each for seed in range(2, 22) for each in check(seed, tmp_path, dynamics)] == []
