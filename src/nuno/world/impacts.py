@@ -24,7 +24,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from nuno.bodies.body import Body
 from nuno.bodies.dynamics import SOON, Dynamics
@@ -93,6 +92,8 @@ class Impacts:
     """
 
     def __init__(self, moving: list[Body], worlds: int, frame: float) -> None:
+        import warp as wp
+
         from nuno.solvers.extremes import forget_extremes
 
         self._moving = moving
@@ -102,7 +103,7 @@ class Impacts:
         self._thorough = np.zeros_like(self.substeps, dtype=bool)  # where it has gone with more passes
         self._guarded: dict[int, np.ndarray] = {}  # (worlds,) bool, where a cloth was taken apart not long ago
         self._crossed: dict[Body, list[int]] = {}  # worlds in which a cloth passes through itself in the end
-        self._start: dict[int, list[wp.array]] = {}  # of each cloth that touches itself, where it begins
+        self._start: dict[int, list[Any]] = {}  # of each cloth that touches itself, where it begins
         for k, body in enumerate(moving):
             if collides_with_itself(body._dynamics):
                 solver: Any = body._dynamics.solver  # type: ignore[union-attr]
