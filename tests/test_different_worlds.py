@@ -1,5 +1,6 @@
 """A world of a batch is the world alone, to the bit, also where the batch's worlds differ from each other."""
 
+import numpy as np
 import pytest
 
 import nuno
@@ -92,6 +93,32 @@ def test_a_push_that_is_nothing_in_one_world_ends_its_frame_too():
 
     both = pushed(nuno.World(device="cpu"), [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
     assert both[1].tolist() == pushed(nuno.World(device="cpu"), [(0.0, 0.0, 0.0)]).tolist()
+
+
+def test_what_is_thrown_farther_than_expected_meets_what_it_would_alone():
+    """A cloth that a grip tears down 0.4 m within a frame, beside a world whose cloth lies where it comes to.
+
+    Worlds of a batch share a list of the shapes nearby. What moves farther than the list looks met the floor in the
+    batch, which it had not met alone.
+    """
+
+    def torn(heights):
+        world = nuno.World(device="cpu", substeps=6)
+        world.add(nuno.plane())
+        sheet = world.add(nuno.sheet((0.2, 0.2), cells=(3, 3), position=(0.0, 0.0, 0.3)))
+        world.attach(sheet)
+        batch = world.imagine(len(heights), thorough=False) if len(heights) > 1 else world
+        batch._quiet = True
+        cloth, height = batch.find(sheet.name), np.array(heights)
+        cloth.locate(np.stack([0.0 * height, 0.0 * height, height], axis=1) if len(heights) > 1 else (0, 0, heights[0]))
+        first = np.atleast_3d(cloth.vertices).reshape(len(heights), -1, 3)[:, 0]
+        down = np.stack([first, first - (0.0, 0.0, 0.4)], axis=1)
+        batch.grip(cloth, [0], to=nuno.Path((0.0, 1.0 / 60.0), down if len(heights) > 1 else down[0]))
+        batch.run(0.05)
+        return cloth.vertices
+
+    both, alone = torn((0.3, 0.01)), torn((0.3,))
+    np.testing.assert_array_equal(both[0], alone)
 
 
 @pytest.mark.slow

@@ -29,7 +29,8 @@ from nuno.state.cloth_state import FRICTION, SCALARS, THICKNESS, Shapes
 class Surroundings:
     """The static and moving shapes around a body's particles, in its solver's arrays.
 
-    ``near`` lists the shapes nearby, ``stride`` numbers a group of lanes: how many, then which.
+    ``near`` lists the shapes nearby, ``stride`` numbers a group of lanes: how many, which, and for each shape the lanes
+    that would not list it.
     """
 
     shapes: Shapes
@@ -127,6 +128,8 @@ def bound_particles(
     reach = elements.reach[world * elements.bodies + body]
     for k in range(around.near[group * around.stride]):
         s = around.near[group * around.stride + 1 + k]
+        if (around.near[group * around.stride + 1 + around.shapes.count + s] >> lane) & 1 != 0:
+            continue  # the world would not list it alone
         row = s * COLUMNS
         radius = half + entry(around.shapes, world, around.worlds, row + 17)
         far = radius + reach

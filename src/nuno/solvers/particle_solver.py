@@ -87,8 +87,8 @@ class ParticleSolver(ParticleState):
         else:
             shapes = colliders.shapes
         self._colliders, self.shapes = colliders, shapes
-        self._size.shape_list = max(1, int(shapes.count)) + 1
-        self._size.feature_shapes = len(self._surface.feature_colour) + self._size.shape_list
+        self._size.shape_list = 1 + 2 * max(1, int(shapes.count))
+        self._size.feature_shapes = len(self._surface.feature_colour) + max(1, int(shapes.count)) + 1
         self.state.shape_list, self.state.feature_shapes = (
             self._empty(self._size.shape_list, int),
             self._empty(self._size.feature_shapes, int),

@@ -27,11 +27,13 @@ from nuno.contact.particle.hull import distance_hull, way_into_hull
 from nuno.contact.particle.kinematic_pose import kinematic_pose, kinematic_position
 from nuno.numbers.element_access import at
 from nuno.numbers.lanes import (  # noqa: F401
+    LANES,
     add,
     anywhere,
     choose,
     div,
     full_like,
+    lane,
     lane_max,
     maximum,
     minimum,
@@ -53,6 +55,8 @@ of a box, radius and half height, or half sides of a mesh's bounding box. What m
 
 LEAVE_SPEED = wp.constant(0.5)
 """[m/s] A particle found inside leaves no faster than this, so that a bad start is no explosion."""
+OUT_OF_REACH = wp.constant(-1.0e9)
+"""[m] In place of a radius, where a shape is not to be met."""
 FAST = wp.constant(10.0)
 """[m/s] A particle that is faster, seen from a shape, may pass through a shape thinner than its way in a substep."""
 
@@ -145,6 +149,7 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
     pair = per_world(like, shapes.table, g, shapes.stride, w, row + 16)
     mu = choose(pair + 0.5, pair, mean)
     radius = t.scalars[THICKNESS] * 0.5 + per_world(like, shapes.table, g, shapes.stride, w, row + 17)
+    radius = in_lanes(radius, t.shape_list[1 + shapes.count + s], OUT_OF_REACH)
     leave = full_like(like, LEAVE_SPEED * dt)
     kind = shapes.kind[s]
     slot = shapes.slot[s]
@@ -187,6 +192,39 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
                 push_out(t, i, choose(met, deep, gap) - radius, out, u, dot(u, out), mu, leave)
             elif anywhere(radius - gap):
                 push_out(t, i, gap - radius, normal, u, un, mu, leave)
+
+
+@wp.func
+def lanes_without(a: float):
+    """Return the lanes, bit by bit, in which a number is not above zero: none of one number that is."""
+    return 0
+
+
+@wp.func
+def lanes_without(a: lane):
+    found = int(0)
+    lanes = int(LANES)  # a variable, or Warp would unroll the loop
+    for k in range(lanes):
+        if a[k] <= 0.0:
+            found = found | (1 << k)
+    return found
+
+
+@wp.func
+def in_lanes(a: float, lanes: int, other: float):
+    """Return a number, but ``other`` in the lanes given bit by bit."""
+    return a
+
+
+@wp.func
+def in_lanes(a: lane, lanes: int, other: float):
+    result = a
+    if lanes != 0:
+        count = int(LANES)
+        for k in range(count):
+            if (lanes >> k) & 1 != 0:
+                result[k] = other
+    return result
 
 
 @wp.func
@@ -264,7 +302,8 @@ def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
 def select_shapes(t: Any, shapes: Shapes, ahead: float, rank: int, size: int):
     """List the shapes that a particle could touch within ``ahead`` seconds.
 
-    The list of a group of lanes is the union over its worlds; a shape that a world does not touch changes no bit.
+    The list of a group of lanes is the union over its worlds. Behind it are, for each shape, the worlds that would not
+    list it alone, bit by bit: what moves farther than was expected must not meet it for another world's sake.
     """
     like = t.x[0]
     grow = reach_of_frame(t, shapes, ahead)
@@ -293,6 +332,7 @@ def select_shapes(t: Any, shapes: Shapes, ahead: float, rank: int, size: int):
         if anywhere(reach - far):
             k = wp.atomic_add(t.shape_list, 0, 1)
             t.shape_list[1 + k] = s
+            t.shape_list[1 + shapes.count + s] = lanes_without(reach - far)
 
 
 @wp.func

@@ -104,14 +104,16 @@ def rebuild_lists(t: StateLanes, topo: Topology, run: Settings, rank: int, size:
     worlds = wp.min(lanes, t.worlds - lanes * t.group)
     approach = swept(t, run)
     left = run.margin - approach
-    if anywhere(t.notes[TRAVEL] * 2.0 - left):
+    bound = t.notes[TRAVEL] * 2.0 - left
+    if anywhere(bound):
         measure_moves(t, topo)
         worst = max_approach(t, topo, t.scalars[THICKNESS] + run.margin)
         worst = maximum(worst, t.notes[TRAVEL] - FORGET)
-        t.notes[TRAVEL] = worst * 0.5
         late = worst - left
         for k in range(lanes):
-            if late[k] > 0.0:
+            if bound[k] > 0.0:  # a world that would not measure alone does not here: its list is made when it would be
+                t.notes[TRAVEL][k] = worst[k] * 0.5
+            if bound[k] > 0.0 and late[k] > 0.0:
                 t.notes[TRAVEL][k] = 0.0
                 if k < worlds:
                     # what was picked of the old list is not to be trusted any more
