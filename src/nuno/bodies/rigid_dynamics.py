@@ -109,7 +109,10 @@ class RigidScene:
                 sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
                 angle = 2.0 * np.arctan2(sine, turn[..., :1])
                 axis = np.divide(turn[..., 1:], sine, out=np.zeros_like(turn[..., 1:]), where=sine > 0.0)
-                self.solver.set_velocity(slot, (end[0] - start[0]) / duration, axis * angle / duration)
+                # what stands is led by nothing: of its turn, rounding alone would be left
+                still = [(a == b).all(axis=-1, keepdims=True) for a, b in zip(start, end, strict=True)]
+                spin = np.where(still[0] & still[1], 0.0, axis * angle / duration)
+                self.solver.set_velocity(slot, (end[0] - start[0]) / duration, spin)
                 slots.append(slot)
         return slots
 
