@@ -9,8 +9,8 @@ from varied_worlds import Variation, run
 SHORT, LONG = (5, 6, 8, 10, 18, 19, 25, 29, 36, 41, 55, 58, 104, 106, 127, 1101, 1249, 1383), range(1000, 1400)
 """Seeds; the short ones are some in which a world differed: where lists of contacts and the ends of pushes were the
 batch's, then where a step's length or their number was rounded, where a body was led in one world and stood in
-others, where one was put elsewhere in some, and where some were reset to before a body was led. In one, a path is in one
-world alone."""
+others, where one was put elsewhere in some, where some were reset to before a body was led, and where a path is
+under way in one alone."""
 FEW = (29, 55, 58, 106)
 """Of those, some that take no second each and have all kinds of changes but leaving dynamics."""
 WORLDS, COLOURS = 3, 4

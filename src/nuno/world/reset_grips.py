@@ -86,9 +86,9 @@ def _followed(grip: Grip, record: GripRecord, at: WorldRows) -> Any:
         return None
     # in worlds where it has led nothing yet: not a number
     nowhere = [(np.full((1, 3), np.nan), np.full((1, 4), np.nan))] * 2
-    time, *poses = own or (at.time - 1.0, *nowhere)
-    theirs = other[1:] if other else nowhere
-    return time, *(tuple(map(at.merged, x, y, (1, 1))) for x, y in zip(poses, theirs, strict=True))
+    mine, theirs = (nowhere if way is None else way[1:] for way in (own, other))
+    poses = (tuple(map(at.merged, x, y, (1, 1))) for x, y in zip(mine, theirs, strict=True))
+    return at.time - 1.0 if own is None else own[0], *poses
 
 
 def set_merged_grips(
