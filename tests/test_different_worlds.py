@@ -81,20 +81,6 @@ def test_worlds_of_a_batch_that_differ():
     assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "reset", "run"}
 
 
-def test_a_push_that_is_nothing_in_one_world_ends_its_frame_too():
-    """A frame is cut where a push ends in any world: one that is pushed by nothing alone goes in the same steps."""
-
-    def pushed(world, force):
-        ball = world.attach(world.add(nuno.sphere(0.05, position=(0.0, 0.0, 1.0))))
-        batch = world.imagine(len(force)) if len(force) > 1 else world
-        batch.push(ball, force if len(force) > 1 else force[0], duration=0.04)
-        batch.run(0.1)
-        return batch.find(ball.name).position
-
-    both = pushed(nuno.World(device="cpu"), [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
-    assert both[1].tolist() == pushed(nuno.World(device="cpu"), [(0.0, 0.0, 0.0)]).tolist()
-
-
 def test_parts_of_frames_have_as_many_substeps_by_itself_as_with_others():
     """A ball falls the same near a box that is held, which it does not touch, and far from it.
 
@@ -111,6 +97,20 @@ def test_parts_of_frames_have_as_many_substeps_by_itself_as_with_others():
         return ball.position.tolist()
 
     assert fallen(0.12) == fallen(2.0)
+
+
+def test_a_push_that_is_nothing_in_one_world_ends_its_frame_too():
+    """A frame is cut where a push ends in any world: one that is pushed by nothing alone goes in the same steps."""
+
+    def pushed(world, force):
+        ball = world.attach(world.add(nuno.sphere(0.05, position=(0.0, 0.0, 1.0))))
+        batch = world.imagine(len(force)) if len(force) > 1 else world
+        batch.push(ball, force if len(force) > 1 else force[0], duration=0.04)
+        batch.run(0.1)
+        return batch.find(ball.name).position
+
+    both = pushed(nuno.World(device="cpu"), [(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+    assert both[1].tolist() == pushed(nuno.World(device="cpu"), [(0.0, 0.0, 0.0)]).tolist()
 
 
 @pytest.mark.slow
