@@ -336,9 +336,21 @@ def state_of(world, k=None):
         found[f"{own} velocities"] = picked(body.velocities, 2)
         found[f"{own} position"], found[f"{own} quaternion"] = picked(body.position, 1), picked(body.quaternion, 1)
         found[f"{own} friction"] = picked(np.asarray(body.friction), 0)
-        if body._path is not None and body._path.times[-1] > world.time:  # one that has ended is no more than a place
+        if _leads(body._path, world, k):
             found[f"{own} path"] = picked(body._path.at(world.time), 1)
     return found
+
+
+def _leads(path, world, k):
+    """Whether a path leads anywhere in a world; a batch has one for all, which stays in place where a world has none.
+
+    One that has ended is no more than a place, either.
+    """
+    if path is None or path.times[-1] <= world.time:
+        return False
+    parts = [path.positions] if path.quaternions is None else [path.positions, path.quaternions]
+    own = [_of_world(world.world_count, k, keys, 2) for keys in parts]
+    return any((keys != keys[..., :1, :]).any() for keys in own)
 
 
 def wrenches_of(world, k=None):

@@ -212,3 +212,24 @@ def test_pushes_end_at_instants_that_rounding_alone_keeps_apart():
     world.attach(world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=(3, 0, 0))))
     world.run(0.5)
     np.testing.assert_allclose([box.velocity[0] for box in boxes], [0.3, 0.2], rtol=1e-5)
+
+
+def test_a_shape_that_differs_by_world_is_not_made_rigid():
+    """A rigid body has one shape in all worlds: it is refused, changes nothing, and is taken where the worlds agree."""
+    world = nuno.World(device="cpu", substeps=5)
+    cloth = world.attach(world.add(nuno.sheet((0.1, 0.1), (3, 3), name="cloth", position=(0.0, 0.0, 1.0))))
+    world.grip(cloth, [0], to=(0.0, 0.0, 1.0))
+    same, apart = world.imagine(2), world.imagine(2)
+    apart.push("cloth", [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
+    for batch in (same, apart):
+        batch.run(0.1)
+        batch.detach("cloth")
+    same.attach("cloth", nuno.Rigid(mass=0.1))
+    before = apart.find("cloth").vertices
+    with pytest.raises(nuno.BodyStateError, match="'cloth' is deformed otherwise in each world"):
+        apart.attach("cloth", nuno.Rigid(mass=0.1))
+    assert not apart.find("cloth").is_dynamic
+    np.testing.assert_array_equal(apart.find("cloth").vertices, before)
+    alone = apart.imagine(1, world=1)
+    alone.attach("cloth", nuno.Rigid(mass=0.1))
+    np.testing.assert_allclose(alone.find("cloth").vertices, before[1], atol=1e-6)  # floats

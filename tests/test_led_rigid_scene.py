@@ -32,6 +32,12 @@ def pose_of(world, name):
     return np.concatenate([array.numpy()[slot] for array in (state.position, state.rotation, state.velocity)])
 
 
+def spin_of(world, name):
+    """How the rigid solver has a static body turn."""
+    scene = world._rigid
+    return scene.solver.velocity(scene.static[world.find(name).key].slot)[1]
+
+
 def test_a_static_body_that_holds_something_keeps_every_bit():
     """Invariant: no correction moves it, and rounding does not either."""
     for k in range(10):
@@ -77,3 +83,15 @@ def test_corrections_round_nothing_of_a_body_that_they_do_not_move():
         setattr(state, name, wp.array(values.astype(np.float32), dtype=kind, device="cpu"))
     wp.launch(correct, dim=1, inputs=[state], device="cpu")
     np.testing.assert_array_equal(state.rotation.numpy(), turn)
+
+
+def test_what_is_led_nowhere_stands():
+    """Invariant: a body on a path that stays where it is has no spin, not that of a rounded turn."""
+    for k in range(10):
+        world = scene()
+        tray = world.find("tray")
+        world.move(tray, None)
+        tray.rotate(0.1 * k, (1, 2, 3))
+        world.move(tray, nuno.Path([0.0, 1.0], [tray.position, tray.position]))
+        world.run(0.02)
+        np.testing.assert_array_equal(spin_of(world, "tray"), 0.0)

@@ -156,6 +156,23 @@ def test_a_path_that_has_ended_is_no_obstacle():
         assert_same(seen(batch, k), seen(world))
 
 
+def test_a_rigid_body_is_led_from_where_its_leader_is_in_each_world():
+    """A ledge that leads a box goes back to where it was before it had led: so does the box, in that world alone."""
+    world, _ = scene()
+    world.grip("box", to=world.find("ledge"))
+    world.move("ledge", nuno.Path([0.0, 0.04], [(0.4, 0.0, 0.05), (0.4, 0.1, 0.05)]))
+    start = world.save()
+    batch = world.imagine(2)
+    batch.run(0.05)
+    middle = batch.save()
+    batch.reset([1], start)
+    batch.run(0.05)
+    for k, source in ((0, middle.pick(0)), (1, start.at(middle.time))):
+        world.restore(source)
+        world.run(0.05)
+        assert_same(seen(batch, k), seen(world))
+
+
 def test_what_cannot_be_reset_is_named_and_changes_nothing():
     """Other bodies, dynamics, materials, rules or paths; worlds that there are not; snapshots that do not fit."""
     world, _ = scene()

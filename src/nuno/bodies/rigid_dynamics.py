@@ -11,7 +11,7 @@ import warp as wp
 from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
 from nuno.bodies.dynamics import Dynamics, State, check_material
 from nuno.bodies.given_velocity import GivenVelocity
-from nuno.bodies.static_place import StaticPlace, same_deformation, what_of
+from nuno.bodies.static_place import StaticPlace, one_shape, same_deformation, what_of
 from nuno.materials import Rigid
 from nuno.rigid.convex_parts import RigidPart, rigid_shape
 from nuno.rigid.rigid_arrays import PARTS, SAVED
@@ -109,7 +109,10 @@ class RigidScene:
                 sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
                 angle = 2.0 * np.arctan2(sine, turn[..., :1])
                 axis = np.divide(turn[..., 1:], sine, out=np.zeros_like(turn[..., 1:]), where=sine > 0.0)
-                self.solver.set_velocity(slot, (end[0] - start[0]) / duration, axis * angle / duration)
+                # what stands is led by nothing: of its turn, rounding alone would be left
+                still = [(a == b).all(axis=-1, keepdims=True) for a, b in zip(start, end, strict=True)]
+                spin = np.where(still[0] & still[1], 0.0, axis * angle / duration)
+                self.solver.set_velocity(slot, (end[0] - start[0]) / duration, spin)
                 slots.append(slot)
         return slots
 
@@ -202,6 +205,7 @@ class RigidDynamics(Dynamics):
     Raises:
         InvalidInputError: no rigid material, or one that does not fit the batch.
         MeshError: the shape has no volume that the density could fill, or cannot move.
+        BodyStateError: it is deformed otherwise in each world.
     """
 
     is_rigid = True
@@ -352,6 +356,8 @@ def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
     plain = isinstance(body.shape, Box | Sphere | Capsule | Cylinder | Plane | Compound)
     # the same bits wherever the body is
     vertices = None if plain and body._deformed is None else body.local_vertices()
+    if moves and body._deformed is not None:
+        vertices = one_shape(body)
     return rigid_shape(body.shape, moves=moves, thickness=body.thickness, vertices=vertices, is_solid=body.is_solid)
 
 
@@ -365,9 +371,7 @@ def mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarra
     if material.mass is not None and material.inertia is not None and material.centre_of_mass is not None:
         mass = np.broadcast_to(np.asarray(material.mass, dtype=float), density.shape)
         return mass, np.broadcast_to(material.inertia, (len(mass), 3, 3)), np.asarray(material.centre_of_mass)
-    vertices = body.local_vertices() if body._deformed is not None else None
-    if vertices is not None and vertices.ndim == 3:
-        vertices = vertices[0]
+    vertices = one_shape(body) if body._deformed is not None else None
     unit = mass_properties(body.shape, thickness=body.thickness, vertices=vertices)
     mass = density * unit.volume
     inertia = density[:, None, None] * unit.inertia

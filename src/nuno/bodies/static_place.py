@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.errors import BodyStateError
 from nuno.shapes.coordinates import Pose
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.world.snapshot import BodyRecord
+
+SAME_SHAPE = 1e-12
+"""[m] What doubles round where the same shape stands elsewhere."""
 
 
 @dataclass
@@ -45,3 +49,19 @@ def same_deformation(a: tuple[np.ndarray, Pose] | None, b: tuple[np.ndarray, Pos
     if a is None or b is None:
         return a is b
     return a[0] is b[0] and all(np.array_equal(x, y) for x, y in zip(a[1], b[1], strict=True))
+
+
+def one_shape(body: Body) -> np.ndarray:
+    """Return the vertices (n, 3) [m] of a deformed body in its own frame, where all worlds have deformed it alike.
+
+    Raises:
+        BodyStateError: it is deformed otherwise in some world.
+    """
+    vertices = body.local_vertices()
+    own = vertices.reshape(-1, *vertices.shape[-2:])
+    if np.abs(own - own[0]).max() > SAME_SHAPE:
+        raise BodyStateError(
+            f"{body.name!r} is deformed otherwise in each world, and a Rigid has one shape: attach it before the "
+            "worlds part, or in a world alone (imagine(1, world=k))"
+        )
+    return own[0]

@@ -88,7 +88,8 @@ class Grip:
         self.spec: Any = spec
         # in a leading static body's frame: (worlds, k, 3) [m] of points, or place and turn of a rigid body
         self.offsets = offsets
-        # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame
+        # of a rigid body with a static leader: when a frame began [s], and where it was led from and to in that frame;
+        # not a number in worlds of a batch where it was not led yet
         self.followed: tuple[float, Pose, Pose] | None = None
         self._world: Simulation | None = None
         self.unmet_frames = 0  # in so many frames one after the other it was not met; -1: that was told
@@ -200,10 +201,14 @@ class Grip:
         goal = held(end)
         if self.followed is None:
             before = held(start)
-        elif self.followed[0] == time:  # a frame that it goes through twice starts in the same place
-            before = self.followed[1]
         else:
-            before = self.followed[2]
+            # a frame that it goes through twice starts in the same place
+            place, turn = self.followed[1] if self.followed[0] == time else self.followed[2]
+            begins = np.isnan(place).any(axis=-1, keepdims=True)  # in worlds that were reset to before it led
+            before = (place, turn)
+            if begins.any():
+                first = held(start)
+                before = np.where(begins, first[0], place), np.where(begins, first[1], turn)
         self.followed = time, before, goal
         return before, goal
 

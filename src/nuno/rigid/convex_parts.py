@@ -76,9 +76,8 @@ def rigid_shape(shape: Shape, *, moves: bool = True, thickness: float = 0.0, ver
         shape: Any shape; of a mesh that moves, its convex hull counts (a `Compound` has as many parts as one likes).
         moves: Whether the body is to be dynamic. A mesh that is not is taken as it is, triangle by triangle.
         thickness: Of a cloth or an open mesh [m].
-        vertices: (n, 3) or (worlds, n, 3) float [m], where the vertices of a mesh or cloth are, in the frame that the
-        body's
-            pose is given in; None takes the shape's own.
+        vertices: (n, 3) float [m], or (worlds, n, 3) of what does not move, where the vertices of a mesh or cloth are,
+            in the frame that the body's pose is given in; None takes the shape's own.
         is_solid: Whether a mesh that does not move has an inside; None asks the shape.
 
     Raises:
@@ -99,7 +98,7 @@ def rigid_shape(shape: Shape, *, moves: bool = True, thickness: float = 0.0, ver
     points, faces = shape.mesh()
     points = np.asarray(points if vertices is None else vertices, dtype=float)
     if moves:
-        return (convex_part(points if points.ndim == 2 else points[0], thickness),)
+        return (convex_part(points, thickness),)
     solid = shape.is_solid if is_solid is None else is_solid
     rim = 0.0 if solid else 0.5 * float(thickness)
     flat = points.reshape(-1, 3)

@@ -20,6 +20,7 @@ from nuno.rigid.persistent_manifolds import COUNTS, LEFT, OVERFLOW
 from nuno.rigid.rigid_arrays import PARTS, SAVED
 from nuno.rigid.rigid_substep import RigidSettings, run_rigid, run_rigid_group
 from nuno.rigid.saved_contacts import load_contacts, load_listing, save_contacts, save_listing
+from nuno.solvers.particle_solver import substeps_of
 from nuno.solvers.rigid_contacts import RigidContacts
 
 log = logging.getLogger(__name__)
@@ -261,7 +262,7 @@ class RigidSolver(RigidContacts):
         if frames:
             self._launch("all", frame / each, frames * each, each)
         if rest > 1e-6 * frame:
-            count = max(1, math.ceil(each * rest / frame))
+            count = substeps_of(rest, frame, each)  # as many as where bodies go together
             self._launch("all", rest / count, count, count)
 
     def open(self, time: float, dt: float, members: Sequence[int] | None = None) -> None:

@@ -10,7 +10,6 @@ from nuno.bodies.body import Body
 from nuno.errors import BodyStateError
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.rows_of_worlds import WorldRows, merge_spec
-from nuno.shapes.coordinates import compose
 from nuno.world.snapshot import BodyRecord, GripRecord, Snapshot
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def merged_grips(
             end = None if grip.is_tie else _end_of(origin, keys[grip.body.key])
             spec = merge_spec(grip.spec, record.spec, at, name, end)
             offsets = _merged_parts(grip.offsets, record.offsets, at)
-            changed.append((grip, spec, offsets, _followed(grip, record, at, by_key)))
+            changed.append((grip, spec, offsets, _followed(grip, record, at)))
     for record in saved.values():
         body = by_key[record.body]
         back.append((record, merge_spec(None, record.spec, at, body.name, None)))
@@ -81,24 +80,15 @@ def _merged_parts(own: Any, other: Any, at: WorldRows) -> Any:
     return at.merged(own, other, np.ndim(own) - 1)
 
 
-def _followed(grip: Grip, record: GripRecord, at: WorldRows, bodies: dict[str, Body]) -> Any:
+def _followed(grip: Grip, record: GripRecord, at: WorldRows) -> Any:
     own, other = grip.followed, record.followed
     if own is None and other is None:
         return None
-
-    def begun(pose: Any, offsets: Any, count: int) -> Any:
-        place, turn = compose(pose, offsets)
-        start = np.broadcast_to(place, (count, 3)), np.broadcast_to(turn, (count, 4))
-        return at.time - 1.0, start, start
-
-    assert grip.target is not None
-    if own is None:
-        own = begun(grip.target.pose(), grip.offsets, at.world_count)
-    if other is None:
-        leader = bodies[grip.target.key]
-        other = begun(leader.pose(), record.offsets, len(record.offsets[0]))
-    poses = (tuple(map(at.merged, x, y, (1, 1))) for x, y in zip(own[1:], other[1:], strict=True))
-    return own[0], *poses
+    # in worlds where it has led nothing yet: not a number
+    nowhere = [(np.full((1, 3), np.nan), np.full((1, 4), np.nan))] * 2
+    mine, theirs = (nowhere if way is None else way[1:] for way in (own, other))
+    poses = (tuple(map(at.merged, x, y, (1, 1))) for x, y in zip(mine, theirs, strict=True))
+    return at.time - 1.0 if own is None else own[0], *poses
 
 
 def set_merged_grips(

@@ -137,7 +137,7 @@ class World(Setting):
 
         Raises:
             BodyStateError: it has dynamics already and ``keep_velocity`` is not set, follows another frame or a path,
-                or would deform while it holds a rigid body.
+                would deform while it holds a rigid body, or is to be rigid where each world has deformed it otherwise.
             InvalidInputError: the shape has no such dynamics, or the material or a velocity does not fit.
             MeshError: a rigid body without volume.
         """
