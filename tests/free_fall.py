@@ -75,6 +75,14 @@ class FreeFall:
         """(worlds, n, 3)."""
         return self.v.copy()
 
+    def bounds(self):
+        """(worlds, 3) each."""
+        return self.x.min(axis=1), self.x.max(axis=1)
+
+    def speeds(self):
+        """(worlds,) and (worlds, 3)."""
+        return np.linalg.norm(self.v, axis=-1).max(axis=1), np.ptp(self.v, axis=1)
+
     def set_state(self, positions, velocities):
         """Take a state."""
         self.x, self.v = positions.astype(np.float32), velocities.astype(np.float32)

@@ -39,7 +39,10 @@ def test_a_robot_that_stands_carries_steadily(result):
 
 @pytest.mark.long
 def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
-    """Newton: nothing pulls a mat along the arms but friction; nothing is gripped or glued."""
+    """Newton: nothing pulls a mat along the arms but friction; nothing is gripped or glued.
+
+    Without friction nothing holds it on arms that slope either, so that it may be lost while it is let down (time 0).
+    """
     trials = {}
     for mu in (0.0, 0.8):
         material = nuno.Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=mu, air_drag=1.0)
@@ -48,7 +51,7 @@ def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
             walks=glides([0.34], 1.5, (-0.5, 0.0, 0.0)), arm_friction=mu, device="cpu",
         )  # fmt: skip
         trials[mu] = found.trials[0]
-    assert trials[0.0].value is None and trials[0.0].failed_at > 0.0
+    assert trials[0.0].value is None and trials[0.0].reason.startswith("lost contact")
     assert trials[0.8].reason == ""
 
 
