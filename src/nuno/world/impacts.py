@@ -57,8 +57,8 @@ MOST = 480
 
 def are_fast(moving: dict[Body, Dynamics]) -> bool:
     """Return True if a cloth may have passed through itself for its speed since that was last forgotten, or did."""
-    cloths: list[Any] = [dynamics for dynamics in moving.values() if collides_with_itself(dynamics)]
-    return any((_fast_worlds(cloth) | (cloth.solver.guarded > 0)).any() for cloth in cloths)
+    cloths = _touching_themselves(moving)
+    return any((_fast_worlds(cloth) | (cloth.solver.guarded > 0)).any() for _, cloth in cloths)
 
 
 def forget_fast(bodies: Iterable[Body]) -> None:
