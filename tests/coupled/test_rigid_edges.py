@@ -8,6 +8,7 @@ import pytest
 
 import nuno
 from nuno.shapes import quaternion as quat
+from soft_slabs import surface
 
 sys.path.append(str(Path(__file__).parents[1]))
 from pair_with import mass_of, moment, moments
@@ -18,16 +19,10 @@ DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)]
 WEDGE = np.array([(x, y, z) for x in (-0.04, 0.04) for y, z in ((0.0, -0.0267), (0.015, 0.0133), (-0.015, 0.0133))])
 
 
-def surface(body, count=8):
-    """Return points of a body's triangles, ``count`` steps a side [m]."""
-    steps = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
-    return np.einsum("kb,fbx->fkx", steps, body.vertices[body.faces]).reshape(-1, 3)
-
-
 def outside(rigid, body):
     """Return how far the nearest point of a body's surface is outside of all convex parts of a rigid one [m]."""
     place, turn = rigid.pose()
-    points = quat.rotate(quat.inverse(turn), surface(body) - place)
+    points = quat.rotate(quat.inverse(turn), surface(body, 8) - place)
     least = 1.0
     for part in rigid._dynamics.parts:
         own = points

@@ -29,6 +29,14 @@ def assert_same(found, expected):
         np.testing.assert_array_equal(a, b)
 
 
+def assert_same_alone(batch, world, sources, seconds):
+    """Check that worlds of a batch are what ``world`` is after so long from each one's snapshot [s]."""
+    for k, source in sources.items():
+        world.restore(source)
+        world.run(seconds)
+        assert_same(seen(batch, k), seen(world))
+
+
 def test_worlds_that_are_reset_are_the_saved_world_alone():
     """They are what restore makes of the snapshot, now and later; the others are as if nothing had happened."""
     world, _ = scene()
@@ -131,10 +139,7 @@ def test_a_grip_that_was_let_go_is_back_where_the_world_is_reset():
     middle = batch.save()
     batch.reset([1], start)
     batch.run(0.1)
-    for k, source in ((0, middle.pick(0)), (1, start.at(middle.time)), (2, middle.pick(2))):
-        world.restore(source)
-        world.run(0.1)
-        assert_same(seen(batch, k), seen(world))
+    assert_same_alone(batch, world, {0: middle.pick(0), 1: start.at(middle.time), 2: middle.pick(2)}, 0.1)
 
 
 def test_a_path_that_has_ended_is_no_obstacle():
@@ -150,10 +155,7 @@ def test_a_path_that_has_ended_is_no_obstacle():
     middle = batch.save()
     batch.reset([1], start)
     batch.run(0.15)
-    for k, source in ((0, middle.pick(0)), (1, start.at(middle.time))):
-        world.restore(source)
-        world.run(0.15)
-        assert_same(seen(batch, k), seen(world))
+    assert_same_alone(batch, world, {0: middle.pick(0), 1: start.at(middle.time)}, 0.15)
 
 
 def test_a_rigid_body_is_led_from_where_its_leader_is_in_each_world():
@@ -167,10 +169,7 @@ def test_a_rigid_body_is_led_from_where_its_leader_is_in_each_world():
     middle = batch.save()
     batch.reset([1], start)
     batch.run(0.05)
-    for k, source in ((0, middle.pick(0)), (1, start.at(middle.time))):
-        world.restore(source)
-        world.run(0.05)
-        assert_same(seen(batch, k), seen(world))
+    assert_same_alone(batch, world, {0: middle.pick(0), 1: start.at(middle.time)}, 0.05)
 
 
 def test_what_cannot_be_reset_is_named_and_changes_nothing():
@@ -231,10 +230,7 @@ def test_pushes_are_each_worlds_own():
     middle = batch.save()
     batch.reset([1], start)
     batch.run(0.15)
-    for k, source in ((0, middle.pick(0)), (1, start.at(middle.time))):
-        world.restore(source)
-        world.run(0.15)
-        assert_same(seen(batch, k), seen(world))
+    assert_same_alone(batch, world, {0: middle.pick(0), 1: start.at(middle.time)}, 0.15)
 
 
 def test_a_snapshot_at_another_time_leads_there():

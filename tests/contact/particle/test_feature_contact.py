@@ -10,17 +10,12 @@ from nuno.shapes import quaternion as quat
 from nuno.solvers.cloth_solver import ClothSolver
 from nuno.tables.colliders import Colliders
 from nuno.topology.cloth_topology import ClothTopology
+from soft_slabs import surface
 
 THICKNESS = 0.004
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too
 ROUNDED = 0.5 * THICKNESS / np.sqrt(2.0)  # half a thickness from a right edge is so far from one of its faces
 DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
-
-
-def surface(body, count=10):
-    """Return points of a body's triangles, ``count`` steps a side [m]."""
-    steps = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
-    return np.einsum("kb,fbx->fkx", steps, body.vertices[body.faces]).reshape(-1, 3)
 
 
 def outside_of_box(points, box):

@@ -7,13 +7,10 @@ import nuno
 import random_worlds
 import varied_worlds
 from nuno.bodies.body import Body
-from nuno.mesh.tetrahedra import box_tetrahedra
 from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Hull
-from nuno.solvers.soft_solver import SoftSolver
-from nuno.tables.colliders import Colliders
-from nuno.topology.soft_topology import SoftTopology
 from random_worlds import RandomWorld, differences, state_of
+from soft_slabs import assert_plans_agree, surface
 
 THICKNESS, SIDE = 0.004, 0.1
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too, as beside boxes
@@ -30,12 +27,6 @@ def wedge(**where):
     return Body(
         Hull.of(np.array([[x, y, z] for x, z in ((-low, 0), (low, 0), (0, 0.1)) for y in (-0.15, 0.15)])), **where
     )
-
-
-def surface(body, count=10):
-    """Return points of a body's triangles, ``count`` steps a side [m]."""
-    steps = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
-    return np.einsum("kb,fbx->fkx", steps, body.vertices[body.faces]).reshape(-1, 3)
 
 
 def outside(points, body):
@@ -174,16 +165,7 @@ def test_all_plans_meet_hulls_alike(substeps):
     """One source: sixteen particles at a time and one by one give the same bits, with floats and with doubles."""
     world = crowded(1)
     shapes = [world.find(name) for name in ("table", "ball", "wedge")]
-    topology = SoftTopology.of(*box_tetrahedra((0.2, 0.2, 0.06), (6, 6, 2)))
-    start = topology.rest[None] + np.array([0.02, 0.01, 0.09])
-    ends = []
-    for plan in ("vector", "fused"):
-        solver = SoftSolver(topology, soft(), start, 0 * start, substeps=substeps, plan=plan)
-        solver.set_colliders(Colliders.from_bodies(shapes))
-        solver.run(0.0, 0.3)
-        assert solver.state.feature_shapes.numpy()[0] > 0
-        ends.append(solver.positions())
-    np.testing.assert_array_equal(ends[1], ends[0])
+    assert_plans_agree(shapes, soft(), substeps)
 
 
 def test_what_is_saved_while_a_hull_is_touched_goes_on_alike():

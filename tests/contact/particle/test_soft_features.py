@@ -12,16 +12,11 @@ from nuno.solvers.soft_solver import SoftSolver
 from nuno.state.cloth_state import ALL_PARTS
 from nuno.tables.colliders import Colliders
 from nuno.topology.soft_topology import SoftTopology
+from soft_slabs import assert_plans_agree, surface
 
 SIDE = 0.1
 LEFT = 1e-4  # [m] what one pass a substep leaves of a push where neighbours push too
 DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
-
-
-def surface(body, count=10):
-    """Return points of a body's triangles, ``count`` steps a side [m]."""
-    steps = np.array([(i, j, count - i - j) for i in range(count + 1) for j in range(count + 1 - i)]) / count
-    return np.einsum("kb,fbx->fkx", steps, body.vertices[body.faces]).reshape(-1, 3)
 
 
 def outside_of_box(points, box):
@@ -218,16 +213,7 @@ def test_all_plans_meet_edges_alike(substeps):
     """One source: sixteen particles at a time and one by one give the same bits, with floats and with doubles."""
     world = crowded(1)
     shapes = [world.find(name) for name in ("table", "ball", "can", "finger")]
-    topology = SoftTopology.of(*box_tetrahedra((0.2, 0.2, 0.06), (6, 6, 2)))
-    start = topology.rest[None] + np.array([0.02, 0.01, 0.09])
-    ends = []
-    for plan in ("vector", "fused"):
-        solver = SoftSolver(topology, soft(), start, 0 * start, substeps=substeps, plan=plan)
-        solver.set_colliders(Colliders.from_bodies(shapes))
-        solver.run(0.0, 0.3)
-        assert solver.state.feature_shapes.numpy()[0] > 0
-        ends.append(solver.positions())
-    np.testing.assert_array_equal(ends[1], ends[0])
+    assert_plans_agree(shapes, soft(), substeps)
 
 
 @pytest.mark.long
@@ -246,8 +232,8 @@ def test_the_kernels_of_cuda_take_turns():
     run = solver.settings(0.0, 1.0 / 60.0 / substeps, substeps)
     solver._reset_clock()
     gone = []
-    for kernels, surface in ((FAR, solver._far_surface), (FEATURES, solver._surface)):
-        inputs = [solver.state, solver.device_topology, surface, solver._size, run, solver.shapes, 24 * substeps, 1]
+    for kernels, sides in ((FAR, solver._far_surface), (FEATURES, solver._surface)):
+        inputs = [solver.state, solver.device_topology, sides, solver._size, run, solver.shapes, 24 * substeps, 1]
         wp.launch(kernels["blocks"], dim=1, inputs=inputs, device="cpu", block_dim=1)
         gone.append(int(solver.state.reached.numpy()[0]))
     assert 0 < gone[0] < gone[1] == 24 * substeps
