@@ -10,6 +10,7 @@ import pytest
 import warp as wp
 
 from nuno.kernels.kernel_modules import kernel_modules
+from nuno.kernels.struct_references import pass_structs_by_reference
 
 ARCHITECTURE = 90
 MODULES = {module.name: module for module in kernel_modules() if "cuda" in module.devices}
@@ -56,6 +57,7 @@ def long_functions_apart(name):
 def compile_to_ptx(name):
     """Compile a module, and look for all its kernels in what was made."""
     module, blocks = MODULES[name].module, MODULES[name].blocks
+    pass_structs_by_reference()
     kept = dict(wp.get_module_options(module))
     wp.set_module_options({"block_dim": blocks[0]}, module=module)
     try:

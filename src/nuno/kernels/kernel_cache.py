@@ -17,6 +17,7 @@ from typing import Any
 
 from nuno.errors import InvalidInputError
 from nuno.kernels.kernel_modules import KernelModule, kernel_modules
+from nuno.kernels.struct_references import pass_structs_by_reference
 
 
 def compile_kernels(
@@ -106,6 +107,7 @@ def _compile_for_cuda(module: KernelModule, numbers: tuple[int, ...]) -> None:
     """Machine code of a module, for each size of blocks."""
     import warp as wp
 
+    pass_structs_by_reference()
     before = wp.get_module_options(module.module)["block_dim"]
     for block in module.blocks:
         wp.set_module_options({"block_dim": block}, module=module.module)

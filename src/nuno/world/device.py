@@ -8,6 +8,7 @@ from typing import Any
 from nuno.errors import InvalidInputError
 from nuno.kernels.kernel_cache import take_machine_code
 from nuno.kernels.quiet import quiet_warp
+from nuno.kernels.struct_references import pass_structs_by_reference
 
 
 def checked_device(name: Any) -> str:
@@ -40,4 +41,5 @@ def found_device(name: str) -> str:
         valid = ", ".join(["cpu", *(f"cuda:{i}" for i in range(available))])
         raise InvalidInputError(f"there is no device {name!r} here; there are: {valid}")
     take_machine_code(f"cuda:{index}")
+    pass_structs_by_reference()
     return f"cuda:{index}"
