@@ -46,6 +46,13 @@ def without(code, packages=OPTIONAL):
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
+def test_getting_started_lists_every_extra():
+    """The table of extras has all of pyproject.toml but those for developers, and no other."""
+    page = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
+    table = page.partition("| extra | for | brings |")[2].partition("\n\n")[0]
+    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.MULTILINE)) == set(EXTRAS) - {"test", "dev", "docs"}
+
+
 def test_every_module_loads_or_names_the_extra():
     """Without the extras no module raises but MissingPackageError, with an extra that there is."""
     code = """
