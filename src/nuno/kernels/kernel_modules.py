@@ -25,6 +25,11 @@ CPU_ONLY = frozenset(
 )  # fmt: skip
 """Worlds by a thread, and in lanes of SIMD registers."""
 
+WHEN_NAMED = frozenset(
+    f"nuno.plans.{name}" for name in ("run_worlds", "run_double_worlds", "run_soft_worlds", "run_soft_double_worlds")
+)
+"""A world by a thread on the CPU: no world takes that plan by itself, so these are compiled ahead only by name."""
+
 CUDA_ONLY = tuple(
     f"nuno.{name}"
     for name in (
