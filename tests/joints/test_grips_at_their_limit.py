@@ -265,6 +265,7 @@ def test_a_corner_slips_behind_what_pulls_it_at_its_limit(caplog):
     assert len(said) == 1 and "'sheet'" in said[0] and "max_force" in said[0]
 
 
+@pytest.mark.long
 def test_a_limit_that_is_not_reached_changes_nothing():
     """Statics: a towel's corner bears its weight and is where it is led, with the limit and without."""
     found = []

@@ -33,7 +33,9 @@ def at_rest(kind, axis, rigidity, damping):
     return rows(body)[0]
 
 
-@pytest.mark.parametrize("damping", [0.0005, 0.002, 0.02])
+@pytest.mark.parametrize(
+    "damping", [pytest.param(0.0005, marks=pytest.mark.long), 0.002, pytest.param(0.02, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize(("axis", "rigidity"), [(0, 5e-2), (0, 3e-3), (1, 1e-3)], ids=["stiff", "limp", "hung"])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_damping_leaves_a_cloth_where_it_stands_without(kind, axis, rigidity, damping):

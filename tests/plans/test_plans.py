@@ -249,6 +249,7 @@ def filled(kind, values, dtype):
     return t
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", range(4), ids=["line", "twist", "cell", "triangle"])
 def test_a_constraint_gives_the_same_bits_in_all_three_layouts(which):
     """Promise: float, sixteen worlds and sixteen elements are one function."""

@@ -98,6 +98,7 @@ def test_a_cloth_on_a_moving_hull_is_that_on_a_mesh():
     assert ends["hull"][:, 2].max() > 0.1  # it has not fallen off
 
 
+@pytest.mark.long
 def test_a_world_on_a_hull_is_what_it_is_alone():
     """Promise of the design: world k of a batch gives, bit for bit, what it gives alone."""
     world = nuno.World(device="cpu")
