@@ -175,6 +175,7 @@ def test_swinging_limbs_change_no_momentum():
     np.testing.assert_allclose(last[3:], first[3:], atol=4e-3 * np.linalg.norm(first[3:]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.9, pytest.param(1.2, marks=pytest.mark.long)])
 def test_feet_stick_and_slide_at_the_angle_of_friction(share):
     """Talos on stiff motors on a slope aside, friction 0.1: it slides at g (sin - mu cos), and below atan(mu) stops.

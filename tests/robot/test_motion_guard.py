@@ -97,7 +97,7 @@ def test_go_pos_tells_that_it_did_not_get_there():
     assert 0.0 <= robot.read_base().position[0] < 0.5
 
 
-@pytest.mark.parametrize(("gap", "passes"), [(0.05, True), (-0.05, False)])
+@pytest.mark.parametrize(("gap", "passes"), [pytest.param(0.05, True, marks=pytest.mark.long), (-0.05, False)])
 def test_a_wall_at_the_side(beside, caplog, gap, passes):
     """5 cm beside what the links reach it is passed in silence; 5 cm nearer it is not."""
     robot = make()

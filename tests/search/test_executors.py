@@ -84,6 +84,7 @@ def test_dask(in_a_batch, cluster):
     assert_same_bits(in_a_batch, found)
 
 
+@pytest.mark.long
 def test_dask_worker_dies(cluster, tmp_path):
     """A Dask worker that is killed in the middle of a trial: the trial runs again elsewhere."""
     once = tmp_path / "once"
