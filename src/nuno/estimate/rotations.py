@@ -2,8 +2,9 @@
 
 How far a cloth turns on the table while it is dragged, and in the air below two fingers, depends on friction that
 nobody knows: engines that agree on its shape differ by 10 to 30 degrees there. So every future is compared at several
-turns, with a prior on them. A cloth that is turned about the hand's vertical looks as it does to a camera that is turned
-the other way around, so no vertex is moved for it; what stands still, the table, is drawn from where the camera is.
+turns, with a prior on them. A cloth that is turned about the hand's vertical looks as it does to a camera that is
+turned the other way around, so no vertex is moved for it; what stands still, the table, is drawn from where the
+camera is.
 """
 
 from __future__ import annotations
