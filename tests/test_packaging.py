@@ -95,6 +95,7 @@ def test_a_missing_package_is_named(code, package, extra):
     assert f"in a clone of Nuno: pip install -c constraints.txt '.[{extra}]'" in out
 
 
+@pytest.mark.long
 def test_cloth_and_cases_need_no_extra():
     """A world with cloth, a picture of it and the bundled cases work with what ``pip install .`` brings."""
     code = """
@@ -139,6 +140,7 @@ def test_hints_work_from_a_clone():
     assert not [path.name for path in texts if re.search(r"pip install\s+'?nuno", path.read_text(encoding="utf-8"))]
 
 
+@pytest.mark.long
 def test_the_image_compiles_with_options_that_there_are():
     """What the Dockerfile runs of Nuno is understood by the command, for extras that there are."""
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")

@@ -146,6 +146,7 @@ def test_nothing_wanders_in_a_minute(mass, shape, cell):
         assert np.linalg.norm(body.position - start) < 1e-4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
 @pytest.mark.parametrize("mass", [0.01, pytest.param(0.05, marks=pytest.mark.long)])
 def test_a_drawn_towel_takes_along_what_stands_on_it(where, mass):
@@ -244,7 +245,9 @@ def test_a_soft_cube_goes_along_too():
 
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
-@pytest.mark.parametrize("mass", [0.02, pytest.param(0.29, marks=pytest.mark.long), 0.3])
+@pytest.mark.parametrize(
+    "mass", [0.02, pytest.param(0.29, marks=pytest.mark.long), pytest.param(0.3, marks=pytest.mark.long)]
+)
 def test_a_tablecloth_pulled_from_under_a_box(where, mass):
     """Coulomb's law: mu g while the cloth slides under the box, and from what speed that gave the way that is left.
 

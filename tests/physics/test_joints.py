@@ -79,6 +79,7 @@ def test_a_double_pendulum_keeps_its_energy():
     assert np.abs(energy).max() < 5e-3 * 0.5 * G * (0.5 + 1.5) * BAR
 
 
+@pytest.mark.long
 def test_a_four_bar_closes_and_its_rocker_goes_where_geometry_says():
     """A driven crank-rocker: closed within 0.02 mm, its rocker's angle is that of the closed form."""
     world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0))

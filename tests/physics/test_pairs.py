@@ -78,6 +78,7 @@ def test_a_sheet_rests_on_a_sheet():
     assert upper.vertices[:, 2].max() < 0.02  # and it did come to lie there
 
 
+@pytest.mark.long
 def test_a_soft_cube_rests_on_a_soft_cube():
     """Two cubes stacked on a table stand still, as high as they are less what their weight presses."""
     world = nuno.World(device="cpu")

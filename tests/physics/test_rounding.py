@@ -18,7 +18,7 @@ FLOATS, DOUBLES = 24, 25  # substeps a frame on either side of the rule
     [
         (FLOATS, 1, 3e-3),
         (DOUBLES, 1, 5e-5),
-        (104, 1, 5e-5),
+        pytest.param(104, 1, 5e-5, marks=pytest.mark.long),
         pytest.param(104, 3, 5e-5, marks=pytest.mark.long),
         pytest.param(240, 1, 5e-5, marks=pytest.mark.long),
     ],

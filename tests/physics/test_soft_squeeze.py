@@ -31,6 +31,7 @@ def between_plates(axis, cell):
     return world, ball, plates, along
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("axis", "across"),
     [(0, 12), pytest.param(2, 12, marks=pytest.mark.long), pytest.param(0, 13, marks=pytest.mark.slow)],

@@ -18,7 +18,7 @@ import nuno
     "kind",
     [
         "sheet",
-        "right-angled",
+        pytest.param("right-angled", marks=pytest.mark.long),
         pytest.param("equilateral", marks=pytest.mark.long),
         pytest.param("jittered", marks=pytest.mark.long),
     ],

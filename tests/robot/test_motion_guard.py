@@ -69,6 +69,7 @@ def wall_on_the_left(robot, gap, beside):
     return robot.world.add(nuno.box((4.0, 0.2, 2.0), name="wall", position=(0.0, beside + gap + 0.1, 1.0)))
 
 
+@pytest.mark.long
 def test_a_walk_ends_in_front_of_a_wall(caplog):
     """It says so, no link is in the wall at any frame, and the robot stands as near as its steps let it."""
     robot = make()

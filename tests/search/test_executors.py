@@ -154,6 +154,7 @@ def test_broken_executor_of_another_kind():
         search.sweep(search.each(searched.single_square), {"x": [1, 2]}, executor=BrokenSomewhere())
 
 
+@pytest.mark.long
 def test_world_that_cannot_be_made(pool):
     """The world's function raises in a worker: an error here, and no trial that failed."""
     with pytest.raises(InvalidInputError, match="broken_room raised RuntimeError: no room"):

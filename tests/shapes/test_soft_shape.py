@@ -234,6 +234,7 @@ def test_missing_tetrahedraliser(monkeypatch):
         nuno.soft_mesh(CUBE, 0.1, tetrahedraliser="pytetwild")
 
 
+@pytest.mark.long
 def test_tetrahedraliser():
     """The elements of fTetWild follow the surface within its envelope, a thousandth of the diagonal."""
     pytest.importorskip("pytetwild")

@@ -57,6 +57,7 @@ def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
     assert trials[0.8].reason == ""
 
 
+@pytest.mark.long
 def test_hands_that_grip_need_no_friction(talos, glides, mat):
     """Gripped edges carry a mat that would slide off: the comparison that hold="grip" is for."""
     material = nuno.Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=0.0, air_drag=1.0)
@@ -67,6 +68,7 @@ def test_hands_that_grip_need_no_friction(talos, glides, mat):
     assert found.trials[0].reason == ""
 
 
+@pytest.mark.long
 def test_a_cloth_is_carried_too(talos, glides):
     """A cloth mat lies on the arms by friction alone."""
     cloth = nuno.sheet((0.6, 0.4), cells=(18, 12))
@@ -112,6 +114,7 @@ def test_a_picture_shows_robot_and_mat(result):
     assert len(result.figure().axes) == 1
 
 
+@pytest.mark.long
 def test_finished_trials_are_not_run_again(talos, glides, mat, tmp_path, monkeypatch):
     """A results file that is complete answers without a simulation, with the same numbers."""
     given = dict(arm_distances=DISTANCES, walks=glides(DISTANCES), results=tmp_path / "carry.jsonl", **FEW)

@@ -50,7 +50,7 @@ def rails(friction=0.5):
 
 
 @DEVICES
-@pytest.mark.parametrize("cells", [4, 8])
+@pytest.mark.parametrize("cells", [4, pytest.param(8, marks=pytest.mark.long)])
 def test_thin_plates_bear_a_soft_cube_on_their_edges(cells, device):
     """Geometry and balance: plates between rows of vertices stay outside of all of the surface, and bear its weight."""
     plates = rails()
