@@ -1,7 +1,7 @@
 """Mutations: single faults in the package, and whether the tests that should see them do.
 
-Each is made in a copy of the package and the tests, and the named test files run on it. A mutation that no test sees
-has survived. What runs out of time is listed as such, and counts neither way.
+Each is made in a copy of the package and the tests, and the named test files run on it, long tests included. A mutation
+that no test sees has survived. What runs out of time is listed as such, and counts neither way.
 
     python benchmarks/mutations.py --out out/mutations [--only constraints rigid] [--numbers 0 7] [--seconds 900]
 """
@@ -44,7 +44,7 @@ def try_mutation(copy, area, file, old, new, tests, limit):
         return Found(area, file, old, new, tests, "stale", 0.0)
     path.write_text(text.replace(old, new), encoding="utf-8")
     clock = time.perf_counter()
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", "0", "-q", "-x", "--no-header"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-n", "0", "-q", "-x", "-m", "not slow"]
     environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         ran = subprocess.run(

@@ -13,7 +13,7 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-SHORT = {"load_scene", "pick_estimate", "save_and_restore", "show_world", "soft_cube"}
+SHORT = {"soft_cube"}
 """The others take more than some three seconds of a core each."""
 
 

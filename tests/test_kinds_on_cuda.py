@@ -43,6 +43,7 @@ def scene(device, worlds=1):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
 def test_the_same_physics_all_at_once(device, monkeypatch):
     """Contacts are solved one by one on the CPU and all at once on CUDA, which one thread can do on the CPU, too."""

@@ -1,6 +1,7 @@
 """Static bodies in the rigid solver: those that followed a path stand, and what hangs on one does not move it."""
 
 import numpy as np
+import pytest
 import warp as wp
 
 import nuno
@@ -72,6 +73,7 @@ def correct(state: RigidState):
         apply_rigid_correction(state, 0, wp.vec3(0.1, 0.2, 0.3), wp.vec3(0.3, 0.1, 0.2))
 
 
+@pytest.mark.long
 def test_corrections_round_nothing_of_a_body_that_they_do_not_move():
     """Invariant: a quaternion whose length is 1 but for rounding stays as it is."""
     state = RigidState()

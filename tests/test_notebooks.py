@@ -11,13 +11,10 @@ from html_page import Page
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
-LONG = {"a_robot_folds", "a_sweep_plotted", "imagine_and_adopt", "where_was_it_picked"}  # of what examples/ does too
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem in LONG else []) for path in NOTEBOOKS],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path):
     """Its own checks hold; it shows small pictures and pages, and neither lines of Warp nor warnings."""
     notebook = nbformat.read(path, as_version=4)

@@ -46,6 +46,13 @@ def without(code, packages=OPTIONAL):
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
+def test_getting_started_lists_every_extra():
+    """The table of extras has all of pyproject.toml but those for developers, and no other."""
+    page = (ROOT / "docs" / "getting-started.md").read_text(encoding="utf-8")
+    table = page.partition("| extra | for | brings |")[2].partition("\n\n")[0]
+    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.MULTILINE)) == set(EXTRAS) - {"test", "dev", "docs"}
+
+
 def test_every_module_loads_or_names_the_extra():
     """Without the extras no module raises but MissingPackageError, with an extra that there is."""
     code = """
@@ -88,6 +95,7 @@ def test_a_missing_package_is_named(code, package, extra):
     assert f"in a clone of Nuno: pip install -c constraints.txt '.[{extra}]'" in out
 
 
+@pytest.mark.long
 def test_cloth_and_cases_need_no_extra():
     """A world with cloth, a picture of it and the bundled cases work with what ``pip install .`` brings."""
     code = """
@@ -132,6 +140,7 @@ def test_hints_work_from_a_clone():
     assert not [path.name for path in texts if re.search(r"pip install\s+'?nuno", path.read_text(encoding="utf-8"))]
 
 
+@pytest.mark.long
 def test_the_image_compiles_with_options_that_there_are():
     """What the Dockerfile runs of Nuno is understood by the command, for extras that there are."""
     text = (ROOT / "Dockerfile").read_text(encoding="utf-8")

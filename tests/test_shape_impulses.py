@@ -122,7 +122,7 @@ def test_a_floor_and_a_wall():
     assert abs(floor[0]) < 1e-6
 
 
-@pytest.mark.parametrize("device", [*DEVICES, "at once"])
+@pytest.mark.parametrize("device", [*DEVICES, pytest.param("at once", marks=pytest.mark.long)])
 def test_a_box_on_a_towel_on_a_table(device, monkeypatch):
     """The table bears both; what the box presses on the towel is its weight; contacts all at once as one by one."""
     if device == "at once":
@@ -140,6 +140,7 @@ def test_a_box_on_a_towel_on_a_table(device, monkeypatch):
     np.testing.assert_allclose(told["box"], (0.0, 0.0, -weight(world, box)), atol=0.01 * both)
 
 
+@pytest.mark.long
 def test_worlds_in_which_a_pair_takes_other_substeps():
     """Equilibrium in every world: a box presses its weight on a towel, beside a stiff cube in one of two worlds."""
     world = nuno.World(device="cpu")

@@ -90,6 +90,7 @@ def test_a_bent_towel_among_rags_of_its_colour():
     assert not found.mirrored and found.scale == 1.0 and len(found.outline) == len(found.polygon)
 
 
+@pytest.mark.long
 def test_rags_alone_are_no_towel():
     """On a table with the same rags but no towel nothing is found, and the likeliest place has a lower score."""
     empty = drawn(seed=1)

@@ -133,6 +133,7 @@ def test_a_cloth_too_like_the_table() -> None:
         segment_before(image, camera, table)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(AMBIGUOUS))
 def test_doubt_is_told(name: str) -> None:
     """Much of a cloth in the table's colour is said to be in doubt, and next to nothing of one that is unlike it."""

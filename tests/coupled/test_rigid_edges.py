@@ -110,6 +110,7 @@ def test_a_plate_crushes_a_soft_cube_and_does_not_cut_it(youngs_modulus, density
     assert lowest < 0.03
 
 
+@pytest.mark.long
 def test_a_plate_rests_on_its_edge():
     """Balance: edges alone bear its weight, and lie still: no corner of the plate is over the cube."""
     world, cube = soft_cube()
@@ -144,7 +145,7 @@ def rod(world):
 
 
 @pytest.mark.parametrize("made", [bar, wedge, rod])
-@pytest.mark.parametrize("speed", [1.0, 2.0])
+@pytest.mark.parametrize("speed", [1.0, pytest.param(2.0, marks=pytest.mark.long)])
 def test_an_edge_falls_on_a_held_cloth(made, speed):
     """Geometry: along a row of cells, between two rows of vertices. They cut in by up to 2.2 mm, through the cloth."""
     world, cloth = held_cloth()

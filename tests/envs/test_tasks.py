@@ -79,7 +79,9 @@ def test_cover_counts_the_box():
         assert score_of(task, vertices, place)[0] == pytest.approx(share, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name == "spread" else ()) for name in TASKS]
+)
 def test_the_script_does_better_than_chance(name):
     """Within an episode it solves what it can with so few cells, and far more than random motion."""
     env = ClothVectorEnv(name, 3, autoreset_mode="Disabled", cells=(8, 8), device="cpu")
@@ -103,6 +105,7 @@ def test_the_script_does_better_than_chance(name):
     assert best["script"].mean() > best["chance"].mean() + 0.1
 
 
+@pytest.mark.long
 def test_starts_are_at_rest_on_the_table():
     """Dropped cloths lie on the table, whole; every start draws from its generator alone."""
     for task in (cls(**SMALL) for cls in TASKS.values()):

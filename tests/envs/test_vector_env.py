@@ -46,7 +46,7 @@ def assert_equal(found, expected):
         np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize("name", ["Spread", "Fold", "Hang", "Cover"])
+@pytest.mark.parametrize("name", [pytest.param("Spread", marks=pytest.mark.long), "Fold", "Hang", "Cover"])
 def test_gymnasium_has_nothing_to_say(name):
     """Gymnasium's checker goes through spaces, seeds, steps and pictures of each registered task."""
     env = gym.make(f"nuno/{name}-v0", render_mode="rgb_array", width=16, height=12, disable_env_checker=True, **SMALL)

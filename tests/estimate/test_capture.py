@@ -63,6 +63,7 @@ def capture(folder, **options):
     return nuno.capture_case(folder, **(given | options))
 
 
+@pytest.mark.long
 def test_the_whole_way_by_files(tmp_path, capsys):
     """The command makes a case of image files, and `read_case` reads the true camera, table and hand from it."""
     views, table, before, after = images()

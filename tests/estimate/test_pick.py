@@ -88,6 +88,7 @@ def test_what_was_learned_is_asked_unless_left_out(result, seen):
     np.testing.assert_allclose(without.eq1, result.eq1, atol=1e-12)  # same futures, of which it changes nothing
 
 
+@pytest.mark.long
 def test_the_prior_of_the_lift_is_added_unless_left_out(seen):
     """Bit for bit: without it the scores are the evidence alone, and so they are with a prior that is flat."""
     points = np.array(((0.0, 0.0), (0.21, 0.4), (1.0, 0.5), (0.7, 0.9)))  # no grid

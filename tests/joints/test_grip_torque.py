@@ -41,8 +41,8 @@ def soft_bar(world, direction):
     return bar, np.flatnonzero(np.abs(bar.vertices[:, 0]) < 1e-6)
 
 
-@pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize("how", ["stiff", "compliant", "weld"])
+@pytest.mark.parametrize("direction", [1.0, pytest.param(-1.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("how", ["stiff", "compliant", pytest.param("weld", marks=pytest.mark.long)])
 def test_a_soft_bar_held_at_its_end(how, direction):
     """Equilibrium: its weight at half of its length, about the mean of the held points."""
     world = nuno.World(device="cpu")

@@ -265,6 +265,7 @@ def test_a_corner_slips_behind_what_pulls_it_at_its_limit(caplog):
     assert len(said) == 1 and "'sheet'" in said[0] and "max_force" in said[0]
 
 
+@pytest.mark.long
 def test_a_limit_that_is_not_reached_changes_nothing():
     """Statics: a towel's corner bears its weight and is where it is led, with the limit and without."""
     found = []
@@ -307,6 +308,7 @@ def test_two_limited_grips_that_contradict_each_other_share_a_stiff_sheet(caplog
     assert len(said) == 2
 
 
+@pytest.mark.long
 def test_a_limit_goes_with_a_leader_and_with_copies(tmp_path):
     """Led by a static body that moves: futures, a restored world and one from a file bear what the world does."""
     world = nuno.World(device="cpu")

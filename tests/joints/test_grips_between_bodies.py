@@ -58,6 +58,7 @@ def test_a_grip_of_surface_points_bears_the_weight():
     np.testing.assert_allclose(mean_force(world, held, 60), (0.0, 0.0, -weight), atol=0.01 * weight)
 
 
+@pytest.mark.long
 def test_a_weld_of_a_cloth_to_a_box_hangs_the_box():
     """Equilibrium: a box that hangs at a held cloth pulls by its weight at the weld; it falls once released."""
     world = nuno.World(device="cpu")

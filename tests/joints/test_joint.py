@@ -304,6 +304,7 @@ def test_a_lid_falls_shut_on_its_basket():
     assert np.linalg.norm(basket.position[:2]) < 2e-3
 
 
+@pytest.mark.long
 def test_a_towel_goes_along_in_a_drawer():
     """A motor pulls a drawer out by 0.2 m at a quarter of mu g: the towel in it goes along within 2 mm."""
     world = nuno.World(device="cpu")
@@ -330,6 +331,7 @@ def test_a_towel_goes_along_in_a_drawer():
     assert joint.wrench[0][2] == pytest.approx(-weight, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_clothes_peg_holds_a_cloth_and_lets_go():
     """Two arms, a hinge and a spring: 2 mu N of the jaws is more than a towel weighs; opened, it falls."""
     world = nuno.World(device="cpu")

@@ -12,7 +12,7 @@ import nuno
 from nuno.__main__ import main
 from nuno.errors import InvalidInputError
 from nuno.kernels.kernel_cache import compile_kernels
-from nuno.kernels.kernel_modules import CPU_ONLY, CUDA_ONLY, kernel_modules, kernel_sources
+from nuno.kernels.kernel_modules import CPU_ONLY, CUDA_ONLY, WHEN_NAMED, kernel_modules, kernel_sources
 
 CASE = Path(__file__).parents[2] / "examples" / "pick-case"
 
@@ -52,9 +52,25 @@ def test_every_kernel_is_of_a_module_that_is_known():
 def test_devices_are_told_of_modules_that_there_are():
     """A name that has changed would leave a module out."""
     names = {module.name for module in kernel_modules()}
-    assert names >= CPU_ONLY
+    assert names >= CPU_ONLY >= WHEN_NAMED
     assert all(any(name.startswith(beginning) for name in names) for beginning in CUDA_ONLY)
     assert all(module.blocks for module in kernel_modules() if "cuda" in module.devices)
+
+
+def test_what_no_world_runs_is_compiled_only_by_name(monkeypatch):
+    """Of worlds on the CPU those by a thread are left out: one world takes SIMD's plan, and a batch takes its lanes."""
+    loaded = []
+    monkeypatch.setattr("warp.load_module", lambda module, device: loaded.append(module.name))
+    compile_kernels("cpu")
+    expected = {module.name for module in kernel_modules() if "cpu" in module.devices}
+    assert set(loaded) == expected - WHEN_NAMED
+    world = nuno.World(device="cpu")
+    cloth = world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=(0, 0, 1)))
+    world.attach(cloth)
+    plans = [each.find(cloth.name)._dynamics.solver for each in (world, world.imagine(3))]
+    assert [(made.plan, made.lanes > 1) for made in plans] == [("vector", False), ("fused", True)]
+    compile_kernels("cpu", only=["nuno.plans.run_worlds"])
+    assert loaded[-1] == "nuno.plans.run_worlds"
 
 
 @pytest.mark.long

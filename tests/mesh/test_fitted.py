@@ -36,7 +36,12 @@ MESHES = {
 }
 
 
-@pytest.fixture(scope="module", params=MESHES)
+LONG = ("cylinder", "turned box", "odd sphere", "wavy ball")
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in MESHES]
+)
 def case(request):
     """A mesh's vertices and faces, the cell, the volume that may be cut off, and its tetrahedra."""
     (vertices, faces), cell, cut = MESHES[request.param]

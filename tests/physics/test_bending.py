@@ -45,7 +45,15 @@ def test_a_resolved_strip_has_its_nominal_rigidity(along):
     np.testing.assert_allclose(ratios((3.0, 10.0, 30.0), 10, along=along, substeps=120), 1.0, atol=0.08)
 
 
-@pytest.mark.parametrize(("cells", "load"), [(10, 10.0), (10, 30.0), (20, 30.0), (20, 10.0)])
+@pytest.mark.parametrize(
+    ("cells", "load"),
+    [
+        (10, 10.0),
+        pytest.param(10, 30.0, marks=pytest.mark.long),
+        pytest.param(20, 30.0, marks=pytest.mark.long),
+        (20, 10.0),
+    ],
+)
 def test_a_strip_has_its_nominal_rigidity_at_default_substeps(cells, load):
     """Elastica within 10 %, what Nuno promises for G from 1 to 30."""
     assert ratios((load,) * 2, cells)[0] == pytest.approx(1.0, abs=0.10)
@@ -193,7 +201,13 @@ def zigzag(bends, smooth):
 
 
 @pytest.mark.parametrize(
-    ("h", "rigidity", "most"), [(0.01, 5e-5, 1e-5), (0.02, 5e-5, 2e-6), (0.01, 3e-2, 1.2e-4), (0.02, 3e-2, 1.2e-4)]
+    ("h", "rigidity", "most"),
+    [
+        pytest.param(0.01, 5e-5, 1e-5, marks=pytest.mark.long),
+        (0.02, 5e-5, 2e-6),
+        pytest.param(0.01, 3e-2, 1.2e-4, marks=pytest.mark.long),
+        (0.02, 3e-2, 1.2e-4),
+    ],
 )
 def test_a_strip_at_rest_has_little_of_a_zigzag(h, rigidity, most):
     """Bound: a thirtieth of the thickness (4 mm) at the substeps of the rule, against many, and less in limp cloth.

@@ -77,7 +77,7 @@ def test_a_strip_stands_below_greenhills_load_and_falls_above(kind):
     assert abs(aside[1]) > 0.3 * LENGTH
 
 
-@pytest.mark.parametrize("kind", ["sheet", "right-angled"])
+@pytest.mark.parametrize("kind", ["sheet", pytest.param("right-angled", marks=pytest.mark.long)])
 def test_weight_softens_a_standing_strip_as_the_linear_theory_says(kind):
     """Deflection under a small force aside, which weight makes up to 4 times as large (G = 6), solved above."""
     loads = np.array([0.5, 2.0, 3.0, 4.0, 5.0, 6.0])

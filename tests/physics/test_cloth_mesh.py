@@ -101,6 +101,7 @@ def test_an_irregular_mesh_hangs_like_a_sheet():
     np.testing.assert_allclose(reach[0], reach[1], rtol=0.05)
 
 
+@pytest.mark.long
 def test_a_curved_rest_shape_is_kept_without_gravity():
     """A half cylinder that is nowhere strained stays as it is, and comes back after a knock."""
     radius, n, m = 0.1, 16, 8

@@ -33,7 +33,9 @@ def at_rest(kind, axis, rigidity, damping):
     return rows(body)[0]
 
 
-@pytest.mark.parametrize("damping", [0.0005, 0.002, 0.02])
+@pytest.mark.parametrize(
+    "damping", [pytest.param(0.0005, marks=pytest.mark.long), 0.002, pytest.param(0.02, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize(("axis", "rigidity"), [(0, 5e-2), (0, 3e-3), (1, 1e-3)], ids=["stiff", "limp", "hung"])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_damping_leaves_a_cloth_where_it_stands_without(kind, axis, rigidity, damping):
@@ -61,7 +63,7 @@ def test_damping_leaves_a_soft_body_where_it_stands_without(damping):
     assert lowest(damping) == pytest.approx(lowest(0.0), rel=0.02)
 
 
-@pytest.mark.parametrize("damping", [0.001, 0.004])
+@pytest.mark.parametrize("damping", [pytest.param(0.001, marks=pytest.mark.long), 0.004])
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
 def test_a_ringing_strip_dies_down_as_its_time_constant_says(kind, damping):
     """Closed form exp(-tau omega^2 t / 2) of a force tau dF/dt beside an elastic force F, omega the frequency found."""

@@ -55,6 +55,7 @@ def batch():
     return body.vertices, body.velocities, body._dynamics.solver.pair_counts
 
 
+@pytest.mark.long
 def test_the_worlds_of_a_batch_differ_and_touch_themselves(batch):
     """What makes the tests below worth their name."""
     x, _, pairs = batch

@@ -26,6 +26,7 @@ def test_the_area_seen_from_above_is_the_squares():
     assert seen_from_above(x, faces) == pytest.approx(0.01, rel=2e-3)  # half a pixel of 0.5 mm
 
 
+@pytest.mark.long
 def test_stiffer_cloth_drapes_less():
     """From a fifth for a limp cloth (measured towels have 0.2, napkins less) to 1 for a board, and never falling."""
     found = drapes([0.01, 0.025, 0.04, 0.07, 0.3], 20)

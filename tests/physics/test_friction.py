@@ -120,6 +120,7 @@ def over_edge(hanging, *, length=0.4, cells=80, radius=0.02, friction=0.3):
     return rows(strip)[:, 0, 0] - before
 
 
+@pytest.mark.long
 def test_a_strip_over_a_rounded_edge_slides_as_the_capstan_equation_says():
     """Capstan equation: slides iff hanging / lying > mu exp(mu pi / 2), less what the strip on the arc weighs.
 

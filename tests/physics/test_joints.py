@@ -41,6 +41,7 @@ def periods(values, step):
     return np.diff(k - values[k] / (values[k + 1] - values[k])).mean() * step
 
 
+@pytest.mark.long
 def test_a_compound_pendulum_swings_as_the_elliptic_integral_says():
     """From 60 degrees: T = 4 sqrt(I / m g l) K(sin^2 30), within 0.5 %; energy stays within 0.1 % for 10 s."""
     world = nuno.World(device="cpu")
@@ -60,6 +61,7 @@ def test_a_compound_pendulum_swings_as_the_elliptic_integral_says():
     assert np.ptp(energy) < 1e-3 * 0.5 * G * BAR
 
 
+@pytest.mark.long
 def test_a_double_pendulum_keeps_its_energy():
     """Chaotic motion from the horizontal, 10 s: energy drifts by less than 0.5 % of what it falls through."""
     world = nuno.World(device="cpu")
@@ -77,6 +79,7 @@ def test_a_double_pendulum_keeps_its_energy():
     assert np.abs(energy).max() < 5e-3 * 0.5 * G * (0.5 + 1.5) * BAR
 
 
+@pytest.mark.long
 def test_a_four_bar_closes_and_its_rocker_goes_where_geometry_says():
     """A driven crank-rocker: closed within 0.02 mm, its rocker's angle is that of the closed form."""
     world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0))
@@ -196,7 +199,7 @@ def test_a_motor_goes_to_a_position():
     assert joint.position == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("stiffness", [10.0, 100.0, 1e5])
+@pytest.mark.parametrize("stiffness", [10.0, 100.0, pytest.param(1e5, marks=pytest.mark.long)])
 def test_a_spring_keeps_its_amplitude(stiffness):
     """1 kg let go 50 mm from rest: period 2 pi sqrt(m / k) within 1 %, the amplitude after 5 s within 1 %."""
     world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0), frame_rate=60.0 if stiffness < 1e3 else 600.0)

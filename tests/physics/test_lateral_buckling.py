@@ -112,6 +112,7 @@ def test_a_strip_on_edge_stands_below_the_load_and_falls_aside_above(kind):
     assert aside[1] > 0.1 * LENGTH
 
 
+@pytest.mark.long
 def test_weight_softens_a_strip_on_edge_as_the_linear_theory_says():
     """Deflection under a small force aside, which weight makes up to 1.5 times as large, solved above."""
     loads, depth, force = np.array([4.0, 10.0, 14.0]), 1 / 4, 0.02

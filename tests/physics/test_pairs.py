@@ -25,6 +25,7 @@ def held_towel(substeps=None, cells=(12, 12)):
     return world, towel, [world.grip(towel, [corner], to=towel.vertices[corner]) for corner in corners]
 
 
+@pytest.mark.long
 def test_a_box_on_a_held_towel_sags_it_and_is_carried():
     """Equilibrium: what holds the towel bears the weight of both, and a box on it makes it sag more."""
     world, towel, grips = held_towel()
@@ -43,6 +44,7 @@ def test_a_box_on_a_held_towel_sags_it_and_is_carried():
     assert box.position[2] - towel.vertices[:, 2].min() > 0.0
 
 
+@pytest.mark.long
 def test_a_soft_cube_lands_on_a_towel():
     """A cube dropped on a towel stays on it, and does not pass: every vertex is above the towel's lowest."""
     world, towel, grips = held_towel()
@@ -56,6 +58,7 @@ def test_a_soft_cube_lands_on_a_towel():
     assert abs(volume(cube) / 0.06**3 - 1.0) < 0.02  # E of 5e4 Pa under 20 Pa of its own weight: 0.04 %
 
 
+@pytest.mark.long
 def test_a_sheet_rests_on_a_sheet():
     """Thickness is kept between two sheets, and no edge of one passes through a triangle of the other."""
     world = nuno.World(device="cpu")
@@ -75,6 +78,7 @@ def test_a_sheet_rests_on_a_sheet():
     assert upper.vertices[:, 2].max() < 0.02  # and it did come to lie there
 
 
+@pytest.mark.long
 def test_a_soft_cube_rests_on_a_soft_cube():
     """Two cubes stacked on a table stand still, as high as they are less what their weight presses."""
     world = nuno.World(device="cpu")

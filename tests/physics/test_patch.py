@@ -30,7 +30,7 @@ def departure(kind, strain, substeps):
 
 
 @pytest.mark.parametrize("strain", STRAINS)
-@pytest.mark.parametrize("kind", ["jittered", "scattered"])
+@pytest.mark.parametrize("kind", ["jittered", pytest.param("scattered", marks=pytest.mark.long)])
 def test_a_uniform_strain_stays_uniform(kind, strain):
     """Invariant: all comes to rest at F X, but for what one pass a substep leaves, which falls with its square."""
     coarse, fine = departure(kind, strain, 120), departure(kind, strain, 240)

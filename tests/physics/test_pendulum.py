@@ -24,7 +24,10 @@ def swinging(arm, angle):
     return world, bar, world.weld(hinge, bar, [0, 2])
 
 
-@pytest.mark.parametrize(("arm", "angle"), [(0.05, 0.1), (0.12, 0.1), (0.12, 1.2)])
+@pytest.mark.parametrize(
+    ("arm", "angle"),
+    [pytest.param(0.05, 0.1, marks=pytest.mark.long), pytest.param(0.12, 0.1, marks=pytest.mark.long), (0.12, 1.2)],
+)
 def test_a_physical_pendulum_swings_in_its_period(arm, angle):
     """Closed form T = 4 sqrt(I / (m g d)) K(sin(angle / 2)), I about the pivot; 2 pi for 4 K where swings are small."""
     inertia = MASS * ((SIZE[0] ** 2 + SIZE[2] ** 2) / 12 + arm**2)

@@ -82,7 +82,12 @@ def test_the_cloth_slips_where_it_is_too_heavy(part, holds, size, device):
 
 
 @pytest.mark.parametrize(
-    ("device", "at_once"), [("cpu", False), ("cpu", True), pytest.param("cuda:0", True, marks=pytest.mark.cuda)]
+    ("device", "at_once"),
+    [
+        ("cpu", False),
+        pytest.param("cpu", True, marks=pytest.mark.long),
+        pytest.param("cuda:0", True, marks=pytest.mark.cuda),
+    ],
 )
 def test_the_cloth_bears_the_force_of_the_fingers(device, at_once, monkeypatch):
     """Newton's third law: what both sides push the cloth with adds up to the fingers' 5 N each, once they are at rest.
@@ -99,6 +104,7 @@ def test_the_cloth_bears_the_force_of_the_fingers(device, at_once, monkeypatch):
     assert np.abs(world.contacts(cloth).forces[:, 1]).sum() == pytest.approx(2.0 * FORCE, rel=5e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_cloth_gives_little_and_then_no_more(device):
     """Pressed together by Hooke's law, 5e5 Pa across the thickness, to 95 % of its 4 mm, which then are hard."""

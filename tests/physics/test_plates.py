@@ -37,7 +37,10 @@ def square(kind, cells, side):
     return rectangle("right-angled" if kind == "sheet" else kind, (side, side), side / cells)
 
 
-@pytest.mark.parametrize("kind", ["sheet", "right-angled", "crossed"])
+@pytest.mark.parametrize(
+    "kind",
+    ["sheet", pytest.param("right-angled", marks=pytest.mark.long), pytest.param("crossed", marks=pytest.mark.long)],
+)
 def test_a_clamped_square_sags_as_a_plate(kind):
     """Closed form w = .00126 q a^4 / D."""
     cells, side = 14, 0.14
@@ -51,7 +54,10 @@ def test_a_clamped_square_sags_as_a_plate(kind):
 
 # squares cut both ways are left out: free to turn at the rim, their twist is 15 to 20 % too soft
 # (docs/reports/performance.md)
-@pytest.mark.parametrize("kind", ["sheet", "right-angled", "jittered"])
+@pytest.mark.parametrize(
+    "kind",
+    ["sheet", pytest.param("right-angled", marks=pytest.mark.long), pytest.param("jittered", marks=pytest.mark.long)],
+)
 def test_a_simply_supported_square_sags_as_a_plate(kind):
     """Closed form w = .00406 q a^4 / D."""
     cells, side = 12, 0.12

@@ -44,6 +44,7 @@ def test_a_cloth_that_hangs_by_a_corner_does_not_turn(corner):
     assert abs(moment / (mass @ (arm[:, :2] ** 2).sum(axis=1))) < 2.5e-3
 
 
+@pytest.mark.long
 def test_the_shape_of_a_hung_cloth_does_not_depend_on_the_substeps():
     """Invariance: a sheet hung by two corners, slack between, at 1, 2 and 4 times the default substeps."""
     first = hung(None, [0, 20])

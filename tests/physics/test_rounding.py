@@ -15,7 +15,13 @@ FLOATS, DOUBLES = 24, 25  # substeps a frame on either side of the rule
 
 @pytest.mark.parametrize(
     ("substeps", "worlds", "most"),
-    [(FLOATS, 1, 3e-3), (DOUBLES, 1, 5e-5), (104, 1, 5e-5), (104, 3, 5e-5), (240, 1, 5e-5)],
+    [
+        (FLOATS, 1, 3e-3),
+        (DOUBLES, 1, 5e-5),
+        pytest.param(104, 1, 5e-5, marks=pytest.mark.long),
+        pytest.param(104, 3, 5e-5, marks=pytest.mark.long),
+        pytest.param(240, 1, 5e-5, marks=pytest.mark.long),
+    ],
 )
 def test_a_hung_cloth_comes_to_rest(substeps, worlds, most):
     """Exact: at rest nothing moves [m/s].

@@ -31,7 +31,11 @@ def between_plates(axis, cell):
     return world, ball, plates, along
 
 
-@pytest.mark.parametrize(("axis", "across"), [(0, 12), (2, 12), pytest.param(0, 13, marks=pytest.mark.slow)])
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("axis", "across"),
+    [(0, 12), pytest.param(2, 12, marks=pytest.mark.long), pytest.param(0, 13, marks=pytest.mark.slow)],
+)
 def test_a_ball_between_plates(axis, across):
     """Hertz's force within 15 %, and the reference within 8 %, for 1 to 8 mm (as found, within 5 %)."""
     world, ball, plates, along = between_plates(axis, 2.0 * RADIUS / across)

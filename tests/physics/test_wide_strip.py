@@ -14,7 +14,15 @@ from world_with import attached
 import nuno
 
 
-@pytest.mark.parametrize("kind", ["sheet", "right-angled", "equilateral", "jittered"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "sheet",
+        pytest.param("right-angled", marks=pytest.mark.long),
+        pytest.param("equilateral", marks=pytest.mark.long),
+        pytest.param("jittered", marks=pytest.mark.long),
+    ],
+)
 def test_a_wide_strip_has_the_rigidity_of_a_narrow_one(kind):
     """Elastica at G = 10 with B, not B / (1 - nu^2), for strips 2 and 10 cells wide and 10 long."""
     for across in (2, 10):

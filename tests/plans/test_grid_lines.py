@@ -141,6 +141,7 @@ def solved(method, plain, cells, differ, doubles, flag=None):
         yield found, expected
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("differ", [False, True], ids=["uniform", "each its own"])
 @pytest.mark.parametrize("cells", [(5, 8), (9, 33), (64, 6), (200, 4)])
 def test_eight_edges_a_thread_are_solved_exactly(cells, differ):

@@ -67,6 +67,7 @@ def _fits(table: Topology, out: wp.array(dtype=int)):
         out[0] = 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("differ", [False, True], ids=["uniform", "each its own"])
 @pytest.mark.parametrize("cells", [(5, 4), (12, 7), (31, 5), (63, 5), (6, 47), (4, 191)])
 def test_strips_do_what_the_plain_constraints_do(cells, differ):

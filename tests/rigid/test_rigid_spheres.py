@@ -56,6 +56,7 @@ def test_a_ball_that_is_thrown_is_caught(device):
         assert ball.position[2] > cloth.vertices[:, 2].min()
 
 
+@pytest.mark.long
 @DEVICES
 def test_a_thin_rod_lies_on_a_held_cloth(device):
     """A capsule of a fifth of a cell, between two rows of vertices."""

@@ -20,7 +20,7 @@ def standing(name):
     return world, robot
 
 
-@pytest.fixture(scope="module", params=["talos", "g1"])
+@pytest.fixture(scope="module", params=["talos", pytest.param("g1", marks=pytest.mark.long)])
 def stood(request):
     """A robot after 0.5 s, with a snapshot."""
     world, robot = standing(request.param)

@@ -66,6 +66,7 @@ def test_sixty_kilograms_in_the_hand_are_told(caplog):
     assert sum("would tip over" in message for message in messages) == 1
 
 
+@pytest.mark.long
 def test_a_kilogram_is_nothing():
     """Nor is a robot that stands, walks and moves its arms."""
     robot = make()

@@ -87,6 +87,7 @@ def test_contacts_are_what_moves_the_robot(standing):
     assert moved > 0.02 * weight  # else it would be statics again
 
 
+@pytest.mark.long
 def test_a_wrist_reads_what_a_table_does_to_the_hand(standing):
     """A hand that presses a static table stops there; its wrist reads the table's force, within 1 %.
 

@@ -65,6 +65,7 @@ def test_a_cube_is_lifted_by_friction_alone(scene):
     assert empty - robot.read().wrenches["right_wrist"][2] == pytest.approx(MASS * G, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [pytest.param(1.2, marks=pytest.mark.long), 0.8])
 @pytest.mark.parametrize("kind", [pytest.param("towel", marks=pytest.mark.long), "mat"])
 def test_a_towels_edge_and_a_mats_corner_are_lifted_by_friction_alone(tmp_path, kind, share):

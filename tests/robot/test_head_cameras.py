@@ -52,6 +52,7 @@ def test_both_arms_are_seen_and_hide_the_towel(scene):
         assert depth[robots].min() > 0.1 and depth[picture.mask("towel")].min() > 0.4
 
 
+@pytest.mark.long
 def test_visual_meshes_are_drawn_in_place_of_hulls(scene):
     """Hulls hide more than what they are around; both have the pixels of the visual meshes, nearly all."""
     _, _, links = scene

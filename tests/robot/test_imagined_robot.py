@@ -149,6 +149,7 @@ def test_bad_commands_are_named(scene):
         _ = nuno.World(device="cpu").robot
 
 
+@pytest.mark.long
 def test_what_the_hands_hold_is_held_alike_in_every_world():
     """A box fixed to a hand, an arm under way: the same bits in imagined worlds, and after a world is restored."""
     world = nuno.World(device="cpu")

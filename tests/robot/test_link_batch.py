@@ -1,6 +1,7 @@
 """Links of a robot's copies, worked out together: to the bit where those of each robot alone are."""
 
 import numpy as np
+import pytest
 
 import nuno
 
@@ -27,6 +28,7 @@ def test_shapes_are_where_each_robot_has_them(still_talos):
         np.testing.assert_array_equal(together[k], [own[k] for own in alone])
 
 
+@pytest.mark.long
 def test_different_ways_are_those_of_robots_alone():
     """Arms, a gripper and bent knees, other in each world, beside a towel: links, base and towel to the bit."""
     world = nuno.World(device="cpu")

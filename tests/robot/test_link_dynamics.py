@@ -55,6 +55,7 @@ def turns(world, dynamics, frames):
     return np.abs(inner[peaks]), found
 
 
+@pytest.mark.long
 def test_friction_takes_the_same_of_each_swing_and_then_holds(tmp_path):
     """Coulomb friction f in a joint of stiffness k: each half swing is 2 f / k less, and it sticks within f / k.
 
@@ -69,6 +70,7 @@ def test_friction_takes_the_same_of_each_swing_and_then_holds(tmp_path):
     assert abs(angles[-1] - angles[-60]) < 1e-6  # it stands
 
 
+@pytest.mark.long
 def test_damping_takes_the_same_share_of_each_swing(tmp_path):
     """Viscous damping d: amplitudes fall by exp(-d T / 4 I) from half swing to half swing."""
     damping = 0.1
@@ -90,6 +92,7 @@ def test_a_joint_sticks_below_its_friction_and_goes_above(tmp_path):
         assert (float(dynamics.joints[0].position) > 1e-4) == goes
 
 
+@pytest.mark.long
 def test_all_joints_read_at_once_are_what_each_tells():
     """Positions and velocities to rounding, hinges and sliders, base free and fixed, one world and a batch."""
     talos = nuno.Humanoid("talos")
@@ -172,6 +175,7 @@ def test_swinging_limbs_change_no_momentum():
     np.testing.assert_allclose(last[3:], first[3:], atol=4e-3 * np.linalg.norm(first[3:]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.9, pytest.param(1.2, marks=pytest.mark.long)])
 def test_feet_stick_and_slide_at_the_angle_of_friction(share):
     """Talos on stiff motors on a slope aside, friction 0.1: it slides at g (sin - mu cos), and below atan(mu) stops.

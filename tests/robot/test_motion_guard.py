@@ -69,6 +69,7 @@ def wall_on_the_left(robot, gap, beside):
     return robot.world.add(nuno.box((4.0, 0.2, 2.0), name="wall", position=(0.0, beside + gap + 0.1, 1.0)))
 
 
+@pytest.mark.long
 def test_a_walk_ends_in_front_of_a_wall(caplog):
     """It says so, no link is in the wall at any frame, and the robot stands as near as its steps let it."""
     robot = make()
@@ -97,7 +98,7 @@ def test_go_pos_tells_that_it_did_not_get_there():
     assert 0.0 <= robot.read_base().position[0] < 0.5
 
 
-@pytest.mark.parametrize(("gap", "passes"), [(0.05, True), (-0.05, False)])
+@pytest.mark.parametrize(("gap", "passes"), [pytest.param(0.05, True, marks=pytest.mark.long), (-0.05, False)])
 def test_a_wall_at_the_side(beside, caplog, gap, passes):
     """5 cm beside what the links reach it is passed in silence; 5 cm nearer it is not."""
     robot = make()

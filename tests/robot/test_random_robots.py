@@ -139,7 +139,11 @@ def check(seed, folder, dynamics):
     return [f"seed {seed} after {', '.join(log)}: {each}" for each in wrong]
 
 
-@pytest.mark.parametrize("dynamics", [False, True], ids=["kinematic", "dynamic"])
+@pytest.mark.parametrize(
+    "dynamics",
+    [pytest.param(False, marks=pytest.mark.long), pytest.param(True, marks=pytest.mark.long)],
+    ids=["kinematic", "dynamic"],
+)
 def test_copies_of_a_few_random_robots(tmp_path, dynamics):
     """Of the same, so many as take seconds."""
     assert [each for seed in range(2) for each in check(seed, tmp_path, dynamics)] == []

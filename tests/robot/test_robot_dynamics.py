@@ -158,7 +158,8 @@ def test_restored_it_goes_on_bit_for_bit(standing):
     assert np.array_equal(once.q, again.q) and np.array_equal(once.v, again.v)
 
 
-@pytest.mark.parametrize("push", [(0.0, 7.0, 0.0), (7.0, 0.0, 0.0)])
+@pytest.mark.long
+@pytest.mark.parametrize("push", [(0.0, 7.0, 0.0), pytest.param((7.0, 0.0, 0.0), marks=pytest.mark.long)])
 def test_a_light_push_is_survived(standing, push):
     """7 N s on the base: its centre of mass goes as far as a critically damped mass, J / (m e rate), and back.
 

@@ -89,6 +89,7 @@ def two_ways():
     ]
 
 
+@pytest.mark.long
 def test_two_hands_are_followed_as_surely_as_they_say():
     """Errors as the deviations that the track tells, and under 8 mm: no hint of height is given."""
     ways = two_ways()

@@ -84,6 +84,7 @@ def test_dask(in_a_batch, cluster):
     assert_same_bits(in_a_batch, found)
 
 
+@pytest.mark.long
 def test_dask_worker_dies(cluster, tmp_path):
     """A Dask worker that is killed in the middle of a trial: the trial runs again elsewhere."""
     once = tmp_path / "once"
@@ -153,6 +154,7 @@ def test_broken_executor_of_another_kind():
         search.sweep(search.each(searched.single_square), {"x": [1, 2]}, executor=BrokenSomewhere())
 
 
+@pytest.mark.long
 def test_world_that_cannot_be_made(pool):
     """The world's function raises in a worker: an error here, and no trial that failed."""
     with pytest.raises(InvalidInputError, match="broken_room raised RuntimeError: no room"):

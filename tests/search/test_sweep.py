@@ -135,6 +135,7 @@ def test_diverged_names_its_worlds():
     assert caught.value.worlds == (1,)
 
 
+@pytest.mark.long
 def test_memory_runs_out():
     """A batch that is too large is divided, down to what fits."""
     sizes = []

@@ -34,6 +34,7 @@ def tetrahedron():
     return np.array([[1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 1]], dtype=float), np.array([[0, 1, 2, 3]])
 
 
+@pytest.mark.long
 def test_vertices_are_those_of_the_tetrahedra():
     """``vertices`` are all that move, ``faces`` their boundary; the position is their mean."""
     for body in every_kind():
@@ -233,6 +234,7 @@ def test_missing_tetrahedraliser(monkeypatch):
         nuno.soft_mesh(CUBE, 0.1, tetrahedraliser="pytetwild")
 
 
+@pytest.mark.long
 def test_tetrahedraliser():
     """The elements of fTetWild follow the surface within its envelope, a thousandth of the diagonal."""
     pytest.importorskip("pytetwild")

@@ -134,7 +134,9 @@ def test_all_goes_back_where_lists_were_short(request):
     assert position[2] < 0.045 and vertices[:2, 2].mean() > 0.004  # the box was pushed down, the hand lifted
 
 
-@pytest.mark.parametrize("plan", ["fused", pytest.param("grid", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "plan", ["vector", pytest.param("fused", marks=pytest.mark.long), pytest.param("grid", marks=pytest.mark.long)]
+)
 def test_every_plan_tells_that_its_lists_were_short(plan, scarce):
     """A list that was too short is told of also where a later one, of a cloth that unfolded, was not."""
     cloth = folded("cpu").find("cloth")

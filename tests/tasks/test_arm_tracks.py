@@ -29,6 +29,7 @@ def test_a_file_holds_the_tracks_to_the_bit(tracks, tmp_path):
     assert (back.robot, back.settle, back.seconds) == ("talos", 0.3, 0.3)
 
 
+@pytest.mark.long
 def test_tracks_carry_as_the_robot_does(talos, glides, tracks, mat, tmp_path):
     """The same trials, without a robot: equal to the bit; pictures of the robot are refused by name."""
     ways = dict(mat=mat, offsets_x=(0.1,), offsets_y=(0.0, 0.24), device="cpu")

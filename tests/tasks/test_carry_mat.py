@@ -22,6 +22,7 @@ def result(talos, glides):
     return carry_mat(talos, mat, arm_distances=DISTANCES, walks=glides(DISTANCES), **FEW)
 
 
+@pytest.mark.long
 def test_a_mat_falls_where_its_middle_is_beside_the_arms(result):
     """Statics: a body stays on two supports if its centre of gravity is between them, and else tips over."""
     assert [trial.offset_y for trial in result.trials] == [0.0, 0.24, 0.0, 0.24]
@@ -31,6 +32,7 @@ def test_a_mat_falls_where_its_middle_is_beside_the_arms(result):
     assert fallen.value is None and -FEW["settle"] <= fallen.failed_at < 0.0  # as it was laid down
 
 
+@pytest.mark.long
 def test_a_robot_that_stands_carries_steadily(result):
     """Nothing moves, so the mean is where it was: what is left is the mat's settling, under 2 mm in the mean."""
     assert np.nanmax(result.values) < 2e-3 * FEW["seconds"]
@@ -55,6 +57,7 @@ def test_a_mat_without_friction_is_left_behind(talos, glides, mat):
     assert trials[0.8].reason == ""
 
 
+@pytest.mark.long
 def test_hands_that_grip_need_no_friction(talos, glides, mat):
     """Gripped edges carry a mat that would slide off: the comparison that hold="grip" is for."""
     material = nuno.Soft(density=60.0, youngs_modulus=5e3, poisson_ratio=0.25, friction=0.0, air_drag=1.0)
@@ -65,6 +68,7 @@ def test_hands_that_grip_need_no_friction(talos, glides, mat):
     assert found.trials[0].reason == ""
 
 
+@pytest.mark.long
 def test_a_cloth_is_carried_too(talos, glides):
     """A cloth mat lies on the arms by friction alone."""
     cloth = nuno.sheet((0.6, 0.4), cells=(18, 12))
@@ -75,6 +79,7 @@ def test_a_cloth_is_carried_too(talos, glides):
     assert found.trials[0].reason == ""
 
 
+@pytest.mark.long
 def test_files_hold_what_the_result_holds(result, tmp_path):
     """The table, the CSV and the JSON name every trial, and the JSON has no NaN."""
     result.save(tmp_path, pictures=False)
@@ -88,6 +93,7 @@ def test_files_hold_what_the_result_holds(result, tmp_path):
     assert result.table().count("x -") == 2
 
 
+@pytest.mark.long
 def test_a_replay_is_what_was_measured(result):
     """Promise of a batch: world k is what it is alone, to the bit; so F can be taken from the replay."""
     times = np.arange(0.0, 1.0 + 1e-9, 1.0 / 60.0)
@@ -97,6 +103,7 @@ def test_a_replay_is_what_was_measured(result):
     assert value == pytest.approx(result.trials[0].value, rel=1e-3)  # means in float32 on the device
 
 
+@pytest.mark.long
 def test_a_picture_shows_robot_and_mat(result):
     """Both outcomes have their strip, and the parameters a plot."""
     for trial in (result.best, result.telling_failure):
@@ -107,6 +114,7 @@ def test_a_picture_shows_robot_and_mat(result):
     assert len(result.figure().axes) == 1
 
 
+@pytest.mark.long
 def test_finished_trials_are_not_run_again(talos, glides, mat, tmp_path, monkeypatch):
     """A results file that is complete answers without a simulation, with the same numbers."""
     given = dict(arm_distances=DISTANCES, walks=glides(DISTANCES), results=tmp_path / "carry.jsonl", **FEW)
@@ -173,6 +181,7 @@ def test_a_robot_without_legs_is_refused(talos, tmp_path):
         carry_mat(bare, hands_at=(0.5, 1.1))
 
 
+@pytest.mark.long
 def test_the_robot_is_left_as_it_was(talos, glides, result):
     """A robot that is lent stands as before, also where something is refused."""
     before = talos.configuration()

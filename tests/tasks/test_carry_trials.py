@@ -61,6 +61,7 @@ def test_an_arm_without_the_mat_is_a_failure(plan, side, name):
     assert outcome.failed_at[0] == pytest.approx(12 * EVERY / FRAME_RATE - SETTLE)
 
 
+@pytest.mark.long
 def test_a_trial_is_what_it_is_alone(plan):
     """Promise of the design: world k of a batch gives, bit for bit, what it gives alone; each has its own paths."""
     walks, offsets = np.array([0, 1, 0]), np.array([[0.1, 0.0], [0.12, 0.05], [0.05, -0.05]])

@@ -194,11 +194,11 @@ class ParticleDynamics(Dynamics):
 
     def vertices(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
-        return self.solver.positions().astype(np.float64)
+        return self.solver.positions()
 
     def velocities(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s]."""
-        return self.solver.velocities().astype(np.float64)
+        return np.stack(self.solver.velocities_apart(), axis=-1, dtype=np.float64)
 
     def pose(self, body: Body) -> Pose:
         """Return the mean of the vertices, and the orientation that the body was last given."""

@@ -309,7 +309,7 @@ def _shape_normals(shape: Shape) -> np.ndarray:
 def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return unit normals (n, 3) of vertices (n, 3): those of their faces (m, 3), by the faces' angles at them.
 
-    By area instead, that of a box's corner would hang on how its sides are cut into triangles.
+    By area instead, that of a box's corner would depend on how its sides are cut into triangles.
     """
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

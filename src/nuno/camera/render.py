@@ -114,11 +114,11 @@ def body_index(world: Any, body: Any) -> int:
     Raises:
         UnknownNameError: the world has no such body.
     """
-    name = body if isinstance(body, str) else getattr(body, "name", repr(body))
     bodies = list(world.bodies)
     for k, candidate in enumerate(bodies):
         if candidate is body:
             return k
+    name = body if isinstance(body, str) else body.name if hasattr(body, "name") else repr(body)
     for k, candidate in enumerate(bodies):
         if candidate.name == name:
             return k
@@ -140,28 +140,33 @@ def _render(
     device, worlds = world.device, int(world.world_count)
     with_ids = read is raster.ids_of
 
-    def skin(body: Any) -> tuple[np.ndarray, np.ndarray]:
-        return body.skin() if getattr(body.shape, "is_soft", False) else (body.vertices, body.faces)
+    def embedded(body: Any) -> bool:
+        return getattr(body.shape, "is_soft", False)
 
-    def draw(keys: wp.array, body: Any, vertices: np.ndarray, label: int) -> None:
+    def draw(keys: wp.array, body: Any, vertices: Any, label: int) -> None:
         thickness = cloth_thickness if getattr(body.shape, "is_cloth", False) else 0.0
         if body.shape.kind == "plane":  # endless, so not drawn as triangles
             raster.draw_depth(keys, _plane_depth(camera, region, vertices[0], body.faces), label)
             return
-        faces = np.asarray(skin(body)[1])
+        faces = np.asarray(body.skin()[1] if embedded(body) else body.faces)
         if seen.distorted and not body.is_dynamic:
             vertices, faces = _split(camera, vertices[0], faces)
             vertices = vertices[None]
-        points: wp.array = wp.array(np.ascontiguousarray(vertices, dtype=np.float32), dtype=wp.vec3, device=device)
+        points: Any = vertices
+        if not isinstance(vertices, wp.array):
+            points = wp.array(np.ascontiguousarray(vertices, dtype=np.float32), dtype=wp.vec3, device=device)
         triangles: wp.array = wp.array(np.ascontiguousarray(faces, dtype=np.int32), dtype=wp.vec3i, device=device)
         raster.draw(keys, points, triangles, seen, label, thickness=thickness)
 
     layer = raster.key_images(1, region, device, ids=with_ids)
-    differing: list[tuple[Any, np.ndarray, int]] = []
+    differing: list[tuple[Any, Any, int]] = []
     for k, body in enumerate(world.bodies):
         if k in hidden:
             continue
-        vertices = np.asarray(skin(body)[0])
+        if worlds > 1 and _moves_on_device(world, body):
+            differing.append((body, world.state(body)["positions"], labels[k]))
+            continue
+        vertices = np.asarray(body.skin()[0] if embedded(body) else body.vertices)
         if vertices.ndim == 2:
             vertices = vertices[None]
         if (vertices[-1] == vertices[0]).all() and (vertices[1:] == vertices[0]).all():
@@ -184,6 +189,11 @@ def _render(
                 draw(chunk, body, vertices[first:last], label)
         read(chunk, out=out[first:last])
     return out[0] if worlds == 1 else out
+
+
+def _moves_on_device(world: Any, body: Any) -> bool:
+    """Return whether the vertices that are drawn are those that a batch's solver has, which need not pass the host."""
+    return getattr(body.shape, "is_cloth", False) and body.is_dynamic and hasattr(world, "state")
 
 
 def _plane_depth(camera: Camera, region: Region, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import warp as wp
 
 from nuno.bodies.make_bodies import sphere
 from nuno.camera.camera import Camera
@@ -59,7 +62,8 @@ class ClothBatch:
         self.places = np.zeros((world_count, 3))
         nx, ny = task.cells
         rows, columns = (np.rint(np.linspace(0, n, KEY_POINTS)).astype(int) for n in (ny, nx))
-        self._key = (rows[:, None] * (nx + 1) + columns).ravel()
+        key = (rows[:, None] * (nx + 1) + columns).ravel()
+        self._key: Any = wp.array(key, dtype=int, device=self.world.device)
 
     @property
     def seconds(self) -> float:
@@ -69,14 +73,14 @@ class ClothBatch:
     @property
     def vertices(self) -> np.ndarray:
         """(worlds, n, 3) float64 [m], of the cloth."""
-        return self.cloth.vertices.reshape(self.world.world_count, -1, 3)
+        return self.cloth.surface()[0].reshape(self.world.world_count, -1, 3)
 
     def begin(self, worlds: np.ndarray, starts: list[Start]) -> None:
         """Let some worlds (k,) begin an episode each; the others keep every bit."""
         if not len(worlds):
             return
         self.world.reset(worlds, self._start)
-        shapes = np.array(self.vertices)
+        shapes = np.zeros((self.world.world_count, len(starts[0].vertices), 3))
         shapes[worlds] = [start.vertices for start in starts]
         count = self.world.world_count
         self.world.set_vertices(self.cloth, shapes if count > 1 else shapes[0], worlds=worlds)
@@ -98,13 +102,17 @@ class ClothBatch:
     def observe(self, steps: np.ndarray) -> np.ndarray:
         """Return what is observed, (worlds, size) float32, after so many steps (worlds,) of each episode."""
         count = self.world.world_count
-        velocities = self.cloth.velocities.reshape(count, -1, 3)
-        parts = (
-            self.vertices[:, self._key], velocities[:, self._key], self.pickers.positions, self.pickers.held >= 0,
-            self.places, 1.0 - steps / self.task.horizon,
-        )  # fmt: skip
+        state = self.world.state(self.cloth)
+        seen = [self._at_key_points(state[name]) for name in ("positions", "velocities")]
+        parts = (*seen, self.pickers.positions, self.pickers.held >= 0, self.places, 1.0 - steps / self.task.horizon)
         values = np.concatenate([np.asarray(part, dtype=np.float32).reshape(count, -1) for part in parts], axis=1)
-        return np.clip(values, -BOUND, BOUND)
+        return np.clip(values, -BOUND, BOUND, out=values)
+
+    def _at_key_points(self, array: Any) -> np.ndarray:
+        """Return what an array (worlds, n) of vec3 has of the observed vertices, which alone leave the device."""
+        chosen: Any = wp.indexedarray(array, [None, self._key])
+        found: np.ndarray = chosen.numpy()
+        return found
 
     @property
     def size(self) -> int:

@@ -98,6 +98,8 @@ class ClothTask(ABC):
         self.cells = (count("cells", cells[0], low=2), count("cells", cells[1], low=2))
         self.substeps, self.device, self.material = substeps, device, material
         nx, ny = self.cells
+        x, y = (np.linspace(-0.5 * SIDE, 0.5 * SIDE, n + 1) for n in self.cells)
+        self._grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         self.corners = np.array([0, nx, ny * (nx + 1), (ny + 1) * (nx + 1) - 1])  # (-x, -y), (+x, -y), (-x, +y) ...
 
     def world(self) -> World:
@@ -112,10 +114,11 @@ class ClothTask(ABC):
 
     def flat(self, centre: ArrayLike, angle: float) -> np.ndarray:
         """Return vertices (n, 3) [m] of the cloth flat on the table, its middle at (x, y), turned [rad]."""
-        x, y = (np.linspace(-0.5 * SIDE, 0.5 * SIDE, n + 1) for n in self.cells)
-        grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         c, s = np.cos(angle), np.sin(angle)
-        return np.column_stack([grid @ np.array([[c, s], [-s, c]]) + np.asarray(centre), np.full(len(grid), LIFT)])
+        vertices = np.empty((len(self._grid), 3))
+        vertices[:, :2] = self._grid @ np.array([[c, s], [-s, c]]) + np.asarray(centre)
+        vertices[:, 2] = LIFT
+        return vertices
 
     def furnish(self, world: World) -> None:  # noqa: B027  (some tasks have nothing else)
         """Put into a world what the task has beside table and cloth; what moves with an episode is called "object"."""

@@ -73,7 +73,8 @@ class Pickers:
             free = close[:, h] & (self.held[:, h] < 0)
             if not free.any():
                 continue
-            away = np.linalg.norm(vertices[free] - self.positions[free, h, None], axis=-1)
+            apart = vertices[free] - self.positions[free, h, None]
+            away = np.sqrt(np.einsum("wnk,wnk->wn", apart, apart))
             for other in np.delete(self.held[free], h, axis=1).T:
                 away[other >= 0, other[other >= 0]] = np.inf
             nearest = away.argmin(axis=1)

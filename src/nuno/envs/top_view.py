@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import warp as wp
 
 from nuno.bodies.body import Body
 from nuno.camera.camera import Camera
 from nuno.camera.render import render_masks
+from nuno.envs.covered_fields import count_covered, look_up_covered
 from nuno.world.world import World
 
 WIDTH = 0.9
@@ -35,14 +37,18 @@ class TopView:
 
     def covered(self) -> np.ndarray:
         """Return where the middle of a field is under the cloth: (worlds, x, y) bool, from -x and -y on."""
-        seen = render_masks(self._world, self._camera, self._cloth, without=self._without).numpy()
-        return seen.reshape(-1, FIELDS, FIELDS)[:, ::-1].swapaxes(1, 2)
+        return self._seen().numpy()[:, ::-1].swapaxes(1, 2)
 
     def area(self) -> np.ndarray:
         """Return the area that the cloth covers, (worlds,) [m2]."""
-        return self.covered().sum(axis=(1, 2)) * (WIDTH / FIELDS) ** 2
+        return count_covered(self._seen()) * (WIDTH / FIELDS) ** 2
 
     def covered_at(self, places: np.ndarray) -> np.ndarray:
         """Return where places (worlds, k, 2) [m] are under the cloth, to the nearest field: (worlds, k) bool."""
         fields = np.clip(np.floor((places / WIDTH + 0.5) * FIELDS).astype(int), 0, FIELDS - 1)
-        return self.covered()[np.arange(len(places))[:, None], fields[..., 0], fields[..., 1]]
+        return look_up_covered(self._seen(), np.stack([FIELDS - 1 - fields[..., 1], fields[..., 0]], axis=-1))
+
+    def _seen(self) -> wp.array:
+        """Return the picture on the device, (worlds, rows from +y on, columns from -x on) bool."""
+        masks = render_masks(self._world, self._camera, self._cloth, without=self._without)
+        return masks.reshape((-1, FIELDS, FIELDS))

@@ -40,7 +40,7 @@ def contact_sheet(result: PickResult) -> Figure:
     figure.suptitle(
         f"picked at {_name(result, result.best)}, confidence {result.confidence:.2f}; cloth "
         f"{result.rectangle.long_m * 100:.1f} x {result.rectangle.short_m * 100:.1f} cm; best future turned by "
-        f"{np.degrees(result.turn):.0f} degrees\nbelow: real outline orange, imagined blue, both pale;  "
+        f"{np.degrees(result.turn):.0f} degrees\nbelow: seen outline orange, imagined blue, both pale;  "
         f"rank: {'position' if result.by_position else '(i, j)'}  {result.score_name} | eq. (1)",
         fontsize=9, y=1.0 - 0.08 / height, va="top",
     )  # fmt: skip

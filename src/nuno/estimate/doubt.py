@@ -1,7 +1,7 @@
 """Doubt of evidence: a chance fit, a best future that fits badly, and warnings make an answer less sure.
 
 Evidence (`nuno.estimate.ranking`) takes it that one of the guesses is right up to chance. Where it is not, three things
-tell so. The answer may hang on a single future: so it is asked for again without the best guess of every candidate, and
+tell so. The answer may depend on a single future: so it is asked for again without each candidate's best guess, and
 the mean of both probabilities counts. Even the best future may fit badly: the hand, the camera, the table or the cloth
 are not what they are taken for. And a warning may say that what was seen is odd. The last two mix the probabilities
 with broad ones, whose logarithms are a fraction of the evidence's.

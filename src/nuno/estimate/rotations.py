@@ -1,9 +1,10 @@
 """Turns of a picked cloth about the vertical through the hand, which no simulation foretells.
 
-How far a cloth turns on the table while it is dragged, and in the air below two fingers, hangs on friction that nobody
-knows: engines that agree on its shape differ by 10 to 30 degrees there. So every future is compared at several turns,
-with a prior on them. A cloth that is turned about the hand's vertical looks as it does to a camera that is turned the
-other way around, so no vertex is moved for it; what stands still, the table, is drawn from where the camera is.
+How far a cloth turns on the table while it is dragged, and in the air below two fingers, depends on friction that
+nobody knows: engines that agree on its shape differ by 10 to 30 degrees there. So every future is compared at several
+turns, with a prior on them. A cloth that is turned about the hand's vertical looks as it does to a camera that is
+turned the other way around, so no vertex is moved for it; what stands still, the table, is drawn from where the
+camera is.
 """
 
 from __future__ import annotations

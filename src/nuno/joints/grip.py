@@ -288,7 +288,7 @@ def make_grip(
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
     limits = None if max_force is None else force_limit(max_force, worlds)
-    present = body.vertices
+    present = body.surface()[0]
     vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
     positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
     rows = np.arange(worlds)[:, None]

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from nuno.errors import InvalidInputError
-from nuno.kernels.kernel_modules import KernelModule, kernel_modules
+from nuno.kernels.kernel_modules import WHEN_NAMED, KernelModule, kernel_modules
 from nuno.kernels.struct_references import pass_structs_by_reference
 
 
@@ -29,7 +29,7 @@ def compile_kernels(
     Args:
         device: "cpu", for this machine's processor, or "cuda".
         arch: CUDA's architecture, "sm_90" for an H100 or H200; None: that of this machine's devices.
-        only: Names of Warp modules; None: all that the device runs.
+        only: Names of Warp modules; None: all that the device runs by itself.
         jobs: How many are compiled at once; None: as many as there are cores.
         report: Called with each module's name and seconds as soon as it is there.
 
@@ -46,7 +46,9 @@ def compile_kernels(
     if device == "cpu" and arch is not None:
         raise InvalidInputError(f"an architecture is CUDA's: arch={arch!r} needs the device cuda")
     chosen = [module for module in kernel_modules() if device in module.devices]
-    if only is not None:
+    if only is None:
+        chosen = [module for module in chosen if module.name not in WHEN_NAMED]
+    else:
         if unknown := sorted(set(only) - {module.name for module in chosen}):
             raise InvalidInputError(f"there is no module of kernels {unknown[0]!r} for {device}")
         chosen = [module for module in chosen if module.name in only]

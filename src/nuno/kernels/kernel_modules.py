@@ -25,12 +25,18 @@ CPU_ONLY = frozenset(
 )  # fmt: skip
 """Worlds by a thread, and in lanes of SIMD registers."""
 
+WHEN_NAMED = frozenset(
+    f"nuno.plans.{name}" for name in ("run_worlds", "run_double_worlds", "run_soft_worlds", "run_soft_double_worlds")
+)
+"""A world by a thread on the CPU: no world takes that plan by itself, so these are compiled ahead only by name."""
+
 CUDA_ONLY = tuple(
     f"nuno.{name}"
     for name in (
         "plans.run_blocks", "plans.run_double_blocks", "plans.run_grid", "plans.run_double_grid",
         "plans.run_soft_blocks", "plans.run_soft_few", "plans.run_soft_double_blocks", "plans.run_soft_grid",
         "plans.run_soft_double_grid", "rigid.run_rigid_group", "state.finite",
+        "envs.covered_fields",
     )
 )  # fmt: skip
 """Beginnings of names: worlds by blocks and by the whole device. The CPU runs some of them, when asked to."""

@@ -3,7 +3,7 @@
 Each is there twice, with and without what meets sharp shapes: beside that the elastic clusters, which take all
 registers that a thread may have, would lose some of theirs whether anything sharp is near or not. Those without go on
 until something sharp is near at the start of a frame; those with it, launched behind them, do the rest. Which one does
-a substep of a world hangs on that world alone.
+a substep of a world depends on that world alone.
 """
 
 from typing import Any

@@ -119,7 +119,10 @@ class ParticleState:
 
     def positions(self) -> np.ndarray:
         """(worlds, n, 3) float64, a copy [m]."""
-        return self.local_positions() + self.origin[:, None]
+        places = np.empty((self.world_count, self.particle_count, 3))
+        for k, array in enumerate(self.doubles.arrays):
+            np.add(self.download(array, self.particle_count), self.origin[:, k : k + 1], out=places[..., k])
+        return places
 
     def local_positions(self) -> np.ndarray:
         """(worlds, n, 3) relative to each world's ``origin`` [m]: the solver's own digits, float32 or float64."""

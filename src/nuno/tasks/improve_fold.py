@@ -29,7 +29,7 @@ STEP = 0.04
 
 DOUBTS = ((0.0, 1.0), (0.0015, 0.7), (-0.0015, 1.4))
 """Every guess is imagined so often: as it is, and with ways that end so far aside [m] of a cloth so much stiffer. How a
-crease falls may hang on less than hands and materials are known to; such folds are not wanted."""
+crease falls may depend on less than hands and materials are known to; such folds are not wanted."""
 
 
 @dataclass(frozen=True, eq=False)

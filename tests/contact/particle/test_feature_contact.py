@@ -254,6 +254,7 @@ def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():
     assert away.max() < reach + 0.5 * 0.02**2 / (2.0 * 0.02)
 
 
+@pytest.mark.long
 @DEVICES
 def test_more_edges_may_touch_than_there_is_room_for_in_a_queue(device):
     """Geometry: the cloth's edges stay half a thickness from all of four bars, more than are queued at once on CUDA."""

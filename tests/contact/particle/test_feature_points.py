@@ -1,6 +1,7 @@
 """Where an edge is nearest to a capsule's axis."""
 
 import numpy as np
+import pytest
 import warp as wp
 
 from nuno.contact.particle.feature_points import past_axis
@@ -16,6 +17,7 @@ def parts(start: wp.array(dtype=wp.vec3), way: wp.array(dtype=wp.vec3), half: fl
     found[k] = past_axis(vec3(a[0], a[1], a[2]), vec3(w[0], w[1], w[2]), half)
 
 
+@pytest.mark.long
 def test_an_edge_is_nowhere_nearer_to_an_axis_than_where_it_is_found():
     """Definition: of 2,001 points along each of 2,000 edges none is nearer, beside the axis, beyond it and across."""
     rng = np.random.default_rng(3)

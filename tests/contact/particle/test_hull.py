@@ -78,6 +78,7 @@ def test_a_soft_block_rubs_on_a_hull_as_on_a_box(angle):
     assert moved["hull"] < 1e-3 if angle < 25.0 else 0.07 < moved["hull"] < 0.1
 
 
+@pytest.mark.long
 def test_a_cloth_on_a_moving_hull_is_that_on_a_mesh():
     """Another method: a mesh of the same triangles, which is searched."""
     # so round, and met by cells so small, that a hull's edges and corners are left to the vertices, as a mesh's are
@@ -98,6 +99,7 @@ def test_a_cloth_on_a_moving_hull_is_that_on_a_mesh():
     assert ends["hull"][:, 2].max() > 0.1  # it has not fallen off
 
 
+@pytest.mark.long
 def test_a_world_on_a_hull_is_what_it_is_alone():
     """Promise of the design: world k of a batch gives, bit for bit, what it gives alone."""
     world = nuno.World(device="cpu")

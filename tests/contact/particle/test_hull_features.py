@@ -138,6 +138,7 @@ def crowded(count):
     return world.imagine(count) if count > 1 else world
 
 
+@pytest.mark.long
 def test_a_world_of_a_batch_meets_hulls_as_alone():
     """Promise: bit for bit, in 18 worlds (more than the lanes of a vector), of which some meet no edge."""
     shift = np.linspace(0.0, 0.6, 18)

@@ -1,6 +1,7 @@
 """Where an edge is nearest to a convex hull, beside formulas of two lines and beside trying all of its points."""
 
 import numpy as np
+import pytest
 import trimesh
 import warp as wp
 
@@ -65,6 +66,7 @@ def random_edges(rng, hull, count=400):
     return through - rng.uniform(0.2, 0.8, (count, 1)) * way, way
 
 
+@pytest.mark.long
 def test_an_edge_meets_a_ridge_at_the_distance_of_two_lines():
     """Formula: at an edge's lowest point two planes meet in a line; the gap is its distance from the edge's line."""
     rng = np.random.default_rng(5)

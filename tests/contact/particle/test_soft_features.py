@@ -50,7 +50,7 @@ def rails(friction=0.5):
 
 
 @DEVICES
-@pytest.mark.parametrize("cells", [4, 8])
+@pytest.mark.parametrize("cells", [4, pytest.param(8, marks=pytest.mark.long)])
 def test_thin_plates_bear_a_soft_cube_on_their_edges(cells, device):
     """Geometry and balance: plates between rows of vertices stay outside of all of the surface, and bear its weight."""
     plates = rails()
@@ -187,7 +187,7 @@ def crowded(count, substeps=None, device="cpu"):
 
 
 @DEVICES
-@pytest.mark.parametrize("substeps", [16, 30])
+@pytest.mark.parametrize("substeps", [16, pytest.param(30, marks=pytest.mark.long)])
 def test_a_world_of_a_batch_meets_edges_as_alone(substeps, device):
     """Promise: bit for bit, in 18 worlds (more than the lanes of a vector), of which some meet no edge."""
     shift = np.linspace(0.0, 0.6, 18)
@@ -208,6 +208,7 @@ def test_a_world_of_a_batch_meets_edges_as_alone(substeps, device):
         np.testing.assert_array_equal(batch[k], run(k))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("substeps", [20, 40])
 def test_all_plans_meet_edges_alike(substeps):
     """One source: sixteen particles at a time and one by one give the same bits, with floats and with doubles."""

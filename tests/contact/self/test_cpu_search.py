@@ -60,7 +60,9 @@ def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) ->
     return rows, float(made.scalars[-1, THICKNESS]) + margin
 
 
-@pytest.mark.parametrize("thickness", [0.002, 0.004, 0.01])
+@pytest.mark.parametrize(
+    "thickness", [pytest.param(0.002, marks=pytest.mark.long), 0.004, pytest.param(0.01, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("shape", shapes())
 def test_nothing_near_is_passed_over(shape: str, thickness: float) -> None:
     """Brute force finds no pair within the thickness and the margin that is not listed, creases included."""
@@ -89,8 +91,9 @@ def test_flat_cloth_is_passed_over() -> None:
     assert [len(r) for r in rows] == [0, 0]
 
 
+@pytest.mark.parametrize("alone", ["vector", pytest.param("fused", marks=pytest.mark.long)])
 @pytest.mark.parametrize("shape", ["rolled 1.5", "folded 3", "crumpled 0.25"])
-def test_order_depends_on_the_world_alone(shape: str) -> None:
+def test_order_depends_on_the_world_alone(shape: str, alone: str) -> None:
     """Invariant: pairs of a short margin come in the same order with a long one, among other worlds or alone."""
     every = shapes()
     x = every[shape]
@@ -98,8 +101,7 @@ def test_order_depends_on_the_world_alone(shape: str) -> None:
     assert len(short[0]) > 3 and len(short[1]) > 3
     batch = np.stack([every["crumpled 0.5"], every["flat"], x])
     for other, _ in (
-        listed(x[None], "vector", 0.004, 0.008),
-        listed(x[None], "fused", 0.004, 0.003),
+        listed(x[None], alone, 0.004, 0.008),
         listed(batch, "fused", 0.004, 0.003),
         listed(batch, "fused", 0.004, 0.008),
     ):

@@ -55,7 +55,7 @@ def lifted(picks: list[int], seconds: float, margin: float | None = None, **mate
         pytest.param({"thickness": 0.002}, marks=pytest.mark.long),
         pytest.param({"thickness": 0.006}, marks=pytest.mark.long),
         pytest.param({"bending_rigidity": 2e-5}, marks=pytest.mark.long),
-        {"bending_rigidity": 2e-3},
+        pytest.param({"bending_rigidity": 2e-3}, marks=pytest.mark.long),
     ],
     ids=str,
 )
@@ -86,7 +86,7 @@ def near_edges(x: np.ndarray, edges: np.ndarray, far: float) -> set[tuple[tuple[
     return {tuple(sorted((tuple(sorted(a)), tuple(sorted(b))))) for a, b in pairs if not set(a) & set(b)}
 
 
-@pytest.mark.parametrize("worlds", [1, 3])
+@pytest.mark.parametrize("worlds", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_a_substep_solves_all_pairs_in_reach(worlds: int) -> None:
     """Brute force over where the last substep began finds no pair within 1.1 thicknesses that it did not look at.
 

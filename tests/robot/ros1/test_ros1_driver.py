@@ -150,6 +150,7 @@ def test_a_python_without_ros_is_named(tmp_path):
         Ros1Driver("ws://127.0.0.1:1", str(tmp_path / "none"))
 
 
+@pytest.mark.long
 @needs_ros1
 def test_the_command(master, still_g1):
     """Promise: `nuno serve --ros1` shows the robot on the master; an interrupt ends it, and the node with it."""

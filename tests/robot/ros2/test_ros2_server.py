@@ -223,6 +223,7 @@ def test_another_layout_is_not_heard(node, plain):
     hear(node.listen("rt/joint_states", JointState))  # it goes on
 
 
+@pytest.mark.long
 def test_the_command(plain):
     """Promise: `nuno serve --ros2` is heard in another process; an interrupt ends it."""
     command = [sys.executable, "-m", "nuno", "serve", "g1", "--ros2", "--domain", str(DOMAIN), "--device", "cpu"]
