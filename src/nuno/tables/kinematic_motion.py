@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from nuno.world.world import World
 
 
+SAME_INSTANT = 1e-8
+"""[s] Times that are no farther apart are one."""
+
+
 @dataclass(frozen=True, eq=False)
 class PathBatch:
     """Paths of many bodies with the same keys in time, such as a robot's links; they are worked out together.
@@ -52,8 +56,25 @@ class PathBatch:
             made.append(path)
         return made
 
+    def on_device(self, device: Any) -> tuple[Any, Any]:
+        """Return positions and quaternions as Warp's arrays (n, worlds or 1, k) of vectors."""
+        import warp as wp
+
+        positions, quaternions = (
+            np.ascontiguousarray(part if part.ndim == 4 else part[:, None])
+            for part in (self.positions, self.quaternions)
+        )
+        return (
+            wp.array(positions, dtype=wp.vec3d, device=device, copy=False),
+            wp.array(quaternions, dtype=wp.vec4d, device=device, copy=False),
+        )
+
     def at(self, between: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Pose:
         """Return positions and quaternions (n, ..., 3) and (n, ..., 4), at what ``Path.keys_around`` says of times."""
+        first, last, s = between
+        if s.ndim == 0 and s in (0.0, 1.0):  # at a key
+            key = int(first if s == 0.0 else last)
+            return self.positions[..., key, :], self.quaternions[..., key, :]
         alike = self._alike
         if not alike.any():
             return _between(self.positions, self.quaternions, between)
@@ -90,6 +111,48 @@ def _between(positions: np.ndarray, turns: np.ndarray, between: tuple[np.ndarray
     for k, part in enumerate(s):
         turned[..., k, :] = quat.slerp(turns[..., first[k], :], turns[..., last[k], :], part)
     return placed, turned
+
+
+@dataclass(frozen=True, eq=False)
+class BatchMotion:
+    """A path batch in a run.
+
+    Attributes:
+        path_batch: The path batch.
+        path: One of its paths.
+        times: (k,) float [s], of the run.
+    """
+
+    path_batch: PathBatch
+    path: Path
+    times: np.ndarray
+
+    @property
+    def by_frame(self) -> np.ndarray:
+        """(frames, 3, 4) float, for the three instants of a frame the keys around it, the part between, the time [s].
+
+        A frame between two keys is worked out by itself, so that it makes no difference how many a run has.
+        """
+        times = np.stack([self.times[k : k + 3] for k in range(0, len(self.times) - 1, 2)])
+        found = np.stack([*self.path.keys_around(times), times], axis=2)
+        keys = self.path_batch.times
+        first = np.maximum(np.searchsorted(keys, times[:, 0] + SAME_INSTANT, side="right") - 1, 0)
+        first = np.minimum(first, max(len(keys) - 2, 0))
+        last = np.minimum(first + 1, len(keys) - 1)
+        span = np.where(last > first, keys[last] - keys[first], 1.0)
+        share = np.minimum(np.maximum((times - keys[first][:, None]) / span[:, None], 0.0), 1.0)
+        # all of the frame is between two keys, but for rounding
+        whole = (times[:, 2] <= keys[last] + SAME_INSTANT) | (last == len(keys) - 1)
+        for column, own in enumerate((first[:, None], last[:, None], share)):
+            found[:, :, column] = np.where(whole[:, None], own, found[:, :, column])
+        return found
+
+    @cached_property
+    def poses(self) -> dict[str, Pose]:
+        """By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4)."""
+        own = self.path_batch
+        found = own.at(self.path.keys_around(self.times))
+        return {key: (place, turn) for key, place, turn in zip(own.keys, *found, strict=True)}
 
 
 class KinematicGroup:
@@ -194,12 +257,12 @@ class Schedule:
     Attributes:
         times: (k,) float [s].
         alone: By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4).
-        path_batches: Keys of bodies, n each, positions (n, k, 3) and quaternions (n, k, 4), or (n, worlds, k, ...).
+        path_batches: Those of all other bodies.
     """
 
     times: np.ndarray
     alone: dict[str, Pose]
-    path_batches: tuple[tuple[tuple[str, ...], np.ndarray, np.ndarray], ...] = ()
+    path_batches: tuple[BatchMotion, ...] = ()
 
     def frame_at(self, time: float) -> int | None:
         """Return which of ``times`` is the start of the frame at ``time`` [s]; None where the schedule is over."""
@@ -220,8 +283,8 @@ class Schedule:
     def poses(self) -> dict[str, Pose]:
         """Of all bodies, by key, as in ``alone``."""
         found = dict(self.alone)
-        for keys, places, turns in self.path_batches:
-            found |= {key: (place, turn) for key, place, turn in zip(keys, places, turns, strict=True)}
+        for own in self.path_batches:
+            found |= own.poses
         return found
 
 
@@ -240,7 +303,7 @@ def make_schedule(bodies: Iterable[Body], start: float, duration: float, frame: 
     # the same instants, to the bit, whether a span is gone through at once or in pieces
     times = np.round(times, 9)
     path_batches, bodies = path_batches_of(bodies)
-    moved = tuple((own.keys, *own.at(path.keys_around(times))) for own, path in path_batches)
+    moved = tuple(BatchMotion(own, path, times) for own, path in path_batches)
     if not bodies:
         return Schedule(times, {}, moved)
     kinematic = {leader.key: leader for body in bodies if (leader := _followed_by(body)) is not None}
