@@ -7,7 +7,8 @@ import nuno
 from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE
 from nuno.shapes.shape import Hull
 from nuno.tables.colliders import Colliders
-from nuno.tables.kinematic_motion import KinematicGroup, PathBatch, make_schedule
+from nuno.tables.kinematic_motion import make_schedule
+from nuno.tables.path_batch import KinematicGroup, PathBatch
 
 FRAME = 1 / 60
 

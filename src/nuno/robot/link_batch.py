@@ -9,7 +9,7 @@ import numpy as np
 
 from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays
-from nuno.tables.kinematic_motion import KinematicGroup
+from nuno.tables.path_batch import KinematicGroup
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body

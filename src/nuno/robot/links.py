@@ -13,7 +13,7 @@ from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays, quaternions_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
-from nuno.tables.kinematic_motion import KinematicGroup
+from nuno.tables.path_batch import KinematicGroup
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
 from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
-from nuno.tables.kinematic_motion import BatchMotion, Schedule, is_kinematic
+from nuno.tables.kinematic_motion import Schedule, is_kinematic
+from nuno.tables.path_batch import BatchMotion
 from nuno.tables.pose_keys import write_pose_keys
 
 if TYPE_CHECKING:
