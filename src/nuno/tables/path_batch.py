@@ -124,32 +124,27 @@ class BatchMotion:
     path: Path
     times: np.ndarray
 
+    @cached_property
+    def between(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What ``Path.keys_around`` says of the run's times; what rounding alone keeps from a key is at the key.
+
+        So it makes no difference how many frames a run has.
+        """
+        keys = self.path_batch.times
+        nearest = keys[np.abs(keys[:, None] - self.times).argmin(axis=0)]
+        return self.path.keys_around(np.where(np.abs(nearest - self.times) < SAME_INSTANT, nearest, self.times))
+
     @property
     def by_frame(self) -> np.ndarray:
-        """(frames, 3, 4) float, for the three instants of a frame the keys around it, the part between, the time [s].
-
-        A frame between two keys is worked out by itself, so that it makes no difference how many a run has.
-        """
-        times = np.stack([self.times[k : k + 3] for k in range(0, len(self.times) - 1, 2)])
-        found = np.stack([*self.path.keys_around(times), times], axis=2)
-        keys = self.path_batch.times
-        first = np.maximum(np.searchsorted(keys, times[:, 0] + SAME_INSTANT, side="right") - 1, 0)
-        first = np.minimum(first, max(len(keys) - 2, 0))
-        last = np.minimum(first + 1, len(keys) - 1)
-        span = np.where(last > first, keys[last] - keys[first], 1.0)
-        share = np.minimum(np.maximum((times - keys[first][:, None]) / span[:, None], 0.0), 1.0)
-        # all of the frame is between two keys, but for rounding
-        whole = (times[:, 2] <= keys[last] + SAME_INSTANT) | (last == len(keys) - 1)
-        for column, own in enumerate((first[:, None], last[:, None], share)):
-            found[:, :, column] = np.where(whole[:, None], own, found[:, :, column])
-        return found
+        """(frames, 3, 4) float: of each instant of a frame the keys around it, the part between them, the time [s]."""
+        found = np.stack([*self.between, self.times], axis=1)
+        return np.stack([found[k : k + 3] for k in range(0, len(found) - 1, 2)])
 
     @cached_property
     def poses(self) -> dict[str, Pose]:
         """By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4)."""
-        own = self.path_batch
-        found = own.at(self.path.keys_around(self.times))
-        return {key: (place, turn) for key, place, turn in zip(own.keys, *found, strict=True)}
+        keys, found = self.path_batch.keys, self.path_batch.at(self.between)
+        return {key: (place, turn) for key, place, turn in zip(keys, *found, strict=True)}
 
 
 class KinematicGroup:

@@ -102,10 +102,7 @@ class Running(Advancing):
 
     def _frames_ahead(self, ends: list[float]) -> int:
         """Return how many of the frames that end at ``ends`` [s] drivers may be asked for at once."""
-        dynamics = [body._dynamics for body in self._bodies.values() if body._dynamics is not None]
-        # what follows a driven body is told where that is frame by frame
-        follows = any(own.is_rigid or any(grip.target is not None for grip in own.grips) for own in dynamics)
-        count = 1 if follows or not self._engine.is_builtin else len(ends)
+        count = len(ends) if self._engine.is_builtin else 1
         for driver in self.drivers:
             ahead = getattr(driver, "frames_ahead", None)
             count = 1 if ahead is None or count == 1 else min(count, ahead(self._time, ends[:count]))
