@@ -59,3 +59,33 @@ def test_different_ways_are_those_of_robots_alone():
         for body in (*robot.links.bodies, towel):
             np.testing.assert_array_equal(futures.find(body.name).vertices[k], body.vertices)
     assert np.abs(futures.robot.state()[1].q[2] - futures.robot.state()[0].q[2]) > 1e-3  # the base went down
+
+
+def test_many_frames_at_once_are_those_one_by_one():
+    """Two copies of which one's arm comes to rest earlier: run at once, and stepped; links and joints to the bit.
+
+    In the first frame the commands are looked at, and one takes up another piece as its way ends.
+    """
+    world = nuno.World(device="cpu")
+    world.attach(world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=(3.0, 0.0, 1.0))))
+    nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    found = []
+    for at_once in (True, False):
+        futures = world.imagine(2)
+        futures.robot.angle_vector({"arm_left_4_joint": [-0.6, -0.5]}, 0.1)
+        futures.robot.angle_vector({"arm_left_4_joint": [-0.4, -0.6], "arm_right_4_joint": [-0.6, -0.5]}, 0.15)
+        counted, begin = [], futures.robot.begin_frame
+        futures.robot.begin_frame = lambda start, end, own=counted, begin=begin: (own.append(end), begin(start, end))
+        if at_once:
+            futures.run(0.3)
+        else:
+            for _ in range(18):
+                futures.step()
+        places = [body._position for body in futures.bodies] + [body._quaternion for body in futures.bodies]
+        states = futures.robot.state()
+        found.append((len(counted), places, [state.q for state in states], [state.v for state in states], futures.time))
+    assert found[0][0] < 8 and found[1][0] == 18
+    for k in (1, 2, 3):
+        for together, alone in zip(found[0][k], found[1][k], strict=True):
+            np.testing.assert_array_equal(together, alone)
+    assert found[0][4] == found[1][4]

@@ -3,7 +3,8 @@
 import numpy as np
 
 import nuno
-from nuno.tables.kinematic_motion import KinematicGroup, PathBatch, arrive, make_schedule, path_batches_of
+from nuno.tables.kinematic_motion import arrive, make_schedule, path_batches_of
+from nuno.tables.path_batch import KinematicGroup, PathBatch
 
 
 def convoy_of(bodies, seed=0):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -166,17 +166,27 @@ class ImaginedRobot:
 
     # What the world asks of it
 
+    def frames_ahead(self, start: float, ends: Sequence[float]) -> int:
+        """Return how many of the frames that end at ``ends`` [s] may be begun at once."""
+        if not self._is_whole():
+            return len(ends)
+        return 1 if self.balance is not None or self._servo is not None else self._together.look_ahead(start, ends)
+
     def begin_frame(self, start: float, end: float) -> None:
-        """Set the motors for a frame, or send the links on their way."""
+        """Set the motors for a frame, or send the links on their way; in all frames that were looked ahead to."""
         if not self._is_whole():
             return
         span, self._before = end - start, list(self._states)
         servo = None if self.balance is not None or self._servo is None else self._serve
         if self.balance is None:
-            aims, angles = self._together.begin(end, span, servo)
+            found = self._together.begin_ahead(start, end)
+            if found is None:
+                aims, angles = self._together.begin(end, span, servo)
+                found = aims, np.array([end]), np.array([[aim.q for aim in aims]]), angles[None]
+            aims, *frames = found
             if span > 0.0:
-                if not all(np.array_equal(a.q, b.q) for a, b in zip(aims, self._states, strict=True)):
-                    self._batch.lead(start, end, [aim.q for aim in aims], angles)
+                if (frames[1] != np.array([state.q for state in self._states])).any():
+                    self._batch.lead(start, *frames)
                 self._states = list(aims)
             return
         aims = [own.begin(end, span, servo) for own in self._motions]

@@ -9,7 +9,7 @@ import numpy as np
 
 from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays
-from nuno.tables.kinematic_motion import KinematicGroup
+from nuno.tables.path_batch import KinematicGroup
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class LinkBatch:
     """The links of copies of a robot, one in each world of a batch.
 
-    A frame is one path batch of all links in all worlds. Each link goes, to the bit, as that of a robot alone.
+    Frames are one path batch of all links in all worlds. Each link goes, to the bit, as that of a robot alone.
 
     Args:
         links: Those of the robot itself.
@@ -35,31 +35,44 @@ class LinkBatch:
         self._data = self._model.createData()
         self._axes, self._origins = placement_arrays(self._data.oMi.tolist())
 
-    def lead(self, start: float, end: float, configurations: Sequence[np.ndarray], angles: np.ndarray) -> None:
-        """Send the links to where the robots are at the end of a frame, on a path for each world.
+    def lead(self, start: float, ends: np.ndarray, configurations: np.ndarray, angles: np.ndarray) -> None:
+        """Send the links to where the robots are at the ends of frames, on a path for each world.
 
         Args:
-            start: When the frame begins [s], now.
-            end: When it ends [s].
-            configurations: Pinocchio's (nq,), of each world, at the end.
-            angles: (worlds, dof) of the joints there.
+            start: When the first frame begins [s], now.
+            ends: (k,) [s], when each ends.
+            configurations: Pinocchio's (k, worlds, nq) at the ends.
+            angles: (k, worlds, dof) of the joints there.
         """
-        worlds, count = len(angles), len(self._bodies)
+        (frames, worlds), count = angles.shape[:2], len(self._bodies)
         # worlds under the same commands are in the same posture: one of them says where all their links are
         numbers: dict[bytes, int] = {}
-        which = [numbers.setdefault(q.tobytes(), len(numbers)) for q in configurations]
-        firsts = [which.index(k) for k in range(len(numbers))]
-        axes, origins = (np.empty((len(firsts), *part.shape)) for part in (self._axes, self._origins))
-        for k, w in enumerate(firsts):
-            pin.forwardKinematics(self._model, self._data, configurations[w])
-            axes[k], origins[k] = self._axes, self._origins
-        aims = self._links.poses_at(axes, origins, angles[firsts])
-        if len(firsts) < worlds:
-            aims = (aims[0][which], aims[1][which])
+        firsts: list[int] = []
+        which = []
+        for k, q in enumerate(configurations.reshape(frames * worlds, -1)):
+            number = numbers.setdefault(q.tobytes(), len(firsts))
+            if number == len(firsts):
+                firsts.append(k)
+            which.append(number)
+        configurations, angles = (part.reshape(frames * worlds, -1)[firsts] for part in (configurations, angles))
+        parts = []
+        for k in range(0, len(firsts), worlds):
+            parts.append(self._poses(configurations[k : k + worlds], angles[k : k + worlds]))
+        aims = [np.concatenate(part) for part in zip(*parts, strict=True)]
         begins = self._group.arrived(self._bodies, start, (worlds,) if worlds > 1 else ())
         keys = []
         for begin, aim in zip(begins, aims, strict=True):
-            both = np.empty((count, worlds, 2, aim.shape[-1]))
-            both[:, :, 0], both[:, :, 1] = begin.reshape(count, -1, aim.shape[-1]), aim.swapaxes(0, 1)
-            keys.append(both if worlds > 1 else both[:, 0])
-        self._group.lead(self._bodies, self._world, np.array([start, end]), keys[0], keys[1])
+            every = np.empty((count, worlds, frames + 1, aim.shape[-1]))
+            every[:, :, 0] = begin.reshape(count, -1, aim.shape[-1])
+            found = aim if len(firsts) == len(which) else aim[which]
+            every[:, :, 1:] = found.reshape(frames, worlds, count, -1).transpose(2, 1, 0, 3)
+            keys.append(every if worlds > 1 else every[:, 0])
+        self._group.lead(self._bodies, self._world, np.array([start, *ends]), keys[0], keys[1])
+
+    def _poses(self, configurations: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the links are in n configurations: (n, links, 3) [m] and (n, links, 4)."""
+        axes, origins = (np.empty((len(angles), *part.shape)) for part in (self._axes, self._origins))
+        for k, q in enumerate(configurations):
+            pin.forwardKinematics(self._model, self._data, q)
+            axes[k], origins[k] = self._axes, self._origins
+        return self._links.poses_at(axes, origins, angles)

@@ -13,7 +13,7 @@ from nuno.robot.pinocchio import pin
 from nuno.robot.spatial_arrays import placement_arrays, quaternions_of
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose
-from nuno.tables.kinematic_motion import KinematicGroup
+from nuno.tables.path_batch import KinematicGroup
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Links:
             Positions (worlds, n, 3) [m] and quaternions (worlds, n, 4).
         """
         worlds, joints = len(axes), self._rows
-        if self._turned_by_all.shape[0] != worlds * len(joints):
+        if len(self._turned_by_all) < worlds * len(joints):
             self._turned_by_all = np.tile(self._turned_by, (worlds, 1, 1))
         offsets = np.broadcast_to(self.finger_bodies.offset(self._offsets, angles), (worlds, len(joints), 3))
         # one long list, of matrices that lie column by column as Pinocchio's do: einsum rounds others in another way
@@ -121,7 +121,8 @@ class Links:
             for part in (np.swapaxes(axes, -1, -2), origins, quaternions_of(axes)[..., [3, 0, 1, 2]])
         )
         own_axes = np.swapaxes(np.ascontiguousarray(by_column), -1, -2)
-        places, turned = self._placed(own_axes, own_origins, turns, offsets.reshape(-1, 3), self._turned_by_all)
+        turned_by = self._turned_by_all[: len(own_origins)]
+        places, turned = self._placed(own_axes, own_origins, turns, offsets.reshape(-1, 3), turned_by)
         return places.reshape(worlds, -1, 3), turned.reshape(worlds, -1, 4)
 
     def _placed(

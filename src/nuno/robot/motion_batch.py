@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +16,25 @@ if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid
     from nuno.robot.motion_guard import MotionGuard
     from nuno.robot.wanted_motion import Servo, WantedMotion
+
+
+@dataclass(frozen=True, eq=False)
+class FramesAhead:
+    """Frames that were worked out ahead.
+
+    Attributes:
+        start: When the first begins [s].
+        ends: When each ends [s].
+        configurations: (n, nq) of the copies, at the end of each.
+        motions: Velocities and accelerations (2, n, nv), likewise.
+        joints: What is to become of the joints' clock, motion and desired motion, likewise.
+    """
+
+    start: float
+    ends: list[float] = field(default_factory=list)
+    configurations: list[np.ndarray] = field(default_factory=list)
+    motions: list[np.ndarray] = field(default_factory=list)
+    joints: list[tuple[np.ndarray, ...]] = field(default_factory=list)
 
 
 class MotionBatch:
@@ -35,6 +56,59 @@ class MotionBatch:
         self._aims: list[RobotState] = []
         self._asked: list[int] = []
         self._pending: tuple[Any, ...] = ()
+        self._ahead = FramesAhead(0.0)
+
+    def look_ahead(self, start: float, ends: Sequence[float]) -> int:
+        """Return how many frames can be begun at once, the first at ``start`` and each up to its end [s]; one at least.
+
+        Those are worked out in which no copy must be asked.
+        """
+        self._ahead = ahead = FramesAhead(start)
+        joints, everyone = self._prepared(), np.ones(len(self._motions), dtype=bool)
+        kept = joints.clock.copy(), joints.motion, joints.desired
+        configurations = np.array([aim.q for aim in self._aims])
+        motions = np.array([[aim.v for aim in self._aims], [aim.a for aim in self._aims]])
+        pairs = list(zip(self._guards, self._motions, joints.clock.tolist(), strict=True))
+        if any(guard.is_due(own, clock, ends[0] - start) for guard, own, clock in pairs):
+            return 1
+        quiet = np.array([guard.quiet_until(own) for guard, own, _ in pairs])
+        for before, end in pairwise((start, *ends)):
+            span = end - before
+            motion, desired, rests = joints.step(span)
+            due = self._are_due(span, motion) | (joints.clock + span > quiet)
+            if due.any():
+                break
+            moves, before_it = ~rests, configurations
+            configurations, motions = before_it.copy(), motions.copy()
+            configurations[moves] = self._robot.configuration_of(motion[0, moves], before_it[moves, :7])
+            motions[:, moves, :6], motions[:, moves, 6:] = 0.0, motion[1:, moves]
+            joints.take(everyone, span, motion, desired)
+            ahead.ends.append(end)
+            ahead.configurations.append(configurations)
+            ahead.motions.append(motions)
+            ahead.joints.append((joints.clock.copy(), joints.motion, joints.desired))
+        joints.clock, joints.motion, joints.desired = kept
+        return max(len(ahead.ends), 1)
+
+    def begin_ahead(
+        self, start: float, end: float
+    ) -> tuple[list[RobotState], np.ndarray, np.ndarray, np.ndarray] | None:
+        """Return what was worked out ahead up to a time ``end`` [s], if it was: ``end`` of this class takes it.
+
+        Returns:
+            How the copies are to move then, the frames' ends (k,) [s], and the copies' configurations (k, n, nq) and
+            joints (k, n, m) at those.
+        """
+        ahead = self._ahead
+        self._ahead = FramesAhead(0.0)
+        if ahead.start != start or end not in ahead.ends:
+            return None
+        count = ahead.ends.index(end) + 1
+        configurations = np.stack(ahead.configurations[:count])
+        aims = [RobotState(end, *own) for own in zip(configurations[-1], *ahead.motions[count - 1], strict=True)]
+        self._asked, self._pending = [], (aims, *ahead.joints[count - 1])
+        angles = np.stack([motion[0] for _, motion, _ in ahead.joints[:count]])
+        return aims, np.array(ahead.ends[:count]), configurations, angles
 
     def begin(self, end: float, span: float, servo: Servo | None) -> tuple[list[RobotState], np.ndarray]:
         """Return how the copies are to move at a time ``end`` [s], ``span`` [s] from now, and their joints (n, m).
@@ -45,13 +119,9 @@ class MotionBatch:
         if span <= 0.0:
             self.bring()
             return [own.begin(end, span) for own in self._motions], self._angles()
-        if self._joints is None:
-            self._joints = JointBatch([own.joints for own in self._motions])
-            self._aims = [own.aim for own in self._motions]
-        joints, legs = self._joints, self._motions[0].leg_rows
+        joints = self._prepared()
         motion, desired, rests = joints.step(span)
-        alone = joints.due(span) | np.array([servo is not None or own.gait.is_walking for own in self._motions])
-        alone |= (motion[0] != joints.motion[0])[:, legs].any(axis=1) | motion[1:, :, legs].any(axis=(0, 2))
+        alone = self._are_due(span, motion) | (servo is not None)
         for w, (guard, own) in enumerate(zip(self._guards, self._motions, strict=True)):
             alone[w] = alone[w] or guard.is_due(own, float(joints.clock[w]), span)
         self._asked, aims, angles = np.flatnonzero(alone).tolist(), list(self._aims), motion[0].copy()
@@ -84,8 +154,11 @@ class MotionBatch:
             if self._joints is not None:
                 self._joints.gather(w)
         if self._joints is not None and self._pending:
-            self._aims = self._pending[0]
-            self._joints.take(*self._pending[1:])
+            self._aims, *found = self._pending
+            if len(found) == 3:  # of frames that were worked out ahead
+                self._joints.clock, self._joints.motion, self._joints.desired = found
+            else:
+                self._joints.take(*found)
         self._asked, self._pending = [], ()
 
     def cancel(self) -> None:
@@ -104,6 +177,21 @@ class MotionBatch:
     def forget(self) -> None:
         """Begin anew with the copies as they are."""
         self._joints, self._pending = None, ()
+
+    def _prepared(self) -> JointBatch:
+        """Return the joints of all copies as arrays."""
+        if self._joints is None:
+            self._joints = JointBatch([own.joints for own in self._motions])
+            self._aims = [own.aim for own in self._motions]
+        return self._joints
+
+    def _are_due(self, span: float, motion: np.ndarray) -> np.ndarray:
+        """Return whose controllers, legs or walk must be asked in a frame of ``span`` [s] with a motion (3, n, m)."""
+        assert self._joints is not None
+        legs = self._motions[0].leg_rows
+        due = self._joints.due(span) | np.array([own.gait.is_walking for own in self._motions])
+        due |= (motion[0] != self._joints.motion[0])[:, legs].any(axis=1) | motion[1:, :, legs].any(axis=(0, 2))
+        return due
 
     def _bring(self, world: int) -> None:
         assert self._joints is not None

@@ -149,6 +149,12 @@ class MotionGuard:
             self._key = key
         return bool(key != self._key or at > self._until or at > self._acts)
 
+    def quiet_until(self, motion: WantedMotion) -> float:
+        """Return up to when ``before_frame`` has nothing to do, by the joints' clock [s], if it is not due now."""
+        if motion.joints.commands == self._rests_since or self.mode == "ignore":
+            return np.inf
+        return min(self._until, self._acts) + SOON
+
     def after_step(self, motion: WantedMotion, before: np.ndarray) -> Collision | None:
         """Return what the links run into in a frame that nobody could look ahead to, None for nothing.
 

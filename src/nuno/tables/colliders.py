@@ -13,15 +13,20 @@ from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE,
 from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
 from nuno.contact.particle.shape_contact import COLUMNS
 from nuno.errors import BodyStateError
+from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.shapes import quaternion as quat
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
 from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
+from nuno.tables.path_batch import BatchMotion
+from nuno.tables.pose_keys import write_pose_keys
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
 
+BLOCK_SIZE = 256
+"""Threads of a CUDA block."""
 UNBOUNDED = 1.0e9
 """[m] Bounding radius of a plane."""
 ENDLESS = 2**30
@@ -66,7 +71,10 @@ class Colliders:
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
         self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
-        self._path_batch: tuple[tuple[str, ...], np.ndarray, np.ndarray] | None = None
+        self._launches = RecordedLaunches(shapes.pose.device, BLOCK_SIZE)
+        self._batch: tuple[Any, ...] | None = (
+            None  # keys of a path batch's bodies, their slots and rows, middles, radii
+        )
 
     @classmethod
     def from_bodies(
@@ -151,32 +159,54 @@ class Colliders:
         frames = len(schedule.times) // 2
         if not 1 <= frames < FRAMES:
             raise ValueError(f"a run may have 1 to {FRAMES - 1} frames, got {frames}")
-        worlds = len(self.shapes.pose) // (len(self.kinematic) * SLOT_SIZE)
-        place = np.empty((worlds, len(self.kinematic), 2 * frames + 1, 3))
-        turn = np.empty((worlds, len(self.kinematic), 2 * frames + 1, 4))
-        slots = self._slots
-        for key, pose in schedule.alone.items():
-            if key in slots:
-                place[:, slots[key]], turn[:, slots[key]] = pose
-        for keys, places, turns in schedule.path_batches:
-            own, rows = self._slots_of(keys)
-            if places.ndim == 4:  # each world has its own
-                place[:, own], turn[:, own] = places[rows].swapaxes(0, 1), turns[rows].swapaxes(0, 1)
-            else:
-                place[:, own], turn[:, own] = places[rows], turns[rows]
-        if self._has_centres:
-            place += quat.rotate(turn, self._centres[:, :, None])
-        shape_speed = 0.0
-        for rows, alike in _alike_or_not(place, turn):
-            which = slice(0, 1) if alike else slice(None)
-            speed = self._write_keys(rows, place[which, rows], turn[which, rows], schedule.times)
-            shape_speed = max(shape_speed, speed)
+        slots = [self._slots[key] for key in schedule.alone if key in self._slots]
+        shape_speed = self._follow_alone(schedule, slots) if slots else 0.0
         if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
             self._shape_speed_on_cpu[0] = shape_speed
         else:
-            self.shapes.pose.assign(self._table.ravel())
+            if slots:
+                self.shapes.pose.assign(self._table.ravel())
             self.shapes.shape_speed.assign(np.array([shape_speed], dtype=np.float32))
+        for motion in schedule.path_batches:
+            self._follow_batch(motion)
         self._times = schedule.times
+
+    def _follow_alone(self, schedule: Schedule, slots: list[int]) -> float:
+        """Take where bodies on paths of their own are, and return how fast any point of them moves [m/s]."""
+        worlds, rows = self._worlds, np.array(slots)
+        place = np.empty((worlds, len(slots), len(schedule.times), 3))
+        turn = np.empty((worlds, len(slots), len(schedule.times), 4))
+        for k, slot in enumerate(slots):
+            place[:, k], turn[:, k] = schedule.alone[self.kinematic[slot].key]
+        if self._has_centres:
+            place += quat.rotate(turn, self._centres[:, rows, None])
+        shape_speed = 0.0
+        for own, alike in _alike_or_not(place, turn):
+            which = slice(0, 1) if alike else slice(None)
+            speed = self._write_keys(rows[own], place[which, own], turn[which, own], schedule.times)
+            shape_speed = max(shape_speed, speed)
+        return shape_speed
+
+    def _follow_batch(self, motion: BatchMotion) -> None:
+        """Take where the bodies of a path batch are."""
+        device, keys = self.shapes.pose.device, motion.path_batch.keys
+        if self._batch is None or self._batch[0] is not keys:
+            pairs = [(self._slots[key], row) for row, key in enumerate(keys) if key in self._slots]
+            fixed = (
+                (np.array(pairs, dtype=np.int32).reshape(-1, 2), int), (self._centres, wp.vec3d),
+                (self._radii, wp.float64),
+            )  # fmt: skip
+            self._batch = keys, *[wp.array(part, dtype=kind, device=device) for part, kind in fixed]
+        rows, centres, radii = self._batch[1:]
+        positions, quaternions = motion.path_batch.on_device(device)
+        between: Any = wp.array(motion.by_frame, dtype=wp.float64, device=device)
+        self._launches.launch(
+            write_pose_keys, (self._worlds, len(rows)),
+            [
+                positions, quaternions, between, rows, centres, radii, len(self.kinematic) * SLOT_SIZE,
+                self.shapes.pose, self.shapes.shape_speed,
+            ],
+        )  # fmt: skip
 
     @cached_property
     def _table(self) -> np.ndarray:
@@ -194,13 +224,9 @@ class Colliders:
     def _slots(self) -> dict[str, int]:
         return {body.key: slot for slot, body in enumerate(self.kinematic)}
 
-    def _slots_of(self, keys: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the slots of those of many bodies that have one, and which they are."""
-        if self._path_batch is None or self._path_batch[0] is not keys:
-            pairs = [(self._slots[key], row) for row, key in enumerate(keys) if key in self._slots]
-            own, rows = np.array(pairs, dtype=int).reshape(-1, 2).T
-            self._path_batch = (keys, own, rows)
-        return self._path_batch[1], self._path_batch[2]
+    @cached_property
+    def _worlds(self) -> int:
+        return len(self.shapes.pose) // (len(self.kinematic) * SLOT_SIZE)
 
     def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> float:
         """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s]."""

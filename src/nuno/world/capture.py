@@ -13,7 +13,7 @@ from nuno.joints.grip import Grip
 from nuno.joints.joint import Joint, JointSpec
 from nuno.shapes.coordinates import compose, invert
 from nuno.shapes.shape import Shape
-from nuno.tables.kinematic_motion import GroupPath
+from nuno.tables.path_batch import GroupPath
 from nuno.world.rigid_layout import bring_static, layout_of, scene_for, settle
 from nuno.world.snapshot import NEUTRAL, BodyRecord, DynamicsRecord, GripRecord, Snapshot
 

@@ -10,6 +10,9 @@ class Driver(Protocol):
 
     One that goes along into imagined worlds has besides ``imagined(futures, world)``, which returns the driver of its
     copies in a batch, and ``take_future(futures, k)``, by which it becomes its copy in world ``k`` of one.
+
+    One that knows many frames ahead has ``frames_ahead(start, ends)``: how many of the frames that end at ``ends`` [s]
+    it can be asked for at once, one at least. ``begin_frame`` may then be for so many of them, or fewer.
     """
 
     def begin_frame(self, start: float, end: float) -> None:

@@ -81,7 +81,7 @@ class Running(Advancing):
         # the poses of what follows a path are laid out for so many frames
         most = CUDA_CHUNK if self._device.startswith("cuda") and not self._kinematic_bodies() else CHUNK
         chunk = min(most, math.gcd(*(watcher.frames for watcher in self._watchers)) or most)
-        chunk = 1 if self.drivers else chunk  # they are asked frame by frame
+        chunk, most = (1, chunk) if self.drivers else (chunk, 1)  # they are asked frame by frame, or for some at once
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
         for piece in with_bar(range(1, pieces + 1), "simulating", progress):
             end = finish if piece == pieces else begin + piece * chunk / self.frame_rate
@@ -90,9 +90,23 @@ class Running(Advancing):
                 last = min(end, self._time + 2.0 * chunk / self.frame_rate)
                 stop = self._pace.next_stop(self._time, last, 1.0 / self.frame_rate)
                 with self._call():
+                    if stop == end and each_frame is None and most > 1:
+                        ends = [
+                            finish if k == pieces else begin + k * chunk / self.frame_rate
+                            for k in range(piece, min(piece + most, pieces + 1))
+                        ]
+                        stop = ends[self._frames_ahead(ends) - 1]
                     if stop - self._time > SOON:
                         self._advance(stop - self._time, stop, each_frame)
             self._raise_background_error()
+
+    def _frames_ahead(self, ends: list[float]) -> int:
+        """Return how many of the frames that end at ``ends`` [s] drivers may be asked for at once."""
+        count = len(ends) if self._engine.is_builtin else 1
+        for driver in self.drivers:
+            ahead = getattr(driver, "frames_ahead", None)
+            count = 1 if ahead is None or count == 1 else min(count, ahead(self._time, ends[:count]))
+        return count
 
     def trace(self, body: Body | str, times: ArrayLike) -> np.ndarray:
         """Run through many instants, and return where a body's vertices are at each.

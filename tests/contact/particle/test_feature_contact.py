@@ -5,6 +5,7 @@ import pytest
 import warp as wp
 
 import nuno
+from nuno.contact.particle.feature_lists import SETS
 from nuno.contact.particle.feature_queue import ROOM
 from nuno.shapes import quaternion as quat
 from nuno.solvers.cloth_solver import ClothSolver
@@ -233,7 +234,9 @@ def awake_at_sharp_shapes(body):
     counts, wake = solver.state.feature_shapes.numpy()[1:], solver.state.feature_due.numpy()
     places = np.concatenate([np.arange(a, a + k) for a, k in zip(starts[:-1], counts, strict=False)])
     listed = solver.state.feature_list.numpy()[places]
-    return np.maximum(listed, -1 - listed)[wake[2 + places] <= wake[0]], len(places)
+    # above its number an element has the sets of shapes that it may touch
+    elements = np.maximum(listed, -1 - listed) & ((1 << SETS) - 1)
+    return elements[wake[2 + places] <= wake[0]], len(places)
 
 
 def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():

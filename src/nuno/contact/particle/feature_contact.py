@@ -16,7 +16,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, FAR, HULL
-from nuno.contact.particle.feature_lists import DUE, EARLIEST, TRAVELLED
+from nuno.contact.particle.feature_lists import DUE, EARLIEST, SETS, TRAVELLED, element_of, names_sets, set_of
 from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
@@ -39,9 +39,11 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
     """Wake what may be near again of the listed elements; the others get a number below zero.
 
     Returns:
-        How many are active of those that the thread looked at, and, if none is, when the first wakes [m].
+        How many are active of those that the thread looked at, if none is when the first wakes [m], and the sets of
+        shapes that they may touch.
     """
     active = int(0)
+    sets = int(0)
     soon = float(FAR)
     for c in range(topo.feature_colour.shape[0] - 1):
         first = topo.feature_colour[c]
@@ -52,11 +54,12 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
             if travelled >= due:
                 t.feature_due[DUE + k] = FAR
                 active += 1
+                sets = sets | (element >> SETS << SETS)
             else:
                 element = -1 - element
                 soon = wp.min(soon, due)
             t.feature_list[k] = element
-    return active, soon
+    return active, soon, sets
 
 
 @wp.func
@@ -74,9 +77,14 @@ def earliest_due(t: Any, soon: float, rank: int, size: int):
 
 @wp.func
 def push_elements(
-    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, travelled: float, queued: int, rank: int, size: int
-):
-    """The elements that are active against one shape: those ``queued``, or all of them in turn where that is 0."""
+    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, own: int, travelled: float, queued: int, rank: int,
+    size: int,
+):  # fmt: skip
+    """The elements that are active against one shape: those ``queued``, or all of them in turn where that is 0.
+
+    Only those that may touch a shape of its set, whose bit is ``own``.
+    """
+    named = names_sets(topo)
     like = full_like(t.x[0], 0.0)
     zero = full_like(like, 0.0)
     one = full_like(like, 1.0)
@@ -107,8 +115,11 @@ def push_elements(
             if queued > 0:
                 # its sign tells of another time
                 element = wp.max(element, -1 - element)
+            element = element_of(element, own, named)
         point_index = rank % points
         more = int(1)
+        if element < 0 and not shares_work(size):
+            more = 0
         while more > 0:
             more = 0
             on = -one
@@ -200,6 +211,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
     active = int(0)
     soon = float(FAR)
     room = int(0)
+    sets = int(0)
     if shares_work(size):
         room = room_of(topo)
     if room > 0:
@@ -209,14 +221,16 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         forget_queue(t, topo, 0, rank, size)
         queued = 0
     if room == 0 or active > room:
-        active, soon = find_active_features(t, topo, travelled, rank, size)
+        active, soon, sets = find_active_features(t, topo, travelled, rank, size)
         if shares_work(size):
             active = int(anyone(active > 0))
     if active > 0:
         soon = travelled
         for k in range(t.feature_shapes[0]):
             s = t.feature_shapes[topo.feature_colour.shape[0] + k]
-            push_elements(t, topo, run, shapes, s, travelled, queued, rank, size)
+            own = set_of(s)
+            if shares_work(size) or (sets & own) != 0 or not names_sets(topo):
+                push_elements(t, topo, run, shapes, s, own, travelled, queued, rank, size)
         if queued > 0:
             forget_queue(t, topo, queued, rank, size)
     elif shares_work(size):

@@ -29,8 +29,14 @@ TRAVELLED, EARLIEST, DUE = wp.constant(0), wp.constant(1), wp.constant(2)
 element wakes, and each, by how far anything has gone then [m]."""
 
 
-MAX_SLACK = wp.constant(100.0)
+MAX_SLACK = wp.constant(1.0)
 """[m] As far as a mark counts."""
+SLACK_STEP = wp.constant(3.2e-5)
+"""[m] Slack is noted in whole numbers of this, of 15 bits."""
+SHAPE_SETS = wp.constant(14)
+"""Sets of shapes that a mark tells apart; those whose numbers differ by a multiple of it are in one."""
+SETS = wp.constant(17)
+"""Bit from which on marks and listed elements have those sets."""
 
 
 @wp.func
@@ -113,8 +119,8 @@ def clear_features(t: Any, topo: Any, rank: int):
 def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, size: int):
     """List the sharp shapes near the cloth, and mark the vertices by which they may touch within the frame.
 
-    By 1 where an edge at the vertex may be touched, by 2 where a triangle may, and by four times how far anything must
-    go before [um].
+    By 1 where an edge at the vertex may be touched, by 2 where a triangle may, by four times how far anything must go
+    before, and by which sets of shapes.
     """
     like = t.x[0]
     clock = int(lane_max(t.notes[CLOCK]))
@@ -151,6 +157,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         t.feature_mark[i] = 0
                 if rank == 0:
                     t.feature_shapes[topo.feature_colour.shape[0] + found] = s
+                own = set_of(s)
                 found = found + 1
                 for i in range(rank, topo.particles, size):
                     p = transposed_mul(r, position(t, i) - centre)
@@ -161,38 +168,72 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         at_once, _point = stands_between(
                             shapes, s, kind, p, vec3(soon, soon, soon), soon, extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
-                        slack = int(1.0e6 * wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK))
+                        slack = int(wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK) / SLACK_STEP)
                         mark = t.feature_mark[i]
+                        sets = (mark >> SETS << SETS) | own
                         if mark != 0:
-                            slack = wp.min(slack, mark >> 2)
+                            slack = wp.min(slack, slack_in(mark))
                         mark = (mark & 3) | 1
                         if anywhere(point):
                             mark = mark | 2
-                        t.feature_mark[i] = mark | slack << 2
+                        t.feature_mark[i] = mark | slack << 2 | sets
     if rank == 0:
         t.feature_shapes[0] = found
         t.feature_due[EARLIEST] = wp.where(found > 0, 0.0, FAR)
 
 
 @wp.func
+def set_of(s: int):
+    """Return the bit of the set that a shape is in."""
+    return 1 << (SETS + s % SHAPE_SETS)
+
+
+@wp.func
+def slack_in(mark: int):
+    """Return the slack in a vertex's mark, in steps."""
+    return (mark >> 2) & ((1 << (SETS - 2)) - 1)
+
+
+@wp.func
+def names_sets(topo: Any):
+    """Return True where listed elements have the sets of shapes that they may touch: there are not too many of them."""
+    return topo.side.shape[0] + topo.face.shape[0] <= 1 << SETS
+
+
+@wp.func
+def element_of(listed: int, sets: int, named: bool):
+    """Return which element is listed; -1 where it sleeps, or touches none of some sets of shapes."""
+    element = listed
+    if named and listed >= 0:
+        element = wp.where((listed & sets) != 0, listed & ((1 << SETS) - 1), -1)
+    return element
+
+
+@wp.func
 def slack_of(t: Any, topo: Any, k: int):
-    """Return the way that anything must go before element k may be touched [um]; below zero for never."""
+    """Return the way that anything must go before element k may be touched, in steps, with the sets of those shapes.
+
+    Below zero for never.
+    """
     edges = topo.side.shape[0]
     mark = int(0)
-    slack = int(1.0e6 * MAX_SLACK)
+    sets = int(0)
+    slack = int(MAX_SLACK / SLACK_STEP)
     if k < edges:
         e = topo.side[k]
         for c in range(2):
             at = t.feature_mark[e[c]]
             mark = mark | (at & 1)
-            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
+            sets = sets | (at >> SETS << SETS)
+            slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
     elif k < edges + topo.face.shape[0]:
         f = topo.face[k - edges]
         for c in range(3):
             at = t.feature_mark[f[c]]
             mark = mark | (at & 2)
-            slack = wp.min(slack, wp.where(at != 0, at >> 2, slack))
-    return wp.where(mark != 0, slack, -1)
+            sets = sets | (at >> SETS << SETS)
+            slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
+    return wp.where(mark != 0, slack | sets, -1)
 
 
 @wp.func
@@ -203,8 +244,8 @@ def note_feature_shape(t: Any, topo: Any, k: int, slack: int):
         while k >= topo.feature_colour[c + 1]:
             c += 1
         place = topo.feature_colour[c] + wp.atomic_add(t.feature_shapes, 1 + c, 1)
-        t.feature_list[place] = k
-        t.feature_due[DUE + place] = 1.0e-6 * float(slack)
+        t.feature_list[place] = wp.where(names_sets(topo), k | (slack >> SETS << SETS), k)
+        t.feature_due[DUE + place] = SLACK_STEP * float(slack & ((1 << SETS) - 1))
 
 
 @wp.func

@@ -267,7 +267,9 @@ def triangle_point(
     gap = zero
     on = size
     if h.kind == HULL:
-        on = minimum(meets_corners(shapes, s, a + o, size, cell), -box_clearance(a + o, around, h.size))
+        on = -box_clearance(a + o, around, h.size)
+        if anywhere(on):
+            on = minimum(on, meets_corners(shapes, s, a + o, size, cell))
         if anywhere(on):
             point, normal = outermost_corner(shapes, s, a, n * (one / sqrt(dot(n, n) + 1.0e-20)), cell)
             on = minimum(on, h.reach + dot(point - a, normal))

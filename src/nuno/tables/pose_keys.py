@@ -1,0 +1,135 @@
+"""Key poses of bodies on one path batch, such as a robot's links in all worlds, written into the contacts' table.
+
+What a kernel does here with some thousand links takes NumPy longer than a small cloth's whole frame.
+"""
+
+import warp as wp
+
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, KEY_SIZE, SLOT_SIZE
+
+BASES = wp.constant(wp.float64(1024.0))
+"""Bases of frames are whole parts of a metre by this."""
+SMALL = wp.constant(wp.float64(1.0e-6))
+"""[rad] Half an angle below which turns are interpolated number by number."""
+
+
+NEAR = wp.constant(wp.float64(0.98))
+"""Cosine of half an angle, 23 degrees."""
+HALFWAY = wp.constant(wp.float64(1.0e-6))
+"""Part of a way by which it is not halfway: turns are then wrong by 1e-9 rad at most."""
+
+
+@wp.func
+def angle_between(a: wp.vec4d, b: wp.vec4d):
+    """The angle between two turns with a . b >= 0 [rad], of near ones up to 1 % too large."""
+    x = wp.float64(0.25) * wp.dot(a - b, a - b)
+    if x < wp.float64(0.01):
+        # 4 asin(c / 2) of the chord c
+        return wp.float64(4.0) * wp.sqrt(x / (wp.float64(1.0) - x))
+    return wp.float64(2.0) * wp.acos(wp.min(wp.dot(a, b), wp.float64(1.0)))
+
+
+@wp.func
+def turn_between(a: wp.vec4d, b: wp.vec4d, part: wp.float64):
+    """The short way from a to b, as `nuno.shapes.quaternion.slerp`."""
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    if part == zero or a == b:
+        return a
+    if part == one:
+        return b
+    d = wp.dot(a, b)
+    if d < zero:
+        b = -b
+    first = one - part
+    second = part
+    # halfway between turns that are near to each other numbers go as angles do
+    if wp.abs(d) < NEAR or wp.abs(part - wp.float64(0.5)) > HALFWAY:
+        angle = wp.acos(wp.min(wp.abs(d), one))
+        if angle >= SMALL:
+            first = wp.sin((one - part) * angle) / wp.sin(angle)
+            second = wp.sin(part * angle) / wp.sin(angle)
+    found = a * first + b * second
+    return found / wp.sqrt(wp.dot(found, found))
+
+
+@wp.func
+def turned(q: wp.vec4d, p: wp.vec3d):
+    """A vector turned by a quaternion (w, x, y, z)."""
+    u = wp.vec3d(q[1], q[2], q[3])
+    t = wp.cross(u, p) * wp.float64(2.0)
+    return p + t * q[0] + wp.cross(u, t)
+
+
+@wp.func
+def write_key(pose: wp.array(dtype=float), frame: int, key: int, place: wp.vec3d, turn: wp.vec4d):
+    """The start, middle or end of a frame whose base is written."""
+    at = frame + 3 + key * KEY_SIZE
+    for c in range(3):
+        pose[at + c] = float(place[c] - wp.float64(pose[frame + c]))
+    for c in range(4):
+        pose[at + 3 + c] = float(turn[c])
+
+
+@wp.kernel(enable_backward=False)
+def write_pose_keys(
+    positions: wp.array3d(dtype=wp.vec3d),
+    quaternions: wp.array3d(dtype=wp.vec4d),
+    between: wp.array3d(dtype=wp.float64),
+    rows: wp.array2d(dtype=int),
+    centres: wp.array2d(dtype=wp.vec3d),
+    radii: wp.array(dtype=wp.float64),
+    stride: int,
+    pose: wp.array(dtype=float),
+    shape_speed: wp.array(dtype=float),
+):
+    """A thread for each world and body: its poses at the start, middle and end of each frame of a run.
+
+    Args:
+        positions: (n, worlds or 1, keys) [m] of the path batch.
+        quaternions: (n, worlds or 1, keys) likewise.
+        between: (frames, 3, 4), for the three instants of a frame the keys before and after, the part between them, and
+            the time [s].
+        rows: (bodies, 2), slots in the table, and rows of the path batch.
+        centres: (worlds or 1, slots) [m], where shapes have their middle in their bodies' frames.
+        radii: (slots,) [m], within which shapes are about their middle.
+        stride: Numbers of a world in the table.
+        pose: The table.
+        shape_speed: (1,), the fastest that a point of any of them moves [m/s], where that is faster than it says.
+    """
+    w, k = wp.tid()
+    slot = rows[k, 0]
+    row = rows[k, 1]
+    own = wp.min(w, positions.shape[1] - 1)
+    centre = centres[wp.min(w, centres.shape[0] - 1), slot]
+    frame = w * stride + slot * SLOT_SIZE
+    place = wp.vec3d()
+    turn = wp.vec4d()
+    fastest = wp.float64(0.0)
+    for f in range(between.shape[0]):
+        for i in range(3):
+            before = place
+            turn_before = turn
+            first = int(between[f, i, 0])
+            last = int(between[f, i, 1])
+            part = between[f, i, 2]
+            a = positions[row, own, first]
+            turn = turn_between(quaternions[row, own, first], quaternions[row, own, last], part)
+            place = a + (positions[row, own, last] - a) * part + turned(turn, centre)
+            if i == 0:
+                for c in range(3):
+                    pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
+            else:
+                # the short way round between neighbours, which the contacts' kernels blend number by number
+                if wp.dot(turn, turn_before) < wp.float64(0.0):
+                    turn = -turn
+                way = wp.length(place - before) + angle_between(turn, turn_before) * radii[slot]
+                fastest = wp.max(fastest, way / (between[f, i, 3] - between[f, i - 1, 3]))
+            write_key(pose, frame, i, place, turn)
+        frame += FRAME_SIZE
+    # the frame that begins at the end stands still
+    for c in range(3):
+        pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
+    for i in range(3):
+        write_key(pose, frame, i, place, turn)
+    wp.atomic_max(shape_speed, 0, float(fastest))

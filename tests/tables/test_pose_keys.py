@@ -1,0 +1,87 @@
+"""Key poses of path batches, which a kernel writes: where NumPy puts those of each path alone."""
+
+import numpy as np
+import pytest
+
+import nuno
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE
+from nuno.shapes.shape import Hull
+from nuno.tables.colliders import Colliders
+from nuno.tables.kinematic_motion import make_schedule
+from nuno.tables.path_batch import KinematicGroup, PathBatch
+
+FRAME = 1 / 60
+
+
+def lead(group, bodies, times, places, turns):
+    """Set bodies on one path batch."""
+    group.path_batch = PathBatch(group.keys, times, places, turns)
+    for body, path in zip(bodies, group.paths, strict=True):
+        body._path = path
+
+
+def sent(worlds, frames, apart):
+    """Return the table and the greatest speed for boxes and a hull that are sent on ways of so many frames."""
+    random = np.random.default_rng(4)
+    wedge = [(0, 0, 0), (0.3, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]  # its box's middle is not its origin, their mean
+    hull = nuno.Body(Hull(wedge, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]), name="hull")
+    bodies = [*[nuno.box((0.1, 0.2, 0.1), name=str(k)) for k in range(3)], hull]
+    shape = (len(bodies), worlds, frames + 1) if worlds > 1 else (len(bodies), frames + 1)
+    places = np.cumsum(random.normal(0.0, 0.01, (*shape, 3)), axis=-2)
+    turns = np.array([1.0, 0.0, 0.0, 0.0]) + np.cumsum(random.normal(0.0, 0.3, (*shape, 4)), axis=-2)
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    times = 0.1 + FRAME * np.arange(frames + 1)
+    for body, place, turned in zip(bodies, places, turns, strict=True):
+        if worlds > 1:
+            body._position, body._quaternion = place[:, 0], turned[:, 0]
+        body._path = nuno.Path(times, place, turned)
+    if not apart:
+        group = KinematicGroup(tuple(body.key for body in bodies))
+        lead(group, bodies, times, places, turns)
+    colliders = Colliders.from_bodies(bodies, worlds)
+    schedule = make_schedule(bodies, 0.1, frames * FRAME, FRAME)
+    assert len(schedule.path_batches) == 1 - apart
+    colliders.follow(schedule)
+    table = colliders.shapes.pose.numpy().reshape(-1, len(bodies), FRAMES, FRAME_SIZE)[:, :, : frames + 1]
+    return table, float(colliders.shapes.shape_speed.numpy()[0])
+
+
+def poses_in(table):
+    """Return positions (..., frames, 3, 3) and quaternions of the table's keys, w above zero."""
+    keys = table[..., 3:].reshape(*table.shape[:-1], 3, KEY_SIZE).astype(float)
+    turns = keys[..., 3:] * np.where(keys[..., 3:4] < 0.0, -1.0, 1.0)
+    return table[..., None, :3] + keys[..., :3], turns
+
+
+@pytest.mark.parametrize(("worlds", "frames"), [(1, 1), (1, 4), (3, 1), (3, 4)])
+def test_a_batch_is_where_its_paths_are(worlds, frames):
+    """The kernel's keys are NumPy's, but for float's rounding (1e-6) and 1e-8 of a way for rounded times."""
+    (batch, fastest), (alone, fastest_alone) = sent(worlds, frames, False), sent(worlds, frames, True)
+    np.testing.assert_array_equal(batch[..., :3], alone[..., :3])
+    for found, expected in zip(poses_in(batch), poses_in(alone), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)
+    # a bound, of turns that are near to each other up to 1 % above
+    assert 0.999 * fastest_alone < fastest < 1.02 * fastest_alone
+
+
+def test_frames_of_a_run_are_those_of_runs_of_one_frame():
+    """The same bits, however many frames a run has: what a robot in a batch and one alone are told of its links."""
+    bodies = [nuno.box((0.1, 0.2, 0.1), name=str(k)) for k in range(3)]
+    random, group = np.random.default_rng(5), KinematicGroup(tuple(body.key for body in bodies))
+    places, turns = random.normal(0.0, 0.1, (3, 5, 3)), random.normal(size=(3, 5, 4))
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    times = 0.3 + np.arange(5) / 60  # as a world counts them, not in whole nanoseconds
+    tables = []
+    for frames in (4, 1):
+        rows = []
+        for k in range(0, 4, frames):
+            own = slice(k, k + frames + 1)
+            lead(group, bodies, times[own], places[:, own], turns[:, own])
+            colliders = Colliders.from_bodies(bodies)
+            colliders.follow(make_schedule(bodies, times[k], times[k + frames] - times[k], FRAME))
+            table = colliders.shapes.pose.numpy().reshape(3, FRAMES, FRAME_SIZE)
+            rows.append(table[:, :frames].copy())
+        tables.append(np.concatenate(rows, axis=1))
+    positions, quaternions = zip(*(poses_in(table) for table in tables), strict=True)
+    np.testing.assert_array_equal(*positions)
+    np.testing.assert_array_equal(*quaternions)
