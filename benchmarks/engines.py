@@ -76,6 +76,13 @@ def picture(world: nuno.World, scene: EngineScene, title: str) -> np.ndarray:
     return cv2.putText(image, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (20, 20, 20), 1, cv2.LINE_AA)
 
 
+def told(row: dict[str, Any]) -> str:
+    """Return a run in a line."""
+    if "failed" in row:
+        return str(row["failed"])
+    return f"{_figure(row)}, CPU {row['cpu_s']:.2f} s, wall {row['wall_s']:.2f} s, prepare {row['prepare_s']:.2f} s"
+
+
 def show(rows: list[dict[str, Any]], engines: list[str]) -> None:
     """Print a table of figures and one of times."""
     by = {(row["scene"], row["engine"]): row for row in rows}
@@ -134,10 +141,7 @@ def main() -> None:
                 row, image = run(name, engine, given.device, look=path is not None)
                 rows.append(row | {"round": turn})
                 parts += [] if image is None else [image]
-                told = (
-                    row.get("failed") or f"{_figure(row)}, CPU {row['cpu_s']:.2f} s, prepare {row['prepare_s']:.2f} s"
-                )
-                tqdm.write(f"round {turn + 1}, {name} on {engine}: {told}", file=sys.stderr)
+                tqdm.write(f"round {turn + 1}, {name} on {engine}: {told(row)}", file=sys.stderr)
                 bar.update()
             runs = [row for row in runs if (row["round"], row["scene"]) != (turn, name)] + rows
             if given.json:

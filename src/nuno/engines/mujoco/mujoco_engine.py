@@ -30,8 +30,8 @@ STEP = 0.0021
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
-    "self-contact of soft bodies", "restitution", "sliding grips", "compliant grips", "limited grips",
-    "drives of ball joints", "cuda",
+    "self-contact of soft bodies", "restitution beside deformables", "sliding grips", "compliant grips of rigid bodies",
+    "limited welds and joints", "drives of ball joints", "cuda",
 }  # fmt: skip
 
 
@@ -118,8 +118,7 @@ class MujocoEngine(Engine):
         count = max(1, math.ceil((end - start) / self.substep - 1e-6))
         step = (end - start) / count
         if not math.isclose(step, self.substep, rel_tol=1e-9) or scene.shortened:
-            batch.expand("opt.timestep")[:] = step
-            scene.shortened = True
+            scene.set_step(step)
         times = start + step * np.arange(count + 1)
         paths = {
             key: kinematic_poses(self.world, bodies[key], start, end, times)

@@ -18,7 +18,16 @@ from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
-from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
+from nuno.engines.mujoco.mujoco_touch import (
+    CONTACT,
+    IMPEDANCE,
+    TouchingPair,
+    restitution_of,
+    set_masks,
+    set_pairs,
+    write_friction,
+    write_pairs,
+)
 from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
@@ -30,11 +39,6 @@ if TYPE_CHECKING:
 
 HEAVY = 1e6
 """[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
-CONTACT = (0.004, 1.0)
-"""``solref`` of contacts: time constant [s] and damping ratio. MuJoCo's default is 0.02 s, in which a towel sinks 5 mm
-into a table."""
-IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
-"""``solimp`` of contacts."""
 
 
 @dataclass(eq=False)
@@ -102,11 +106,11 @@ class MujocoScene:
         self.compilations = 0
         self.shortened = False  # whether the substep has been another than the model's
         self._settings: tuple[Any, ...] = ()
+        self._pairs: list[TouchingPair] = []
         self._begin()
 
     def _begin(self) -> None:
         mujoco, spec = self._mujoco, self._mujoco.MjSpec()
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0
@@ -150,13 +154,17 @@ class MujocoScene:
             own.carries, own.helpers = key in carriers, []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
-        set_friction(self.spec, world, bodies)
+        self._pairs = set_pairs(self.spec, world, bodies)
         self.holds.add(self.spec, self.placed)
         self.joints.add(self.spec, self.placed, tree)
         for body, own in bodies:
             if own.role == "rigid":
                 _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
         self.spec.option.timestep, self.shortened = substep, False
+        # a contact that bounces needs one that takes its damper as it is, and a flex needs the other
+        bounces = any(restitution_of(world, body).any() for body in world.bodies)
+        kinds = self._mujoco.mjtIntegrator
+        self.spec.option.integrator = kinds.mjINT_IMPLICITFAST if bounces else kinds.mjINT_DISCRETE
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
@@ -169,9 +177,16 @@ class MujocoScene:
         self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
+        write_pairs(self.model, self.batch, self._pairs, substep)
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
         self.sums = Sums(self, world.world_count) if kept else None
+
+    def set_step(self, step: float) -> None:
+        """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
+        self.batch.expand("opt.timestep")[:] = step
+        write_pairs(self.model, self.batch, self._pairs, step)
+        self.shortened = True
 
     def _delete(self, key: str) -> None:
         own = self.placed.pop(key)
