@@ -43,7 +43,9 @@ def test_the_livelier_of_two_counts_in_each_world_and_momentum_is_kept():
     futures.run(0.2)
     e = np.array([0.2, 0.5, 0.9])
     np.testing.assert_allclose(_named(futures, "b").velocity[:, 0], 2.0 * (1 + e) / 3, atol=0.02)
-    np.testing.assert_allclose(_named(futures, "a").velocity[:, 0] + 2.0 * _named(futures, "b").velocity[:, 0], 2.0, atol=1e-6)
+    np.testing.assert_allclose(
+        _named(futures, "a").velocity[:, 0] + 2.0 * _named(futures, "b").velocity[:, 0], 2.0, atol=1e-6
+    )
 
 
 def test_a_ball_that_sticks_as_it_bounces_rolls_on():

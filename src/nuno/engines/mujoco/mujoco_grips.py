@@ -3,8 +3,8 @@
 A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
 weighted sum, by fixed tendons. Points that give way, or whose grip bears a limited force, are drawn by springs, see
 `nuno.engines.mujoco.mujoco_springs`. A rigid body is welded to what leads it: another body, or a heavy one without a
-shape that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are joints of
-MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
+shape that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are
+joints of MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
 """
 
 from __future__ import annotations
