@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 HEAVY = 1e6
 """[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
+LEADING = 0.5 * HEAVY
+"""[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
 
 
 @dataclass(eq=False)
@@ -156,7 +158,7 @@ class MujocoScene:
         set_masks(world, bodies)
         self._pairs = set_pairs(self.spec, world, bodies)
         self.holds.add(self.spec, self.placed)
-        self.joints.add(self.spec, self.placed, tree)
+        self.joints.add(self.spec, self.placed, tree, substep)
         for body, own in bodies:
             if own.role == "rigid":
                 _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
@@ -168,6 +170,7 @@ class MujocoScene:
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
+        _set_tolerance(self.model)
         # the forces of contacts are read from the data after each substep
         kept = bool(world.engine.rules.summed) or any(own.role == "rigid" for own in self.placed.values())
         self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1, kept)
@@ -186,6 +189,7 @@ class MujocoScene:
         """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
         self.batch.expand("opt.timestep")[:] = step
         write_pairs(self.model, self.batch, self._pairs, step)
+        self.joints.set_step(step)
         self.shortened = True
 
     def _delete(self, key: str) -> None:
@@ -278,6 +282,16 @@ class MujocoScene:
         for axis in range(3):
             damping[:, own.dof[0] + axis] = drag * dynamics.mass
             damping[:, own.dof[0] + 3 + axis] = drag * spin
+
+
+def _set_tolerance(model: Any) -> None:
+    """Let the solver go on until what is left is small beside the bodies, not beside those that lead.
+
+    MuJoCo measures it by the mean inertia of all coordinates, and leaders and flywheels have a million times that.
+    """
+    light = model.dof_M0[model.dof_M0 < LEADING]
+    if 0 < len(light) < model.nv:
+        model.opt.tolerance *= max(float(light.mean()) / float(model.dof_M0.mean()), 1e-7)
 
 
 def _share_mass(dynamics: Any, bodies: list[Any]) -> None:
