@@ -54,10 +54,10 @@ def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it():
     ball = world.add(nuno.sphere(0.05, name="ball", position=(0.0, 0.0, 1.0)))
     world.attach(ball)
     with pytest.raises(nuno.EngineCapabilityError) as caught:
-        world.grip(ball, to=ball.position, free=(0.0, 0.0, 1.0))
-    assert re.match(r"mujoco has no sliding grips; engines that have: nuno", str(caught.value))
-    assert (caught.value.engine, caught.value.capability) == ("mujoco", "sliding grips")
-    assert caught.value.others == engines_with("sliding grips")
+        world.grip(ball, to=ball.position, max_force=5.0)
+    assert re.match(r"mujoco has no limited welds and joints; engines that have: nuno", str(caught.value))
+    assert (caught.value.engine, caught.value.capability) == ("mujoco", "limited welds and joints")
+    assert caught.value.others == engines_with("limited welds and joints")
     world.run(0.1)
     assert ball.position[2] < 0.96  # it falls by 49 mm, for nothing holds it
 

@@ -63,12 +63,14 @@ def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
         drives = "drives of ball joints" if spec.kind == "ball" else "joint drives"
         needs += [kind, drives] if _is_driven(spec) else [kind]
     if spec.compliance > 0.0:
-        needs.append("compliant grips" if isinstance(spec, GripSpec | TieSpec) else "compliant grips of rigid bodies")
+        kinds = {JointSpec: "compliant joints", HoldSpec: "compliant grips of rigid bodies"}
+        needs.append(kinds.get(type(spec), "compliant grips"))
     if not isinstance(spec, GripSpec) and np.min(spec.max_force) < MAX_FORCE:
         needs.append("limited welds and joints")
     if isinstance(spec, HoldSpec):
         needs.append("welds of rigid bodies" if on_moving else "grips of rigid bodies")
-        needs += ["sliding grips"] if spec.free is not None else []
+        if spec.free is not None:
+            needs += ["sliding grips", "sliding welds"] if on_moving else ["sliding grips"]
     elif isinstance(spec, TieSpec):
         needs.append("ties")
         needs += ["grips inside faces"] if _between(spec.weights) else []

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_loose import THIN
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_springs import drawn_with
 from nuno.engines.world_view import bodies_by_key, dynamics_of
@@ -60,6 +61,10 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
             continue
         at, turn = int(own.dof[0]), dynamics.values["turn"][world]
         force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
+        if held.helper is not None:  # what leads bears the helper's share of the mass besides
+            share = THIN * float(dynamics.mass[world]) * (model.opt.gravity - data.qacc[at : at + 3])
+            force[world] += share
+            torque[world] += np.cross(quat.rotate(turn, dynamics.centre), share)
         if isinstance(grip.spec, JointSpec):  # told at the joint's point
             arm = quat.rotate(turn, grip.spec.place[world])
             torque[world] -= np.cross(arm, force[world])

@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
+from nuno.engines.mujoco.mujoco_loose import add_helper, find_helper, is_loose, place_helper
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
-from nuno.engines.world_view import attached
+from nuno.engines.world_view import attached, dynamics_of
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
 from nuno.shapes import quaternion as quat
-from nuno.shapes.coordinates import apply
+from nuno.shapes.coordinates import apply, compose
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
@@ -52,6 +53,9 @@ class Held:
         address: Its first coordinate and its first velocity in the model.
         terms: Of one by springs, of each distinct point its own vertices with their weights.
         corners, weights, qpos, dof: The same as arrays (points, most), and where they are in the model.
+        helper: Of a loose one of a rigid body, what that is welded to.
+        slides, ball: The numbers of its joints in the model, -1 for no ball.
+        addresses: Of the coordinates and velocities of all joints.
     """
 
     grip: Grip
@@ -66,6 +70,10 @@ class Held:
     weights: Any = None
     qpos: Any = None
     dof: Any = None
+    helper: Any = None
+    slides: Any = None
+    ball: int = -1
+    addresses: Any = None
 
 
 class Holds:
@@ -181,18 +189,23 @@ class Holds:
             self._equality(own, "TENDON", tendon.name)
 
     def _add_hold(self, own: Held, placed: dict[str, Any]) -> None:
-        grip = own.grip
-        if grip.target is not None:
-            name = placed[grip.target.key].bodies[0].name
+        grip, joined = own.grip, placed[own.grip.body.key]
+        loose = is_loose(grip.spec)
+        if grip.target is not None and not (loose and dynamics_of(grip.target) is None):
+            leads = placed[grip.target.key].bodies[0]
         else:
             self._made += 1
-            own.leader = self._spec.worldbody.add_body(
+            leads = own.leader = self._spec.worldbody.add_body(
                 name=f"g{self._made}", mass=LEADER, inertia=[LEADER] * 3, explicitinertial=True, gravcomp=1.0
             )
             own.leader.add_freejoint(name=own.leader.name)
             self._elements.append(own.leader)
-            name = own.leader.name
-        self._equality(own, "WELD", name, placed[grip.body.key].bodies[0].name, "BODY")
+        if loose:
+            self._made += 1
+            leads = own.helper = add_helper(own, leads, f"h{self._made}")
+            joined.thin.append(own.helper)
+            self._elements.append(own.helper)
+        self._equality(own, "WELD", leads.name, joined.bodies[0].name, "BODY")
 
     def _add_joint(self, own: Held, placed: dict[str, Any]) -> None:
         grip, mine = own.grip, placed[own.grip.body.key].bodies[0].name
@@ -226,7 +239,9 @@ class Holds:
                     self._soften(own, model, batch, placed)
             elif isinstance(spec, HoldSpec):
                 place, turn = np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1))
-                if own.leader is None:
+                if own.helper is not None:
+                    find_helper(own, model, batch)
+                elif own.leader is None:
                     place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
                 _weld(data, int(own.rows[0]), place, turn)
             else:
@@ -272,6 +287,8 @@ class Holds:
                 found.append((own, driven_points(own.grip, start, frame, times)))
             elif own.leader is not None:
                 found.append((own, driven_hold(own.grip, start, end, times, self._world.world_count)))
+            elif own.helper is not None:
+                found.append((own, None))
         return found
 
     def present(self, time: float, step: float) -> list[tuple[Held, Any]]:
@@ -286,6 +303,13 @@ class Holds:
                 else:
                     now = np.broadcast_to(apply(target.pose(), own.grip.offsets), own.grip.offsets.shape)
                     found.append((own, np.stack([now, now], axis=2)))
+            elif own.leader is not None and target is not None:
+                shape = (self._world.world_count, 2)
+                lead = compose(target.pose(), own.grip.offsets)
+                parts = (np.broadcast_to(part[..., None, :], (*shape, part.shape[-1])) for part in lead)
+                found.append((own, tuple(parts)))
+            elif own.leader is None and own.helper is not None:
+                found.append((own, None))
             elif own.leader is not None:
                 places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
                 found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
@@ -294,9 +318,12 @@ class Holds:
     def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float, at_end: bool = True) -> None:
         """Write where driven grips lead in substep ``k``, which takes ``step`` [s]; springs at its start or end."""
         for own, goals in targets:
+            if own.helper is not None:
+                place_helper(own, batch, goals, k, step)
             if own.leader is not None:
                 place, turn = (part[:, k : k + 2] for part in goals)
                 send(batch, own.address, place, turn, step)
+            if own.leader is not None or own.helper is not None:
                 continue
             if own.terms:
                 draw(own, batch, goals[:, :, k + 1 if at_end else k])

@@ -16,6 +16,7 @@ from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
+from nuno.engines.mujoco.mujoco_loose import THIN
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
@@ -56,6 +57,7 @@ class Placed:
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
         helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
+        thin: Helpers of loose holds, each with a fiftieth of its mass.
         carries: Whether bodies hang on it by joints.
         depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
@@ -71,6 +73,7 @@ class Placed:
     mesh: FlexMesh | None = None
     friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
     helpers: list[Any] = field(default_factory=list)
+    thin: list[Any] = field(default_factory=list)
     carries: bool = False
     depth: int = 0
     id: int = -1
@@ -153,7 +156,7 @@ class MujocoScene:
                 self.placed[key].depth = depth
         carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
         for key, own in self.placed.items():
-            own.carries, own.helpers = key in carriers, []
+            own.carries, own.helpers, own.thin = key in carriers, [], []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
         self._pairs = set_pairs(self.spec, world, bodies)
@@ -161,7 +164,7 @@ class MujocoScene:
         self.joints.add(self.spec, self.placed, tree, substep)
         for body, own in bodies:
             if own.role == "rigid":
-                _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
+                _share_mass(dynamics_of(body), _shares(own))
         self.spec.option.timestep, self.shortened = substep, False
         # a contact that bounces needs one that takes its damper as it is, and a flex needs the other
         bounces = any(restitution_of(world, body).any() for body in world.bodies)
@@ -253,8 +256,9 @@ class MujocoScene:
                 batch.expand("body_mass")[:, ids] = dynamics.mass
                 continue
             share = np.trace(dynamics.inertia, axis1=1, axis2=2)
-            for each in (own.id, *(int(model.body(helper.name).id) for helper in own.helpers)):
-                batch.expand("body_mass")[:, each] = dynamics.mass / (1 + len(own.helpers))
+            for made, part in _shares(own):
+                each = int(model.body(made.name).id)
+                batch.expand("body_mass")[:, each] = dynamics.mass * part
                 batch.expand("body_inertia")[:, each] = model.body_inertia[each] * (share / share[0])[:, None]
         if moving:
             batch.set_const()  # of all worlds, so that one is the same in any batch
@@ -294,11 +298,17 @@ def _set_tolerance(model: Any) -> None:
         model.opt.tolerance *= max(float(light.mean()) / float(model.dof_M0.mean()), 1e-7)
 
 
-def _share_mass(dynamics: Any, bodies: list[Any]) -> None:
-    """Give a rigid body and its helpers equal shares of its mass and inertia."""
-    inertia = dynamics.inertia[0] / len(bodies)
-    for made in bodies:
-        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) / len(bodies), dynamics.centre, True
+def _shares(own: Placed) -> list[tuple[Any, float]]:
+    """Return a rigid body and its helpers, with their shares of its mass."""
+    heavy, left = [*own.bodies, *own.helpers], 1.0 - THIN * len(own.thin)
+    return [*((made, left / len(heavy)) for made in heavy), *((made, THIN) for made in own.thin)]
+
+
+def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
+    """Give a rigid body and its helpers their shares of its mass and inertia."""
+    for made, part in shares:
+        inertia = dynamics.inertia[0] * part
+        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) * part, dynamics.centre, True
         made.fullinertia = [
             inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
         ]  # fmt: skip
