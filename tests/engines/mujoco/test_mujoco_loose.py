@@ -65,7 +65,8 @@ def test_what_slides_is_led_and_turned_along_a_path(compliance):
     x, y, z = block.position
     assert z == pytest.approx(1.0 - 0.5 * G * 0.4 * (0.4 + 1.0 / 480.0), abs=1e-4)
     led = path.at(0.4)
-    # stiff grips keep within 0.2 mm at such a speed; a spring of 1 kN/m swings about where it is led by up to m a c, of a path's 5.8 d / T^2 = 7 m/s2
+    # stiff grips keep within 0.2 mm at such a speed; a spring of 1 kN/m swings about where it is led by up to m a c, of
+    # a path's 5.8 d / T^2 = 7 m/s2
     assert np.hypot(x - led[0], y) < (2e-4 if compliance == 0.0 else 2 * SOFT * 7.0)
     turned = 2.0 * np.arctan2(block.quaternion[3], block.quaternion[0])
     assert turned == pytest.approx(2.0 * np.arctan2(*path.quaternion_at(0.4)[[3, 0]]), abs=0.02)

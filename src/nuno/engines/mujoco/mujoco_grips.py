@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
-from nuno.engines.mujoco.mujoco_loose import add_helper, find_helper, is_loose, place_helper
+from nuno.engines.mujoco.mujoco_loose import WELDED, add_helper, find_helper, is_loose, place_helper
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
@@ -244,6 +244,8 @@ class Holds:
                 elif own.leader is None:
                     place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
                 _weld(data, int(own.rows[0]), place, turn)
+                if own.helper is not None:
+                    data[:, own.rows[0], 10] = WELDED
             else:
                 _joint(data, own.rows, spec)
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 THIN = 0.02
 """Share of its body's mass that a helper has."""
+WELDED = 10.0
+"""``torquescale`` of the weld of a helper, which is light to turn: with 1 it gave way by 1 % of the spring's turn."""
 
 
 def is_loose(spec: Any) -> bool:
