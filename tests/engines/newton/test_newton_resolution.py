@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.engines.newton.newton_resolution import LEAST, MOST, NOMINAL, substeps_for
+from nuno.engines.newton.newton_resolution import MINIMUM, MAXIMUM, NOMINAL, substeps_for
 
 
 def world_of(cells=10, stretch=1000.0, density=0.2, **settings):
@@ -26,8 +26,8 @@ def test_there_are_as_many_as_the_membrane_takes(cells, stretch, density):
     def ratio(n):
         return stretch / (density * (0.2 / cells) ** 2) / (60.0 * n) ** 2
 
-    assert count % 2 == 0 and count >= LEAST and ratio(count) <= NOMINAL
-    assert count == LEAST or ratio(count - 2) > NOMINAL
+    assert count % 2 == 0 and count >= MINIMUM and ratio(count) <= NOMINAL
+    assert count == MINIMUM or ratio(count - 2) > NOMINAL
 
 
 def test_the_stiffest_direction_world_and_frame_rate_count():
@@ -38,7 +38,7 @@ def test_the_stiffest_direction_world_and_frame_rate_count():
     cloth = world.find("mat")
     world.set_material(cloth, nuno.Cloth(stretch_stiffness=np.array([500.0, 1000.0])))
     assert substeps_for(world) == base
-    assert substeps_for(world_of(frame_rate=120.0)) <= max(LEAST, base // 2 + 2)
+    assert substeps_for(world_of(frame_rate=120.0)) <= max(MINIMUM, base // 2 + 2)
     assert substeps_for(world_of(substeps=24)) == 24
 
 
@@ -55,5 +55,5 @@ def test_too_few_are_told_once_with_the_cure(caplog):
     assert "'mat' is too limp: with 20 substeps" in caplog.text and "World(substeps=78)" in caplog.text
     caplog.clear()
     with caplog.at_level(logging.WARNING):
-        assert substeps_for(world_of(cells=60)) == MOST
+        assert substeps_for(world_of(cells=60)) == MAXIMUM
     assert "Larger cells or a smaller stretch stiffness" in caplog.text

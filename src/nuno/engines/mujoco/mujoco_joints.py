@@ -45,7 +45,7 @@ STRONGEST = 1e9
 """[N m, N] Of a motor without a limit."""
 FLYWHEEL = 1e6
 """[kg]"""
-SHARP = 300.0
+STEEPNESS = 300.0
 """b h of such a friction: what is left of the acceleration's term is one in so many."""
 LIGHT = 1.0
 """Of (h^2 k + h d) over the inertia, from where on a motor with a limit is a clutch."""
@@ -104,7 +104,7 @@ class Joints:
         self._made = 0
         self.states: Any = None
         self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
-        self._step, self._sharp = 0.0, SHARP
+        self._step, self._steepness = 0.0, STEEPNESS
         self._carried: dict[Joint, np.ndarray] = {}
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         self._is_driven = False  # whether the numbers of the drives are those that the batch has
@@ -191,7 +191,7 @@ class Joints:
         self.qpos, self.dof = model.jnt_qposadr[self.number], model.jnt_dofadr[self.number]
         self._is_driven, self.states = False, None
         is_discrete = model.opt.integrator == mujoco_package().mjtIntegrator.mjINT_DISCRETE
-        self._sharp = SHARP if is_discrete else 1.0
+        self._steepness = STEEPNESS if is_discrete else 1.0
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         if not joined:
             return
@@ -305,13 +305,13 @@ class Joints:
         pull = own["stiffness"] * own["position"] + damping * own["velocity"]
         self._gains = own["stiffness"], pull, np.where(self._gives, coefficient, 1.0)
         inverse = np.stack([batch.get_model(k).tendon_invweight0[self._clutch] for k in range(len(keeps))])
-        share = step * coefficient * inverse / self._sharp
+        share = step * coefficient * inverse / self._steepness
         impedance = np.clip(share / (1.0 + share), 1e-4, STIFF[0])  # R is (1 - d) / d of the inverse inertia
         batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps | self._gives, most, 0.0)
         solimp = batch.expand("tendon_solimp_fri")
         solimp[:, self._clutch] = STIFF
         solimp[:, self._clutch, :2] = np.where(self._gives, impedance, STIFF[0])[..., None]
-        gives = np.stack([np.full_like(impedance, -1e-9), -self._sharp * impedance / step], axis=-1)
+        gives = np.stack([np.full_like(impedance, -1e-9), -self._steepness * impedance / step], axis=-1)
         solref = np.where(self._gives[..., None], gives, (CLOSING * step, 1.0))
         batch.expand("tendon_solref_fri")[:, self._clutch] = solref
 

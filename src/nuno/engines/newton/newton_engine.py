@@ -11,7 +11,7 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.driven_motion import driven_hold, driven_points, kinematic_poses
 from nuno.engines.engine import Engine
-from nuno.engines.newton.newton_resolution import LEAST, substeps_for
+from nuno.engines.newton.newton_resolution import MINIMUM, substeps_for
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
@@ -47,7 +47,7 @@ class NewtonEngine(Engine):
         self._made: NewtonModel | None = None
         self._substeps: NewtonSubsteps | None = None
         self._gravity: tuple[float, ...] = ()
-        self._count = LEAST
+        self._count = MINIMUM
         self._settings: tuple[float, int | None] = (0.0, None)
 
     def attach(self, body: Body, material: Any) -> Dynamics:

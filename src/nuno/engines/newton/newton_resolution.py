@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-LEAST, MOST = 40, 160
+MINIMUM, MAXIMUM = 40, 160
 """Substeps of a frame where the world gives no number; the most take four times as long as the least."""
 NOMINAL = 0.6
 """The r up to which bending is nominal within 8 %."""
-TOLD = 1.2
+LIMP = 1.2
 """The r beyond which a warning says that a cloth is too limp."""
 _warned: set[str] = set()
 
@@ -37,10 +37,10 @@ def substeps_for(world: Simulation) -> int:
     rates = {body.key: _rate(body) for body in world.bodies if _is_cloth(body)}
     frame = 1.0 / world.frame_rate
     needed = {key: frame * rate / math.sqrt(NOMINAL) for key, rate in rates.items()}
-    wanted = max([float(LEAST), *needed.values()])
-    count = int(world.substeps or min(MOST, 2 * math.ceil(0.5 * wanted)))
+    wanted = max([float(MINIMUM), *needed.values()])
+    count = int(world.substeps or min(MAXIMUM, 2 * math.ceil(0.5 * wanted)))
     for body in world.bodies:
-        if body.key in rates and (frame * rates[body.key] / count) ** 2 > TOLD:
+        if body.key in rates and (frame * rates[body.key] / count) ** 2 > LIMP:
             _tell(body, count, needed[body.key])
     return count
 
@@ -64,7 +64,7 @@ def _tell(body: Body, count: int, needed: float) -> None:
         return
     _warned.add(body.key)
     most = f"World(substeps={2 * math.ceil(0.5 * needed)})"
-    cure = most if needed <= MOST else "Larger cells or a smaller stretch stiffness"
+    cure = most if needed <= MAXIMUM else "Larger cells or a smaller stretch stiffness"
     logger.warning(
         "newton: %r is too limp: with %d substeps a frame block descent leaves too little of its bending. %s would "
         "mend that, or another engine",
