@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.engines.newton.newton_resolution import MINIMUM, MAXIMUM, NOMINAL, substeps_for
+from nuno.engines.newton.newton_resolution import MAXIMUM, MINIMUM, NOMINAL, substeps_for
 
 
 def world_of(cells=10, stretch=1000.0, density=0.2, **settings):
