@@ -114,7 +114,7 @@ class EngineComparison:
         high = LETTERS * float(np.ptp(heads[:, 0])) / (len(heads) - 1)
         above = np.array([0.0, 0.0, high])
         film.labels = [(engine, head + above, high) for engine, head in zip(self.engines, heads, strict=True)]
-        film.view = film.view_of_all(AHEAD)
+        film.direction = AHEAD
         return film
 
     @checked

@@ -110,6 +110,7 @@ class Film:
         self._times: list[float] = []
         self._failed: Exception | None = None
         self.view: View | None = None
+        self.direction = FROM  # from where all is seen, where there is no view
         self.labels: list[tuple[str, Any, float]] = []  # text, where its middle is (3,) and how high it is [m]
         self._period = 1 if scene is None else max(1, int(scene.world.frame_rate / rate + 1e-6))
         if scene is not None:
@@ -254,7 +255,7 @@ class Film:
         """
         if self._scene is not None:
             raise BodyStateError("the film is being recorded; stop it first")
-        view = self.view or self.view_of_all()
+        view = self.view or self._view_of_all()
         times = np.array(self._times) - self._times[0]
         content = {
             "do": "film", "start": self._times[0], "times": times.astype(np.float32),
@@ -280,8 +281,7 @@ class Film:
         for obj in [*(obj for obj in entered if obj.colors is not None), *recolored]:
             self._tracks[obj.number].tint(frame)
 
-    def view_of_all(self, direction: Any = FROM) -> View:
-        """Return a view in which all is seen that was ever drawn, from a direction (3,)."""
+    def _view_of_all(self) -> View:
         corners = []
         for track in self._tracks.values():
             if track.obj.shape.get("endless"):
@@ -294,9 +294,9 @@ class Film:
                 points = np.concatenate(track.points)
                 corners += [points.min(axis=0), points.max(axis=0)]
         if not corners:
-            return View.around(np.full(3, -0.5), np.full(3, 0.5), direction)
+            return View.around(np.full(3, -0.5), np.full(3, 0.5), self.direction)
         low, high = np.min(corners, axis=0).astype(float), np.max(corners, axis=0).astype(float)
-        return View.around(low, high, direction)
+        return View.around(low, high, self.direction)
 
 
 def _packed(points: np.ndarray) -> dict[str, Any]:
