@@ -30,7 +30,7 @@ STEP = 0.0021
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
-    "self-contact of soft bodies", "restitution beside deformables", "sliding welds", "compliant joints",
+    "restitution beside deformables", "sliding welds", "compliant joints",
     "limited welds and joints", "drives of ball joints", "cuda",
 }  # fmt: skip
 

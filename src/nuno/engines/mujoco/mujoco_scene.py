@@ -207,7 +207,7 @@ class MujocoScene:
         if isinstance(dynamics, ArrayParticles):
             mesh = FlexMesh(dynamics)
             flex, bodies = add_flex(spec, name, mesh, dynamics)
-            flex.selfcollide = 4 if rules_of(self._world).touches_itself(body) and mesh.axes is not None else 0
+            flex.selfcollide = 4 if _touches_itself(self._world, body) else 0
             own = Placed(role, signature, bodies, flexes=[flex], mesh=mesh)
         else:
             from nuno.bodies.rigid_dynamics import parts_of
@@ -336,3 +336,8 @@ def _signature(world: Simulation, body: Body, role: str) -> tuple[Any, ...]:
         # another material makes other dynamics
         return role, id(dynamics_of(body)), rules_of(world).touches_itself(body)
     return role, id(body.shape), body.local_vertices().tobytes() if body.is_deformed else None, body.thickness
+
+
+def _touches_itself(world: Simulation, body: Body) -> bool:
+    """Return True if the parts of a cloth touch each other, or those of a soft body whose material asks for it."""
+    return rules_of(world).touches_itself(body) and getattr(dynamics_of(body).material, "self_contact", True)
