@@ -199,8 +199,9 @@ def box_on_incline(world: nuno.World) -> Measure:
 def box_stack(world: nuno.World) -> Measure:
     """Five boxes stand on each other for 1 s."""
     world.add(nuno.plane(name="floor"))
+    colours = ("#8070b0", "#b08050")
     boxes = [
-        world.add(nuno.box((0.1, 0.1, 0.1), name=f"box {k}", position=(0, 0, 0.05 + 0.1 * k), color="#8070b0"))
+        world.add(nuno.box((0.1, 0.1, 0.1), name=f"box {k}", position=(0, 0, 0.05 + 0.1 * k), color=colours[k % 2]))
         for k in range(5)
     ]
     start = np.array([box.position for box in boxes])
@@ -307,7 +308,7 @@ SCENES = {
         (0.0, 0.0, 0.1),
     ),
     "fold": EngineScene(
-        fold, 2.2, "layers apart", "mm", 4.0, 4.0, "the thickness", (0.3, -0.5, 0.35), (-0.08, 0.0, 0.0),
+        fold, 2.2, "layers apart", "mm", 4.0, 4.0, "the thickness", (0.15, -0.42, 0.25), (-0.08, 0.0, 0.0),
     ),
     "soft cube landing": EngineScene(
         soft_cube_landing, 1.5, "sinks by its weight", "mm", 1e3 * 1000.0 * GRAVITY * 0.1**2 / (2 * 5e4),
@@ -319,12 +320,12 @@ SCENES = {
         (0.0, 0.0, 0.04),
     ),
     "box on incline": EngineScene(
-        box_on_incline, SLIDING, "slides by", "mm", _slide(), _slide(), "g (sin - mu cos) t^2 / 2", (0.6, -2.0, 0.9),
-        (0.0, 0.0, 0.0),
+        box_on_incline, SLIDING, "slides by", "mm", _slide(), _slide(), "g (sin - mu cos) t^2 / 2", (0.5, -1.4, 0.9),
+        (-0.1, 0.0, 0.05),
     ),
     "box stack": EngineScene(
-        box_stack, 1.0, "farthest from its place", "mm", 0.0, 100.0, "boxes at rest stay", (0.7, -0.9, 0.5),
-        (0.0, 0.0, 0.25),
+        box_stack, 1.0, "farthest from its place", "mm", 0.0, 100.0, "boxes at rest stay", (0.6, -0.8, 0.75),
+        (0.0, 0.0, 0.22),
     ),
     "towel over bar": EngineScene(
         towel_over_bar, 1.0, "slips by", "mm", 0.0, 120.0, "sticks, as 2 < exp(mu pi) = 4.8", (0.5, -0.6, 0.4),

@@ -4,7 +4,11 @@
 
 A row is a scene. "prepare" is what passes until the first frame is done (building the engine's model; where kernels
 are compiled, that too, so it is told of the last round); CPU and wall seconds are those of all other frames, the median
-of the rounds. What an engine lacks or fails at is told in its place.
+of the rounds. What an engine lacks or fails at is told in its place. An engine that has no CUDA runs on the CPU where
+``--device`` asks for CUDA.
+
+A run that was interrupted goes on where it ended when the same command is given again: ``--json`` has each round of
+each scene that is done.
 """
 
 from __future__ import annotations
@@ -30,24 +34,37 @@ WIDTH, HEIGHT = 240, 200  # [px] of an engine's part of a picture
 def run(name: str, engine: str, device: str, look: bool) -> tuple[dict[str, Any], np.ndarray | None]:
     """Run a scene on an engine; the row, and a picture of its end."""
     scene = SCENES[name]
+    if device.startswith("cuda") and "cuda" not in nuno.engine_capabilities(engine):
+        device = "cpu"
+    row: dict[str, Any] = {"scene": name, "engine": engine, "device": device}
     try:
         begin = time.perf_counter()
         world = nuno.World(device=device, engine=engine)
         measure = scene.build(world)
         world.run(1.0 / world.frame_rate)
+        wait(device)
         prepared = time.perf_counter() - begin
         wall, cpu = time.perf_counter(), time.process_time()
         world.run(scene.seconds - 1.0 / world.frame_rate)
+        wait(device)
         wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
         value = measure()
-    except nuno.NunoError as error:
-        return {"scene": name, "engine": engine, "failed": f"{type(error).__name__}: {error}"}, None
-    row = {
-        "scene": name, "engine": engine, "figure": value, "unit": scene.unit, "expected": scene.expected,
-        "off": (value - scene.expected) / scene.scale, "prepare_s": prepared, "wall_s": wall, "cpu_s": cpu,
-        "simulated_s": scene.seconds - 1.0 / 60.0,
-    }  # fmt: skip
-    return row, picture(world, scene, engine) if look else None
+        row |= {
+            "figure": value, "unit": scene.unit, "expected": scene.expected,
+            "off": (value - scene.expected) / scene.scale, "prepare_s": prepared, "wall_s": wall, "cpu_s": cpu,
+            "simulated_s": scene.seconds - 1.0 / world.frame_rate,
+        }  # fmt: skip
+        return row, picture(world, scene, engine) if look else None
+    except Exception as error:  # the other engines and scenes go on
+        return row | {"failed": f"{type(error).__name__}: {error}"}, None
+
+
+def wait(device: str) -> None:
+    """Wait until a GPU is done."""
+    if device.startswith("cuda"):
+        import warp as wp
+
+        wp.synchronize_device(device)
 
 
 def picture(world: nuno.World, scene: EngineScene, title: str) -> np.ndarray:
@@ -57,6 +74,13 @@ def picture(world: nuno.World, scene: EngineScene, title: str) -> np.ndarray:
     camera = nuno.Camera.look_at(scene.eye, scene.target, np.radians(45.0), width=WIDTH, height=HEIGHT)
     image = nuno.take_picture(world, camera, samples=3).color.numpy().copy()
     return cv2.putText(image, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (20, 20, 20), 1, cv2.LINE_AA)
+
+
+def told(row: dict[str, Any]) -> str:
+    """Return a run in a line."""
+    if "failed" in row:
+        return str(row["failed"])
+    return f"{_figure(row)}, CPU {row['cpu_s']:.2f} s, wall {row['wall_s']:.2f} s, prepare {row['prepare_s']:.2f} s"
 
 
 def show(rows: list[dict[str, Any]], engines: list[str]) -> None:
@@ -69,7 +93,7 @@ def show(rows: list[dict[str, Any]], engines: list[str]) -> None:
         unit = "" if scene.unit == "1" else f" {scene.unit}"
         cells = [_figure(by.get((name, engine))) for engine in engines]
         print(f"| {name} | {scene.figure} | {scene.expected:.3g}{unit}: {scene.source} | {' | '.join(cells)} |")
-    print(f"\n| CPU s for s simulated; prepare | {' | '.join(engines)} |\n|{'---|' * (1 + len(engines))}")
+    print(f"\n| CPU s; wall s; prepare s | {' | '.join(engines)} |\n|{'---|' * (1 + len(engines))}")
     for name in names:
         cells = [_seconds(by.get((name, engine))) for engine in engines]
         print(f"| {name} ({SCENES[name].seconds:g} s) | {' | '.join(cells)} |")
@@ -85,7 +109,9 @@ def _figure(row: dict[str, Any] | None) -> str:
 
 
 def _seconds(row: dict[str, Any] | None) -> str:
-    return "no" if row is None or "failed" in row else f"{row['cpu_s']:.2f}; {row['prepare_s']:.2f}"
+    if row is None or "failed" in row:
+        return "no" if row else ""
+    return f"{row['cpu_s']:.2f}; {row['wall_s']:.2f}; {row['prepare_s']:.2f}"
 
 
 def main() -> None:
@@ -94,37 +120,67 @@ def main() -> None:
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--device", default="cpu")
-    parser.add_argument("--json", type=Path, help="write the figures there")
+    parser.add_argument("--json", type=Path, help="write the figures there, and go on with those that are there")
     parser.add_argument("--pictures", type=Path, metavar="DIR", help="write a picture of each scene there")
     given = parser.parse_args()
+    settings = {
+        "machine": {"cpu": platform.machine(), "python": platform.python_version(), "nuno": nuno.__version__},
+        "engines": given.engines, "device": given.device,
+    }  # fmt: skip
+    runs = done(given.json, settings)
+    turns = [(turn, name) for turn in range(given.rounds) for name in given.scenes]
+    with tqdm(total=len(turns) * len(given.engines), file=sys.stderr, disable=None) as bar:
+        for turn, name in turns:
+            last = turn == given.rounds - 1
+            path = given.pictures / f"{name.replace(' ', '-')}.webp" if last and given.pictures else None
+            if any(row["round"] == turn and row["scene"] == name for row in runs) and (path is None or path.exists()):
+                bar.update(len(given.engines))
+                continue
+            rows, parts = [], []
+            for engine in given.engines:
+                row, image = run(name, engine, given.device, look=path is not None)
+                rows.append(row | {"round": turn})
+                parts += [] if image is None else [image]
+                tqdm.write(f"round {turn + 1}, {name} on {engine}: {told(row)}", file=sys.stderr)
+                bar.update()
+            runs = [row for row in runs if (row["round"], row["scene"]) != (turn, name)] + rows
+            if given.json:
+                write(given.json, settings, runs)
+            if path is not None and parts:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                save(np.hstack(parts), path)
+    show(merged(runs), given.engines)
+
+
+def done(path: Path | None, settings: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of all rounds that a file has, where it was written with the same settings."""
+    if path is None or not path.exists():
+        return []
+    found = json.loads(path.read_text())
+    if any(found.get(key) != value for key, value in settings.items()):
+        sys.exit(f"{path} is of another machine, device or other engines; name another file")
+    rows: list[dict[str, Any]] = found["runs"]
+    return rows
+
+
+def write(path: Path, settings: dict[str, Any], runs: list[dict[str, Any]]) -> None:
+    """Write the figures as JSON: "rows" for all rounds, "runs" each for itself."""
+    whole = path.with_name(path.name + ".part")
+    whole.write_text(json.dumps(settings | {"rows": merged(runs), "runs": runs}, indent=1))
+    whole.replace(path)
+
+
+def merged(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row for all rounds of each scene and engine: median times, figures of the last."""
     found: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    turns = [(turn, name, engine) for turn in range(given.rounds) for name in given.scenes for engine in given.engines]
-    parts: dict[str, list[np.ndarray]] = {}
-    for turn, name, engine in tqdm(turns, file=sys.stderr, disable=None):
-        last = turn == given.rounds - 1
-        row, image = run(name, engine, given.device, look=last and given.pictures is not None)
-        found.setdefault((name, engine), []).append(row)
-        if image is not None:
-            parts.setdefault(name, []).append(image)
-        if given.json:  # as far as it is, for a run that is ended early
-            write(given.json, given.rounds, [merged(these) for these in found.values()])
-        if name in parts:
-            given.pictures.mkdir(parents=True, exist_ok=True)
-            save(np.hstack(parts[name]), given.pictures / f"{name.replace(' ', '-')}.webp")
-    rows = [merged(these) for these in found.values()]
-    show(rows, given.engines)
+    for row in sorted(runs, key=lambda row: row["round"]):
+        found.setdefault((row["scene"], row["engine"]), []).append(row)
+    return [_median(found[key]) for key in sorted(found, key=lambda key: list(SCENES).index(key[0]))]
 
 
-def write(path: Path, rounds: int, rows: list[dict[str, Any]]) -> None:
-    """Write the figures as JSON."""
-    machine = {"cpu": platform.machine(), "python": platform.python_version(), "nuno": nuno.__version__}
-    path.write_text(json.dumps({"machine": machine, "rounds": rounds, "rows": rows}, indent=1))
-
-
-def merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return a row for all rounds: median times, figures of the last."""
+def _median(rows: list[dict[str, Any]]) -> dict[str, Any]:
     last = rows[-1]
-    if "failed" in last:
+    if any("failed" in row for row in rows):
         return last
     return last | {key: statistics.median(row[key] for row in rows) for key in ("wall_s", "cpu_s")}
 

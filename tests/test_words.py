@@ -56,7 +56,7 @@ ALLOWED = {
     r"(is_)?root": "of a tree of joints",
     r"least": "public attribute of `nuno.solvers.resolution.Resolution`",
     r"SpreadTask|spread_task": "a task of `nuno.envs`: a cloth is spread on a table",
-    r"BALL|(project_)?ball(_joint)?": "the field's ball joint",
+    r"(mjJNT_)?BALL|(project_)?ball(_joint)?": "the field's ball joint",
     r"listed_(position|rotation)": "where bodies were when rows were listed: a verb, and in saved states",
     r"lay_over|left_over|over_triangle|take_over": "verbs: to lay over, to be left over, to take over",
     r"(Get|Is)PseudoRoot|GetRootLayer": "names of usd-core",

@@ -52,12 +52,14 @@ def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it():
     pytest.importorskip("mujoco", minversion="4.0")
     world = nuno.World(device="cpu", engine="mujoco")
     ball = world.add(nuno.sphere(0.05, name="ball", position=(0.0, 0.0, 1.0)))
+    world.attach(ball)
     with pytest.raises(nuno.EngineCapabilityError) as caught:
-        world.attach(ball, nuno.Rigid(restitution=0.5))
-    assert re.match(r"mujoco has no restitution; engines that have: nuno", str(caught.value))
-    assert (caught.value.engine, caught.value.capability) == ("mujoco", "restitution")
-    assert caught.value.others == engines_with("restitution")
-    assert not ball.is_dynamic
+        world.grip(ball, to=ball.position, max_force=5.0)
+    assert re.match(r"mujoco has no limited welds and joints; engines that have: nuno", str(caught.value))
+    assert (caught.value.engine, caught.value.capability) == ("mujoco", "limited welds and joints")
+    assert caught.value.others == engines_with("limited welds and joints")
+    world.run(0.1)
+    assert ball.position[2] < 0.96  # it falls by 49 mm, for nothing holds it
 
 
 def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():

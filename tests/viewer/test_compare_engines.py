@@ -37,6 +37,12 @@ def test_engines_agree_where_a_closed_form_says_so():
     assert last["time"] == pytest.approx(0.4) and last["centre"] < 0.03 * way + 0.008  # the steps' error besides
     first = [row for row in found.differences() if row["time"] == 0.0]
     assert all(row["largest"] < 1e-6 for row in first), "they begin in the same place, to a float's digits"
+    film = found.film()
+    assert [text for text, _, _ in film.labels] == ["nuno", "mujoco"]
+    left, right = (np.array(at) for _, at, _ in film.labels)
+    # the ramp is what is widest: columns are 1.25 of its 2 m cos 30 deg + 0.1 m sin 30 deg apart
+    assert right[0] - left[0] == pytest.approx(1.25 * (2.0 * np.cos(np.radians(30)) + 0.05), abs=1e-3)
+    assert min(left[2], right[2]) > 2.05, "above the ball, where that begins"
 
 
 def test_the_command_writes_a_film_and_the_differences(tmp_path, capsys):

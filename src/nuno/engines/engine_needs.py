@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from nuno.engines.world_view import rules_of
 from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.joint_drives import DRIVES
-from nuno.joints.tie import HoldSpec, TieSpec
+from nuno.joints.tie import MAX_FORCE, HoldSpec, TieSpec
 from nuno.materials import Cloth, Material, Rigid, Soft
 
 if TYPE_CHECKING:
@@ -47,18 +48,29 @@ def needs_of_dynamics(body: Body, material: Material, world: Simulation) -> list
     return list(dict.fromkeys(needs))
 
 
+def needs_of_all(materials: Sequence[Material]) -> list[str]:
+    """Return the capabilities that bodies of some materials ask for as they move in one world."""
+    bounces = any(np.max(getattr(material, "restitution", 0.0)) > 0.0 for material in materials)
+    deforms = any(isinstance(material, Cloth | Soft) for material in materials)
+    return ["restitution beside deformables"] if bounces and deforms else []
+
+
 def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
     """Return the capabilities that a grip, weld or joint asks for, on another body that is dynamic or not."""
     needs: list[str] = []
     if isinstance(spec, JointSpec):
         kind = {"hinge": "hinges", "slider": "sliders", "ball": "ball joints", "fixed": "fixed joints"}[spec.kind]
         drives = "drives of ball joints" if spec.kind == "ball" else "joint drives"
-        return [kind, drives] if _is_driven(spec) else [kind]
+        needs += [kind, drives] if _is_driven(spec) else [kind]
     if spec.compliance > 0.0:
-        needs.append("compliant grips")
+        kinds = {JointSpec: "compliant joints", HoldSpec: "compliant grips of rigid bodies"}
+        needs.append(kinds.get(type(spec), "compliant grips"))
+    if not isinstance(spec, GripSpec) and np.min(spec.max_force) < MAX_FORCE:
+        needs.append("limited welds and joints")
     if isinstance(spec, HoldSpec):
         needs.append("welds of rigid bodies" if on_moving else "grips of rigid bodies")
-        needs += ["sliding grips"] if spec.free is not None else []
+        if spec.free is not None:
+            needs += ["sliding grips", "sliding welds"] if on_moving else ["sliding grips"]
     elif isinstance(spec, TieSpec):
         needs.append("ties")
         needs += ["grips inside faces"] if _between(spec.weights) else []

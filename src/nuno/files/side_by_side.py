@@ -27,7 +27,7 @@ def side_by_side(recordings: Sequence[Recording], names: Sequence[str]) -> Recor
     """
     if not recordings or len({len(each) for each in recordings}) != 1 or len(recordings) != len(names):
         raise InvalidInputError("side_by_side needs recordings of one length, and a name for each")
-    step = (1.0 + GAP) * max(_width(each) for each in recordings)
+    step = _step(recordings)
     bodies = []
     for column, (each, name) in enumerate(zip(recordings, names, strict=True)):
         for body in each.bodies:
@@ -37,6 +37,26 @@ def side_by_side(recordings: Sequence[Recording], names: Sequence[str]) -> Recor
                 replace(body, name=f"{name}: {body.name}", vertices=body.vertices + np.array([column * step, 0.0, 0.0]))
             )
     return Recording.from_frames(recordings[0].times, bodies)
+
+
+def heads_of_columns(recordings: Sequence[Recording]) -> np.ndarray:
+    """Return (n, 3) [m], above what each recording ever shows, as `side_by_side` draws it."""
+    step, heads = _step(recordings), []
+    for column, each in enumerate(recordings):
+        corners = [part for body in each.bodies if not _is_endless(body) for part in _corners(body)]
+        low, high = (np.min(corners, axis=0), np.max(corners, axis=0)) if corners else (np.zeros(3), np.zeros(3))
+        x, y, _ = 0.5 * (low + high)
+        heads.append((x + column * step, y, high[2]))
+    return np.array(heads)
+
+
+def _corners(body: RecordedBody) -> tuple[np.ndarray, np.ndarray]:
+    points = body.vertices.reshape(-1, 3)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _step(recordings: Sequence[Recording]) -> float:
+    return (1.0 + GAP) * max(_width(each) for each in recordings)
 
 
 def _is_endless(body: RecordedBody) -> bool:

@@ -22,13 +22,17 @@ from nuno.errors import (
     SimulationDiverged,
 )
 from nuno.files.recording import Recording
-from nuno.files.side_by_side import side_by_side
+from nuno.files.side_by_side import heads_of_columns, side_by_side
 from nuno.files.whole_file import file_path, write_whole
 from nuno.validation import checked, count, number
 from nuno.viewer.film import Film
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 
+AHEAD = np.array([0.0, -1.0, 0.4])
+"""From where a film of columns is seen, which stand beside each other along x."""
+LETTERS = 0.12
+"""Height of an engine's name, over the way from one column to the next."""
 PICTURE_LIMIT = 100_000
 """Of a film; more are a slip of the keyboard."""
 
@@ -104,8 +108,14 @@ class EngineComparison:
         return "\n".join([*text, *(f"{engine} did not run: {why}" for engine, why in self.failures.items())])
 
     def film(self) -> Film:
-        """Return a film with one column an engine, from left to right."""
-        return Film.of(side_by_side([self.recordings[engine] for engine in self.engines], self.engines))
+        """Return a film with one column an engine, from left to right, under the engines' names."""
+        recordings = [self.recordings[engine] for engine in self.engines]
+        film, heads = Film.of(side_by_side(recordings, self.engines)), heads_of_columns(recordings)
+        high = LETTERS * float(np.ptp(heads[:, 0])) / (len(heads) - 1)
+        above = np.array([0.0, 0.0, high])
+        film.labels = [(engine, head + above, high) for engine, head in zip(self.engines, heads, strict=True)]
+        film.direction = AHEAD
+        return film
 
     @checked
     def save(self, folder: str | os.PathLike[str]) -> None:

@@ -60,8 +60,29 @@ class Track {
   }
 }
 
+// A text that faces who looks, and hides behind nothing
+
+function label(command, number) {
+  const canvas = document.createElement("canvas"), font = "bold 48px system-ui, sans-serif";
+  let pen = canvas.getContext("2d");
+  pen.font = font;
+  canvas.width = Math.ceil(pen.measureText(command.text).width) + 32;
+  canvas.height = 72;
+  pen = canvas.getContext("2d");  // which a new size has cleared
+  pen.font = font;
+  pen.textBaseline = "middle";
+  pen.fillStyle = "#223";
+  pen.fillText(command.text, 16, 38);
+  const texture = new THREE.CanvasTexture(canvas);
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: texture, depthTest: false, transparent: true }));
+  sprite.scale.set(command.height * canvas.width / canvas.height, command.height, 1);
+  sprite.position.set(...command.at);
+  viewer.set_object(["labels", String(number)], sprite);
+}
+
 class Film {
   constructor(command) {
+    (command.labels || []).forEach(label);
     this.start = command.start;
     this.times = command.times;
     this.duration = this.times[this.times.length - 1];

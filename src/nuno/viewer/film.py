@@ -24,7 +24,7 @@ from nuno.viewer.page import film_page
 from nuno.viewer.rigid_motion import rigid_motion
 from nuno.viewer.scene import Scene
 from nuno.viewer.scene_object import SceneObject, light_of
-from nuno.viewer.viewpoint import View
+from nuno.viewer.viewpoint import FROM, View
 
 if TYPE_CHECKING:
     from nuno.files.recording import Recording
@@ -110,6 +110,8 @@ class Film:
         self._times: list[float] = []
         self._failed: Exception | None = None
         self.view: View | None = None
+        self.direction = FROM  # from where all is seen, where there is no view
+        self.labels: list[tuple[str, Any, float]] = []  # text, where its middle is (3,) and how high it is [m]
         self._period = 1 if scene is None else max(1, int(scene.world.frame_rate / rate + 1e-6))
         if scene is not None:
             with scene.world.lock:
@@ -258,6 +260,7 @@ class Film:
         content = {
             "do": "film", "start": self._times[0], "times": times.astype(np.float32),
             "tracks": [track.content() for track in self._tracks.values()],
+            "labels": [{"text": text, "at": np.array(at).tolist(), "height": high} for text, at, high in self.labels],
         }  # fmt: skip
         return pack({"commands": [view.command(), content]})
 
@@ -291,8 +294,9 @@ class Film:
                 points = np.concatenate(track.points)
                 corners += [points.min(axis=0), points.max(axis=0)]
         if not corners:
-            return View.around(np.full(3, -0.5), np.full(3, 0.5))
-        return View.around(np.min(corners, axis=0).astype(float), np.max(corners, axis=0).astype(float))
+            return View.around(np.full(3, -0.5), np.full(3, 0.5), self.direction)
+        low, high = np.min(corners, axis=0).astype(float), np.max(corners, axis=0).astype(float)
+        return View.around(low, high, self.direction)
 
 
 def _packed(points: np.ndarray) -> dict[str, Any]:

@@ -28,12 +28,12 @@ class View:
     reach: float = 1.0
 
     @classmethod
-    def around(cls, low: np.ndarray, high: np.ndarray) -> View:
-        """Return a view in which all between two corners (3,) [m] is seen."""
+    def around(cls, low: np.ndarray, high: np.ndarray, direction: np.ndarray = FROM) -> View:
+        """Return a view in which all between two corners (3,) [m] is seen, from a ``direction`` (3,)."""
         middle, radius = (low + high) / 2.0, max(0.1, 0.5 * float(np.linalg.norm(high - low)))
         # a sphere fills the picture from sin(field / 2); things are seldom as large as the sphere around them
         away = 0.95 * radius / np.sin(np.radians(FIELD) / 2.0)
-        eye = middle + away * FROM / np.linalg.norm(FROM)
+        eye = middle + away * direction / np.linalg.norm(direction)
         return cls(_triple(eye), _triple(middle), FIELD, radius)
 
     def command(self) -> dict[str, Any]:

@@ -170,6 +170,9 @@ class World(Setting):
             if own._dynamics is None:
                 check_leader(own, not isinstance(chosen, Rigid), following)
             self._engine.allow_dynamics(own, chosen)
+            self._engine.allow_together(
+                [chosen, *(each.material for each in self._attached() if each is not own._dynamics)]
+            )
             dynamics = self._engine.attach(own._as_static(), chosen)
             if given is not None:
                 dynamics.set_velocity(own, given)
@@ -241,6 +244,9 @@ class World(Setting):
             chosen: Any = material
             check_material(own.shape, chosen, self.world_count)
             self._engine.allow_dynamics(own, chosen)
+            self._engine.allow_together(
+                [chosen, *(each.material for each in self._attached() if each is not own._dynamics)]
+            )
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()

@@ -130,3 +130,18 @@ def test_worlds_of_a_batch_have_their_own_moduli():
     assert pressed[0] / pressed[1] == pytest.approx(2.0, rel=0.02)
     wider = np.ptp(vertices[:, :, 0], axis=1) - 0.1
     assert wider[2] > 2.0 * abs(wider[0])
+
+
+@pytest.mark.parametrize("touches", [True, False])
+def test_parts_of_a_soft_body_touch_where_its_material_asks_for_it(touches):
+    """Two slabs of one body, 20 mm thick: the upper one falls on the lower one, or through it, to 0.1 mm."""
+    vertices, tetrahedra = (np.asarray(part) for part in nuno.box_tetrahedra((0.1, 0.1, 0.02), (3, 3, 1)))
+    count = len(vertices)
+    both = np.concatenate([vertices + np.array((0.0, 0.0, z)) for z in (0.011, 0.035)])
+    world = nuno.World(device="cpu", engine="mujoco")
+    world.add(nuno.plane())
+    slabs = world.add(nuno.soft_tetrahedra(both, np.concatenate([tetrahedra, tetrahedra + count])))
+    world.attach(slabs, nuno.Soft(density=200.0, youngs_modulus=1e5, damping=0.02, self_contact=touches))
+    world.run(0.4)
+    assert slabs.vertices[:count, 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert slabs.vertices[count:, 2].min() == pytest.approx(0.02 if touches else 0.0, abs=1e-4)

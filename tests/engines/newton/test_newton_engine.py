@@ -1,11 +1,15 @@
 """Newton behind the protocol of engines: what it moves against closed forms, and what it refuses by name."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import nuno
 from nuno.engines.engine_registry import engine_class
 from nuno.engines.newton.newton_model import membrane
+from nuno.estimate.hypotheses import DISCRETISATIONS
 
 GRAVITY = 9.81  # [m/s2]
 
@@ -141,3 +145,13 @@ def test_what_newton_lacks_is_refused_before_anything_changes():
         world.set_friction(box, other, 0.2)
     with pytest.raises(nuno.EngineCapabilityError, match="newton has no"):
         nuno.hinge(box, other, point=(0.5, 0, 1), axis=(0, 0, 1))
+
+
+@newton
+def test_newton_tells_the_same_corner_as_nuno():
+    """Newton says that the example's cloth was picked at the corner (0, 0), on a coarse mesh and one guess."""
+    pytest.importorskip("newton")
+    coarse = replace(DISCRETISATIONS[0], cells=8, hypotheses=DISCRETISATIONS[0].hypotheses[:1])
+    case = nuno.read_case(Path(__file__).parents[3] / "examples" / "pick-case")
+    found = case.estimate(candidates=(2, 2), engine="newton", discretisations=[coarse], device="cpu", progress=False)
+    assert found.best == (0, 0)

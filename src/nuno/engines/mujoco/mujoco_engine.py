@@ -30,8 +30,8 @@ STEP = 0.0021
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
-    "self-contact of soft bodies", "restitution", "sliding grips", "compliant grips", "limited grips",
-    "drives of ball joints", "cuda",
+    "restitution beside deformables", "sliding welds", "compliant joints",
+    "limited welds and joints", "drives of ball joints", "cuda",
 }  # fmt: skip
 
 
@@ -118,8 +118,7 @@ class MujocoEngine(Engine):
         count = max(1, math.ceil((end - start) / self.substep - 1e-6))
         step = (end - start) / count
         if not math.isclose(step, self.substep, rel_tol=1e-9) or scene.shortened:
-            batch.expand("opt.timestep")[:] = step
-            scene.shortened = True
+            scene.set_step(step)
         times = start + step * np.arange(count + 1)
         paths = {
             key: kinematic_poses(self.world, bodies[key], start, end, times)
@@ -132,7 +131,7 @@ class MujocoEngine(Engine):
             for key, own in scene.placed.items()
             if key in paths
         ]
-        go = partial(_go, batch, scene.holds, count, step, moving, scene.holds.targets(start, end, times))
+        go = partial(_go, batch, scene, count, step, moving, scene.holds.targets(start, end, times))
         bad = [int(getattr(mujoco_package().mjtWarning, name)) for name in BAD]
         before = batch.warning[:, bad].copy()
         self._sums, self._later = scene.sums, None
@@ -276,7 +275,7 @@ class MujocoEngine(Engine):
         return contacts_of(self, body, itself)
 
 
-def _go(batch: Any, holds: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
+def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
     """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
     if not moving and not targets and sums is None:
         batch.step(nstep=count)
@@ -284,7 +283,8 @@ def _go(batch: Any, holds: Any, count: int, step: float, moving: Any, targets: A
     for k in range(count):
         for lead, address, (place, turn) in moving:
             lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
-        holds.write(targets, batch, k, step)
+        scene.holds.write(targets, batch, k, step)
+        scene.joints.lead(batch)
         batch.step()
         if sums is not None:
             sums.add(step)

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_loose import THIN
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_springs import drawn_with
 from nuno.engines.world_view import bodies_by_key, dynamics_of
 from nuno.joints.grip import Grip
 from nuno.joints.joint import JointSpec
@@ -23,7 +25,7 @@ def forwarded(engine: MujocoEngine) -> list[tuple[Any, Any]]:
     engine.write(time)
     step = engine.substep
     # where grips lead now, with the velocity of the substep to come
-    scene.holds.write(scene.holds.present(time, step), scene.batch, 0, step)
+    scene.holds.write(scene.holds.present(time, step), scene.batch, 0, step, at_end=False)
     found = []
     for world in range(engine.world.world_count):
         model, data = scene.batch.get_model(world), scene.batch.get_data(world)
@@ -37,25 +39,32 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
     mujoco, scene = mujoco_package(), engine.scene
     worlds = engine.world.world_count
     force, torque = np.zeros((worlds, 3)), np.zeros((worlds, 3))
-    rows = scene.holds.rows_of(grip)
+    held = scene.holds.held_by(grip)
     own = scene.placed[grip.body.key]
     dynamics: Any = dynamics_of(grip.body)
-    if rows is None or engine.world.time == 0.0:
+    if held is None or engine.world.time == 0.0:
         return force, torque
     for world, (model, data) in enumerate(forwarded(engine)):
         kind = mujoco.mjtConstraint.mjCNSTR_EQUALITY
-        mine = (data.efc_type == kind) & np.isin(data.efc_id, rows)
-        given = np.zeros(model.nv)
-        mujoco.mj_mulJacTVec(model, data, given, np.where(mine, data.efc_force, 0.0))
+        if held.terms:
+            given = drawn_with(held, data, world)
+        else:
+            mine = (data.efc_type == kind) & np.isin(data.efc_id, held.rows)
+            given = np.zeros(model.nv)
+            mujoco.mj_mulJacTVec(model, data, given, np.where(mine, data.efc_force, 0.0))
         if own.role == "flex":
             each = given[own.dof[:, None] + np.arange(3)]
-            held = np.abs(each).sum(axis=1) > 0.0
+            borne = np.abs(each).sum(axis=1) > 0.0
             places = dynamics.values["positions"][world]
-            middle = places[held].mean(axis=0) if held.any() else np.zeros(3)
+            middle = places[borne].mean(axis=0) if borne.any() else np.zeros(3)
             force[world], torque[world] = -each.sum(axis=0), -np.cross(places - middle, each).sum(axis=0)
             continue
         at, turn = int(own.dof[0]), dynamics.values["turn"][world]
         force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
+        if held.helper is not None:  # what leads bears the helper's share of the mass besides
+            share = THIN * float(dynamics.mass[world]) * (model.opt.gravity - data.qacc[at : at + 3])
+            force[world] += share
+            torque[world] += np.cross(quat.rotate(turn, dynamics.centre), share)
         if isinstance(grip.spec, JointSpec):  # told at the joint's point
             arm = quat.rotate(turn, grip.spec.place[world])
             torque[world] -= np.cross(arm, force[world])

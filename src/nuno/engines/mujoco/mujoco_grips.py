@@ -1,9 +1,10 @@
 """Grips, ball and fixed joints in MuJoCo, as equality constraints whose targets are written before each substep.
 
 A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
-weighted sum, by fixed tendons. A rigid body is welded to what leads it: another body, or a heavy one without a shape
-that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are joints of
-MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
+weighted sum, by fixed tendons. Points that give way, or whose grip bears a limited force, are drawn by springs, see
+`nuno.engines.mujoco.mujoco_springs`. A rigid body is welded to what leads it: another body, or a heavy one without a
+shape that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are
+joints of MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
 """
 
 from __future__ import annotations
@@ -14,14 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
+from nuno.engines.mujoco.mujoco_loose import WELDED, add_helper, find_helper, is_loose, place_helper
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
-from nuno.engines.world_view import attached
+from nuno.engines.world_view import attached, dynamics_of
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
 from nuno.shapes import quaternion as quat
-from nuno.shapes.coordinates import apply
+from nuno.shapes.coordinates import apply, compose
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
@@ -30,6 +33,8 @@ STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """``solimp`` of all equalities."""
 CLOSING = 2.0
 """Time constant of all equalities, in substeps."""
+SOFT = 0.1
+"""Impedance of a tie that gives way: a constraint of the stiffness k is a spring of k (1 - 0.1) / inverse mass."""
 LEADER = 1e6
 """[kg] and [kg m2] Of the body that leads a rigid one along a path."""
 
@@ -40,12 +45,17 @@ class Held:
 
     Attributes:
         grip: The grip.
-        names: Its equalities.
-        rows: Their numbers in the model.
+        names: Its equalities; of one by springs its actuators.
+        rows: Their numbers in the model; of actuators (points, 3).
         point: (worlds, k) int, of each held point its number among the grip's distinct points, -1 for none.
         rest: (points, 3) [m], of each distinct point its place at rest, which coordinates are counted from.
         leader: The body that leads, or None.
         address: Its first coordinate and its first velocity in the model.
+        terms: Of one by springs, of each distinct point its own vertices with their weights.
+        corners, weights, qpos, dof: The same as arrays (points, most), and where they are in the model.
+        helper: Of a loose one of a rigid body, what that is welded to.
+        slides, ball: The numbers of its joints in the model, -1 for no ball.
+        addresses: Of the coordinates and velocities of all joints.
     """
 
     grip: Grip
@@ -55,6 +65,15 @@ class Held:
     rest: np.ndarray | None = None
     leader: Any = None
     address: tuple[int, int] = (-1, -1)
+    terms: list[list[tuple[int, float]]] = field(default_factory=list)
+    corners: Any = None
+    weights: Any = None
+    qpos: Any = None
+    dof: Any = None
+    helper: Any = None
+    slides: Any = None
+    ball: int = -1
+    addresses: Any = None
 
 
 class Holds:
@@ -147,32 +166,46 @@ class Holds:
         own.rest = np.array(rest).reshape(-1, 3)
 
     def _add_coordinates(self, own: Held, mine: Any, terms: Any, target: Any, others: Any) -> None:
-        """Add an equality of each coordinate of a point of a flex."""
+        """Add an equality, or a spring, of each coordinate of a point of a flex."""
+        soft = is_spring(own.grip.spec)
+        if soft:
+            own.terms.append(terms)
         for letter in "xyz":
-            if len(terms) == 1 and not others:
+            if len(terms) == 1 and not others and not soft:
                 self._equality(own, "JOINT", f"{mine.bodies[terms[0][0]].name}.{letter}")
                 continue
             self._made += 1
-            tendon = self._spec.add_tendon(name=f"t{self._made}")
-            for part, its in ((mine, terms), (target, others)):
-                for corner, weight in its:
-                    tendon.wrap_joint(f"{part.bodies[corner].name}.{letter}", weight)
+            name = f"t{self._made}"
+            wraps = [(f"{part.bodies[corner].name}.{letter}", weight)
+                     for part, its in ((mine, terms), (target, others)) for corner, weight in its]  # fmt: skip
+            if soft:
+                own.names.append(name)
+                self._elements += add_spring(self._spec, name, wraps)
+                continue
+            tendon = self._spec.add_tendon(name=name)
+            for joint, weight in wraps:
+                tendon.wrap_joint(joint, weight)
             self._elements.append(tendon)
             self._equality(own, "TENDON", tendon.name)
 
     def _add_hold(self, own: Held, placed: dict[str, Any]) -> None:
-        grip = own.grip
-        if grip.target is not None:
-            name = placed[grip.target.key].bodies[0].name
+        grip, joined = own.grip, placed[own.grip.body.key]
+        loose = is_loose(grip.spec)
+        if grip.target is not None and not (loose and dynamics_of(grip.target) is None):
+            leads = placed[grip.target.key].bodies[0]
         else:
             self._made += 1
-            own.leader = self._spec.worldbody.add_body(
+            leads = own.leader = self._spec.worldbody.add_body(
                 name=f"g{self._made}", mass=LEADER, inertia=[LEADER] * 3, explicitinertial=True, gravcomp=1.0
             )
             own.leader.add_freejoint(name=own.leader.name)
             self._elements.append(own.leader)
-            name = own.leader.name
-        self._equality(own, "WELD", name, placed[grip.body.key].bodies[0].name, "BODY")
+        if loose:
+            self._made += 1
+            leads = own.helper = add_helper(own, leads, f"h{self._made}")
+            joined.thin.append(own.helper)
+            self._elements.append(own.helper)
+        self._equality(own, "WELD", leads.name, joined.bodies[0].name, "BODY")
 
     def _add_joint(self, own: Held, placed: dict[str, Any]) -> None:
         grip, mine = own.grip, placed[own.grip.body.key].bodies[0].name
@@ -191,6 +224,9 @@ class Holds:
         worlds = self._world.world_count
         data, active = batch.expand("eq_data"), batch.bind("eq_active")
         for own in self._held:
+            if is_spring(own.grip.spec):
+                find_springs(own, placed, model, batch)
+                continue
             own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
             batch.expand("eq_solref")[:, own.rows] = (CLOSING * step, 1.0)
             spec = own.grip.spec
@@ -199,11 +235,17 @@ class Holds:
                 own.address = int(model.jnt_qposadr[model.body_jntadr[body]]), int(model.body_dofadr[body])
             if isinstance(spec, GripSpec | TieSpec):
                 self._find_points(own, data, active)
+                if spec.compliance > 0.0:
+                    self._soften(own, model, batch, placed)
             elif isinstance(spec, HoldSpec):
                 place, turn = np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1))
-                if own.leader is None:
+                if own.helper is not None:
+                    find_helper(own, model, batch)
+                elif own.leader is None:
                     place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
                 _weld(data, int(own.rows[0]), place, turn)
+                if own.helper is not None:
+                    data[:, own.rows[0], 10] = WELDED
             else:
                 _joint(data, own.rows, spec)
 
@@ -225,6 +267,19 @@ class Holds:
                         data[world, rows[point], :5] = 0.0
                         data[world, rows[point], 0] = -own.rest[point]
 
+    def _soften(self, own: Held, model: Any, batch: Any, placed: dict[str, Any]) -> None:
+        """Let a tie to a rigid body give way as a spring does."""
+        assert own.grip.target is not None
+        bodies = [int(model.body(placed[own.grip.body.key].bodies[0].name).id)] * len(own.rows)
+        for k, name in enumerate(own.names):
+            bodies[k] = int(model.body(self._spec.equality(name).name1).id)
+        other = placed[own.grip.target.key].id
+        for world in range(self._world.world_count):
+            inverse = batch.get_model(world).body_invweight0[:, 0]
+            stiffness = (1.0 - SOFT) * (inverse[bodies] + inverse[other]) / own.grip.spec.compliance
+            batch.expand("eq_solref")[world, own.rows] = np.stack([-stiffness, np.full_like(stiffness, -1e-9)], axis=-1)
+        batch.expand("eq_solimp")[:, own.rows, :2] = SOFT
+
     def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
         """Return where each driven grip leads at ``times`` (k + 1,) [s] from ``start`` to ``end``."""
         frame = 1.0 / self._world.frame_rate
@@ -234,6 +289,8 @@ class Holds:
                 found.append((own, driven_points(own.grip, start, frame, times)))
             elif own.leader is not None:
                 found.append((own, driven_hold(own.grip, start, end, times, self._world.world_count)))
+            elif own.helper is not None:
+                found.append((own, None))
         return found
 
     def present(self, time: float, step: float) -> list[tuple[Held, Any]]:
@@ -248,17 +305,30 @@ class Holds:
                 else:
                     now = np.broadcast_to(apply(target.pose(), own.grip.offsets), own.grip.offsets.shape)
                     found.append((own, np.stack([now, now], axis=2)))
+            elif own.leader is not None and target is not None:
+                shape = (self._world.world_count, 2)
+                lead = compose(target.pose(), own.grip.offsets)
+                parts = (np.broadcast_to(part[..., None, :], (*shape, part.shape[-1])) for part in lead)
+                found.append((own, tuple(parts)))
+            elif own.leader is None and own.helper is not None:
+                found.append((own, None))
             elif own.leader is not None:
                 places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
                 found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
         return found
 
-    def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float) -> None:
-        """Write where driven grips lead in substep ``k``, which takes ``step`` [s]."""
+    def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float, at_end: bool = True) -> None:
+        """Write where driven grips lead in substep ``k``, which takes ``step`` [s]; springs at its start or end."""
         for own, goals in targets:
+            if own.helper is not None:
+                place_helper(own, batch, goals, k, step)
             if own.leader is not None:
                 place, turn = (part[:, k : k + 2] for part in goals)
                 send(batch, own.address, place, turn, step)
+            if own.leader is not None or own.helper is not None:
+                continue
+            if own.terms:
+                draw(own, batch, goals[:, :, k + 1 if at_end else k])
                 continue
             data = batch.expand("eq_data")
             velocity = (goals[:, :, k + 1] - goals[:, :, k]) / step
@@ -269,9 +339,9 @@ class Holds:
             which = own.point[world, point]
             data[world[:, None], own.rows.reshape(-1, 3)[which], 0] = goal[world, point] - own.rest[which]
 
-    def rows_of(self, grip: Grip) -> np.ndarray | None:
-        """Return the numbers of a grip's equalities in the model; None where it is not known there."""
-        return next((own.rows for own in self._held if own.grip is grip), None)
+    def held_by(self, grip: Grip) -> Held | None:
+        """Return a grip as it is in the spec; None where it is not known there."""
+        return next((own for own in self._held if own.grip is grip), None)
 
 
 def push(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:

@@ -3,6 +3,13 @@
 A drive is what MuJoCo has: stops are a joint's range, springs its stiffness and damping, friction a dry friction of
 its coordinate. A motor with gains is an actuator with an affine law and a limit. A motor that keeps a velocity exactly
 is a clutch, a dry friction as large as its effort between the joint and a flywheel that turns at that velocity.
+
+MuJoCo cuts off an actuator's force before the substep, not at its end: a strong motor of a light joint would throw it
+to and fro. Such a motor is a clutch too, which gives way as its gains do: with the stiffness k, the damping d, substeps
+h and the limit F, min(k (x - x_next) - d v_next, F) is a friction of at most F that has the coefficient c = k h + d
+against the velocity k (x - x_now) / c. MuJoCo's friction f obeys (v_next - v) / h + b v = -R f, where ``discrete``
+takes b at the velocity of the substep's end: f is the motor's for R = b / c and a large b. The other integrators take
+it at the start, and b = 1 / h makes the two terms one.
 """
 
 from __future__ import annotations
@@ -13,7 +20,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.mujoco.mujoco_package import mujoco_package
-from nuno.engines.mujoco.mujoco_tree import JointStates, axis_of, depth_of, hinges_and_sliders, rest_pose
+from nuno.engines.mujoco.mujoco_tree import (
+    JointStates,
+    axis_of,
+    depth_of,
+    hinges_and_sliders,
+    inertias,
+    rest_pose,
+)
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
@@ -31,6 +45,10 @@ STRONGEST = 1e9
 """[N m, N] Of a motor without a limit."""
 FLYWHEEL = 1e6
 """[kg]"""
+STEEPNESS = 300.0
+"""b h of such a friction: what is left of the acceleration's term is one in so many."""
+LIGHT = 1.0
+"""Of (h^2 k + h d) over the inertia, from where on a motor with a limit is a clutch."""
 
 
 @dataclass(eq=False)
@@ -86,6 +104,9 @@ class Joints:
         self._made = 0
         self.states: Any = None
         self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
+        self._step, self._steepness = 0.0, STEEPNESS
+        self._carried: dict[Joint, np.ndarray] = {}
+        self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         self._is_driven = False  # whether the numbers of the drives are those that the batch has
 
     def __len__(self) -> int:
@@ -108,9 +129,10 @@ class Joints:
             self._spec.delete(element)
         self._joined, self._elements = [], []
 
-    def add(self, spec: Any, placed: dict[str, Any], tree: dict[str, Joint]) -> None:
-        """Put all into the spec, as the bodies of the tree are in it."""
-        self._spec = spec
+    def add(self, spec: Any, placed: dict[str, Any], tree: dict[str, Joint], step: float) -> None:
+        """Put all into the spec, as the bodies of the tree are in it, for substeps so long [s]."""
+        self._spec, self._step = spec, step
+        self._carried = inertias(tree)
         for joint in hinges_and_sliders(self._world):
             if tree.get(joint.body.key) is joint:
                 own = Jointed(joint, depth_of(joint.body.key, tree), placed[joint.body.key].bodies[0].name)
@@ -148,7 +170,7 @@ class Joints:
                 objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name,
             )  # fmt: skip
             self._elements.append(sensor)
-        if not needs_clutch(own.joint):
+        if not self._needs_clutch(own.joint):
             return
         own.clutch = True
         wheel = spec.worldbody.add_body(
@@ -168,6 +190,9 @@ class Joints:
         self.number = np.array([model.joint(own.name).id for own in joined], dtype=int)
         self.qpos, self.dof = model.jnt_qposadr[self.number], model.jnt_dofadr[self.number]
         self._is_driven, self.states = False, None
+        is_discrete = model.opt.integrator == mujoco_package().mjtIntegrator.mjINT_DISCRETE
+        self._steepness = STEEPNESS if is_discrete else 1.0
+        self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         if not joined:
             return
         self._motor = np.array([model.actuator(own.name).id for own in joined], dtype=int)
@@ -176,14 +201,14 @@ class Joints:
         self._sensor = first[:, None] + np.arange(6)
         assert all(model.sensor(f"{own.name}.TORQUE").adr[0] == at + 3 for own, at in zip(joined, first, strict=True))
         clutched = [own for own in joined if own.clutch]
-        self._clutched = np.array([own.clutch for own in joined])
+        self._clutched = np.flatnonzero([own.clutch for own in joined])
         self._clutch = np.array([model.tendon(own.name).id for own in clutched], dtype=int)
-        self._wheel = np.array([int(model.joint(f"{own.name}.wheel").dofadr[0]) for own in clutched], dtype=int)
+        wheels = [model.joint(f"{own.name}.wheel") for own in clutched]
+        self._wheel = np.array([int(wheel.dofadr[0]) for wheel in wheels], dtype=int)
+        self._wheel_at = np.array([int(wheel.qposadr[0]) for wheel in wheels], dtype=int)
         closing = (CLOSING * step, 1.0)
         batch.expand("jnt_solref")[:, self.number] = closing
         batch.expand("dof_solref")[:, self.dof] = closing
-        if clutched:
-            batch.expand("tendon_solref_fri")[:, self._clutch] = closing
         for own in joined:
             self._set_frames(own, model, batch)
         self.states = JointStates(self._world, self.joints, [own.depth for own in joined])
@@ -212,7 +237,21 @@ class Joints:
         """Be told that a joint's drives are others now; return whether the spec has what they need."""
         self._is_driven = False
         own = next((own for own in self._joined if own.joint is joint), None)
-        return own is not None and (own.clutch or not needs_clutch(joint))
+        return own is not None and (own.clutch or not self._needs_clutch(joint))
+
+    def _needs_clutch(self, joint: Joint) -> bool:
+        """Return True if, in any world, a motor keeps a velocity exactly, or is strong for what its joint carries."""
+        drives = dict(zip(DRIVES, np.moveaxis(joint.spec.drives, -1, 0), strict=True))
+        keeps, step = np.isinf(drives["damping"]), self._step
+        if (keeps & (drives["max_effort"] > 0.0)).any():
+            return True
+        stiff = step * (step * drives["stiffness"] + np.where(keeps, 0.0, drives["damping"]))
+        carried = self._carried.get(joint, np.inf)  # one in a loop is stiff by the others
+        return bool((np.isfinite(drives["max_effort"]) & (stiff > LIGHT * carried)).any())
+
+    def set_step(self, step: float) -> None:
+        """Let the substeps to come be so long [s]."""
+        self._step, self._is_driven = step, False
 
     def write(self, batch: Any, moved: dict[str, tuple[np.ndarray, ...]]) -> None:
         """Write the joints' coordinates, as the bodies are, and their drives where these have changed."""
@@ -224,7 +263,16 @@ class Joints:
             self._write_drives(batch)
             self._is_driven = True
         if len(self._wheel):
+            batch.bind("qpos")[:, self._wheel_at] = 0.0
             batch.bind("qvel")[:, self._wheel] = self._speeds
+
+    def lead(self, batch: Any) -> None:
+        """Turn the flywheels of motors with gains as the next substep needs it."""
+        if not self._gives.any():
+            return
+        stiffness, pull, coefficient = self._gains
+        speeds = (pull - stiffness * batch.bind("qpos")[:, self.qpos[self._clutched]]) / coefficient
+        batch.bind("qvel")[:, self._wheel] = np.where(self._gives, speeds, self._speeds)
 
     def _write_drives(self, batch: Any) -> None:
         table = np.stack([own.joint.spec.drives for own in self._joined], axis=1)
@@ -237,13 +285,35 @@ class Joints:
         keeps = np.isinf(own["damping"])
         damping = np.where(keeps, 0.0, own["damping"])
         most = np.minimum(own["max_effort"], STRONGEST)
+        by_clutch = np.zeros(keeps.shape, dtype=bool)
+        by_clutch[:, self._clutched] = True
         law = batch.expand("actuator_biasprm")
-        law[:, self._motor, 0] = own["stiffness"] * own["position"] + damping * own["velocity"]
-        law[:, self._motor, 1], law[:, self._motor, 2] = -own["stiffness"], -damping
+        law[:, self._motor, 0] = np.where(
+            by_clutch, 0.0, own["stiffness"] * own["position"] + damping * own["velocity"]
+        )
+        law[:, self._motor, 1] = np.where(by_clutch, 0.0, -own["stiffness"])
+        law[:, self._motor, 2] = np.where(by_clutch, 0.0, -damping)
         batch.expand("actuator_forcerange")[:, self._motor] = np.stack([-most, most], -1)
         if len(self._wheel):
-            batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps, most, 0.0)[:, self._clutched]
-            self._speeds = own["velocity"][:, self._clutched]
+            clutched = {name: values[:, self._clutched] for name, values in own.items()}
+            self._write_clutches(batch, clutched, damping[:, self._clutched], most[:, self._clutched])
+
+    def _write_clutches(self, batch: Any, own: dict[str, np.ndarray], damping: np.ndarray, most: np.ndarray) -> None:
+        keeps, step = np.isinf(own["damping"]), self._step
+        coefficient = own["stiffness"] * step + damping
+        self._speeds, self._gives = own["velocity"], ~keeps & (coefficient > 0.0)
+        pull = own["stiffness"] * own["position"] + damping * own["velocity"]
+        self._gains = own["stiffness"], pull, np.where(self._gives, coefficient, 1.0)
+        inverse = np.stack([batch.get_model(k).tendon_invweight0[self._clutch] for k in range(len(keeps))])
+        share = step * coefficient * inverse / self._steepness
+        impedance = np.clip(share / (1.0 + share), 1e-4, STIFF[0])  # R is (1 - d) / d of the inverse inertia
+        batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps | self._gives, most, 0.0)
+        solimp = batch.expand("tendon_solimp_fri")
+        solimp[:, self._clutch] = STIFF
+        solimp[:, self._clutch, :2] = np.where(self._gives, impedance, STIFF[0])[..., None]
+        gives = np.stack([np.full_like(impedance, -1e-9), -self._steepness * impedance / step], axis=-1)
+        solref = np.where(self._gives[..., None], gives, (CLOSING * step, 1.0))
+        batch.expand("tendon_solref_fri")[:, self._clutch] = solref
 
     def read(self, batch: Any, moved: dict[str, tuple[np.ndarray, ...]]) -> None:
         """Set the states of the bodies that hang in the tree; ``moved`` is as `JointStates.set_bodies` takes it."""
@@ -263,9 +333,3 @@ class Joints:
         which = np.where(self.states.slides, 0, 1)
         along = np.einsum("wnx,wnx->wn", on_body[:, np.arange(len(which)), which], axis)
         return -on_body.reshape(*given.shape[:2], 6), along
-
-
-def needs_clutch(joint: Joint) -> bool:
-    """Return True if a joint has a motor that keeps a velocity exactly, in any world."""
-    drives = dict(zip(DRIVES, np.moveaxis(joint.spec.drives, -1, 0), strict=True))
-    return bool((np.isinf(drives["damping"]) & (drives["max_effort"] > 0.0)).any())

@@ -16,9 +16,19 @@ from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
+from nuno.engines.mujoco.mujoco_loose import THIN
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
-from nuno.engines.mujoco.mujoco_touch import set_friction, set_masks, write_friction
+from nuno.engines.mujoco.mujoco_touch import (
+    CONTACT,
+    IMPEDANCE,
+    TouchingPair,
+    restitution_of,
+    set_masks,
+    set_pairs,
+    write_friction,
+    write_pairs,
+)
 from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
@@ -30,11 +40,8 @@ if TYPE_CHECKING:
 
 HEAVY = 1e6
 """[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
-CONTACT = (0.004, 1.0)
-"""``solref`` of contacts: time constant [s] and damping ratio. MuJoCo's default is 0.02 s, in which a towel sinks 5 mm
-into a table."""
-IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
-"""``solimp`` of contacts."""
+LEADING = 0.5 * HEAVY
+"""[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
 
 
 @dataclass(eq=False)
@@ -50,6 +57,7 @@ class Placed:
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
         helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
+        thin: Helpers of loose holds, each with a fiftieth of its mass.
         carries: Whether bodies hang on it by joints.
         depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
@@ -65,6 +73,7 @@ class Placed:
     mesh: FlexMesh | None = None
     friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
     helpers: list[Any] = field(default_factory=list)
+    thin: list[Any] = field(default_factory=list)
     carries: bool = False
     depth: int = 0
     id: int = -1
@@ -102,11 +111,11 @@ class MujocoScene:
         self.compilations = 0
         self.shortened = False  # whether the substep has been another than the model's
         self._settings: tuple[Any, ...] = ()
+        self._pairs: list[TouchingPair] = []
         self._begin()
 
     def _begin(self) -> None:
         mujoco, spec = self._mujoco, self._mujoco.MjSpec()
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
         spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0
@@ -147,19 +156,24 @@ class MujocoScene:
                 self.placed[key].depth = depth
         carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
         for key, own in self.placed.items():
-            own.carries, own.helpers = key in carriers, []
+            own.carries, own.helpers, own.thin = key in carriers, [], []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
-        set_friction(self.spec, world, bodies)
+        self._pairs = set_pairs(self.spec, world, bodies)
         self.holds.add(self.spec, self.placed)
-        self.joints.add(self.spec, self.placed, tree)
+        self.joints.add(self.spec, self.placed, tree, substep)
         for body, own in bodies:
             if own.role == "rigid":
-                _share_mass(dynamics_of(body), [*own.bodies, *own.helpers])
+                _share_mass(dynamics_of(body), _shares(own))
         self.spec.option.timestep, self.shortened = substep, False
+        # a contact that bounces needs one that takes its damper as it is, and a flex needs the other
+        bounces = any(restitution_of(world, body).any() for body in world.bodies)
+        kinds = self._mujoco.mjtIntegrator
+        self.spec.option.integrator = kinds.mjINT_IMPLICITFAST if bounces else kinds.mjINT_DISCRETE
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
+        _set_tolerance(self.model)
         # the forces of contacts are read from the data after each substep
         kept = bool(world.engine.rules.summed) or any(own.role == "rigid" for own in self.placed.values())
         self.batch = self._mujoco.batch.Batch(self.model, world.world_count, 1, kept)
@@ -169,9 +183,17 @@ class MujocoScene:
         self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
+        write_pairs(self.model, self.batch, self._pairs, substep)
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
         self.sums = Sums(self, world.world_count) if kept else None
+
+    def set_step(self, step: float) -> None:
+        """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
+        self.batch.expand("opt.timestep")[:] = step
+        write_pairs(self.model, self.batch, self._pairs, step)
+        self.joints.set_step(step)
+        self.shortened = True
 
     def _delete(self, key: str) -> None:
         own = self.placed.pop(key)
@@ -185,7 +207,7 @@ class MujocoScene:
         if isinstance(dynamics, ArrayParticles):
             mesh = FlexMesh(dynamics)
             flex, bodies = add_flex(spec, name, mesh, dynamics)
-            flex.selfcollide = 4 if rules_of(self._world).touches_itself(body) and mesh.axes is not None else 0
+            flex.selfcollide = 4 if _touches_itself(self._world, body) else 0
             own = Placed(role, signature, bodies, flexes=[flex], mesh=mesh)
         else:
             from nuno.bodies.rigid_dynamics import parts_of
@@ -234,8 +256,9 @@ class MujocoScene:
                 batch.expand("body_mass")[:, ids] = dynamics.mass
                 continue
             share = np.trace(dynamics.inertia, axis1=1, axis2=2)
-            for each in (own.id, *(int(model.body(helper.name).id) for helper in own.helpers)):
-                batch.expand("body_mass")[:, each] = dynamics.mass / (1 + len(own.helpers))
+            for made, part in _shares(own):
+                each = int(model.body(made.name).id)
+                batch.expand("body_mass")[:, each] = dynamics.mass * part
                 batch.expand("body_inertia")[:, each] = model.body_inertia[each] * (share / share[0])[:, None]
         if moving:
             batch.set_const()  # of all worlds, so that one is the same in any batch
@@ -265,11 +288,27 @@ class MujocoScene:
             damping[:, own.dof[0] + 3 + axis] = drag * spin
 
 
-def _share_mass(dynamics: Any, bodies: list[Any]) -> None:
-    """Give a rigid body and its helpers equal shares of its mass and inertia."""
-    inertia = dynamics.inertia[0] / len(bodies)
-    for made in bodies:
-        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) / len(bodies), dynamics.centre, True
+def _set_tolerance(model: Any) -> None:
+    """Let the solver go on until what is left is small beside the bodies, not beside those that lead.
+
+    MuJoCo measures it by the mean inertia of all coordinates, and leaders and flywheels have a million times that.
+    """
+    light = model.dof_M0[model.dof_M0 < LEADING]
+    if 0 < len(light) < model.nv:
+        model.opt.tolerance *= max(float(light.mean()) / float(model.dof_M0.mean()), 1e-7)
+
+
+def _shares(own: Placed) -> list[tuple[Any, float]]:
+    """Return a rigid body and its helpers, with their shares of its mass."""
+    heavy, left = [*own.bodies, *own.helpers], 1.0 - THIN * len(own.thin)
+    return [*((made, left / len(heavy)) for made in heavy), *((made, THIN) for made in own.thin)]
+
+
+def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
+    """Give a rigid body and its helpers their shares of its mass and inertia."""
+    for made, part in shares:
+        inertia = dynamics.inertia[0] * part
+        made.mass, made.ipos, made.explicitinertial = float(dynamics.mass[0]) * part, dynamics.centre, True
         made.fullinertia = [
             inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
         ]  # fmt: skip
@@ -297,3 +336,8 @@ def _signature(world: Simulation, body: Body, role: str) -> tuple[Any, ...]:
         # another material makes other dynamics
         return role, id(dynamics_of(body)), rules_of(world).touches_itself(body)
     return role, id(body.shape), body.local_vertices().tobytes() if body.is_deformed else None, body.thickness
+
+
+def _touches_itself(world: Simulation, body: Body) -> bool:
+    """Return True if the parts of a cloth touch each other, or those of a soft body whose material asks for it."""
+    return rules_of(world).touches_itself(body) and getattr(dynamics_of(body).material, "self_contact", True)

@@ -1,9 +1,16 @@
-"""Touching: which pairs collide, as bit masks, and the friction of each pair."""
+"""Touching: which pairs collide, as bit masks, and the friction and restitution of each pair.
+
+Two bodies of which one has a restitution e touch by a damper that a single substep h goes through: of
+``v_next = v - h b v`` with b = (1 + e) / h there is -e v left. A spring as weak as 0.02 (1 - e) / h^2 brings out what
+overlaps, and friction stops what sticks by a damper of its own. The integrators that take a contact's damper as it is
+are those other than ``discrete``.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +27,16 @@ log = logging.getLogger(__name__)
 
 BITS = 31
 """Bits of a mask that tell bodies apart."""
+CONTACT = (0.004, 1.0)
+"""``solref`` of contacts: time constant [s] and damping ratio. MuJoCo's default is 0.02 s, in which a towel sinks 5 mm
+into a table."""
+IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
+"""``solimp`` of contacts."""
+BOUNCING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""``solimp`` of contacts that bounce."""
+LIFT = 0.02
+"""Of the spring that brings out what overlaps, over (1 - e) / h^2: a bounce is faster by a share of 0.02 (1 - e) at
+most."""
 _warned: set[frozenset[str]] = set()
 
 
@@ -83,11 +100,27 @@ def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
                 shape.contype, shape.conaffinity = 1 << k, mask
 
 
-def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
-    """Give all geoms and flexes the coefficients of their pairs.
+@dataclass(frozen=True, eq=False)
+class TouchingPair:
+    """Two geoms that touch with numbers of their own.
+
+    Attributes:
+        name: Of the pair in the spec.
+        friction: (worlds,), the coefficient.
+        restitution: (worlds,).
+    """
+
+    name: str
+    friction: np.ndarray
+    restitution: np.ndarray
+
+
+def set_pairs(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -> list[TouchingPair]:
+    """Give all geoms and flexes the coefficients of their pairs; return the pairs that have numbers of their own.
 
     MuJoCo takes of two the larger coefficient, or that of the shape with the higher priority; Nuno's pair takes the
-    geometric mean. A geom against a flex tells the pair's own; two geoms that differ from theirs are an explicit pair.
+    geometric mean. A geom against a flex tells the pair's own; two geoms that differ from theirs, or that bounce, are
+    an explicit pair.
     """
     for pair in list(spec.pairs):
         spec.delete(pair)
@@ -107,21 +140,49 @@ def set_friction(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -
         for other, theirs in flexes[:i]:
             if rules_of(world).touch(body, other):
                 _tell(body, other, pair_friction(world, body, other), np.maximum(own.friction, theirs.friction))
+    found: list[TouchingPair] = []
     for i, (body, own) in enumerate(others):
         for other, theirs in others[:i]:
             if (dynamics_of(body) is None and dynamics_of(other) is None) or not rules_of(world).touch(body, other):
                 continue
             mu, taken = pair_friction(world, body, other), np.maximum(own.friction, theirs.friction)
-            if np.abs(mu - taken).max() < 1e-9:
+            bounce = np.maximum(restitution_of(world, body), restitution_of(world, other))
+            if np.abs(mu - taken).max() < 1e-9 and not bounce.any():
                 continue
-            if own.flexes or theirs.flexes or np.ptp(mu) > 0.0:
+            if own.flexes or theirs.flexes:
                 _tell(body, other, mu, taken)
+                _tell(body, other, bounce, np.zeros_like(bounce), "restitution")
                 continue
             for a in own.geoms:
                 for b in theirs.geoms:
-                    pair = spec.add_pair(geomname1=a.name, geomname2=b.name)
-                    pair.condim, pair.friction = 3, [float(mu[0]), float(mu[0]), 0.005, 1e-4, 1e-4]
-                    pair.solref, pair.solimp = a.solref, a.solimp
+                    name = f"{a.name}-{b.name}"
+                    spec.add_pair(name=name, geomname1=a.name, geomname2=b.name, condim=3)
+                    found.append(TouchingPair(name, mu, bounce))
+    return found
+
+
+def write_pairs(model: Any, batch: Any, pairs: Sequence[TouchingPair], step: float) -> None:
+    """Write the numbers of pairs that have their own, for substeps so long [s]."""
+    if not pairs:
+        return
+    number = [model.pair(pair.name).id for pair in pairs]
+    mu, bounce = (np.stack([getattr(p, kind) for p in pairs], axis=1) for kind in ("friction", "restitution"))
+    batch.expand("pair_friction")[:, number] = np.stack(
+        [mu, mu, *(np.full_like(mu, k) for k in (5e-3, 1e-4, 1e-4))], -1
+    )
+    bounces = (bounce > 0.0)[..., None]
+    spring = -np.maximum(LIFT * (1.0 - bounce), 1e-6) / step**2
+    by_damper = np.stack([spring, -(1.0 + bounce) / step], axis=-1)
+    batch.expand("pair_solref")[:, number] = np.where(bounces, by_damper, CONTACT)
+    batch.expand("pair_solimp")[:, number] = np.where(bounces, BOUNCING, IMPEDANCE)
+    # what sticks stops within a substep; zeros are for as in ``pair_solref``
+    batch.expand("pair_solreffriction")[:, number] = np.where(bounces, (-1e-9, -1.0 / step), 0.0)
+
+
+def restitution_of(world: Simulation, body: Body) -> np.ndarray:
+    """Return a body's restitution (worlds,), 0 of one without a rigid material."""
+    dynamics = dynamics_of(body)
+    return _by_world(world, getattr(dynamics.material, "restitution", 0.0) if dynamics is not None else 0.0)
 
 
 def write_friction(model: Any, batch: Any, bodies: list[tuple[Body, Any]]) -> None:
@@ -152,13 +213,18 @@ def _triple(mu: np.ndarray) -> list[float]:
     return [float(mu[0]), 0.005, 1e-4]
 
 
-def _tell(a: Body, b: Body, mu: np.ndarray, real: np.ndarray) -> None:
-    """Warn once of a pair whose friction MuJoCo cannot have."""
-    pair = frozenset((a.key, b.key))
-    worst = int(np.argmax(np.abs(mu - real)))
-    if abs(mu[worst] - real[worst]) > 1e-6 and pair not in _warned:
+def _tell(a: Body, b: Body, wanted: np.ndarray, real: np.ndarray, what: str = "friction") -> None:
+    """Warn once of a pair whose friction or restitution MuJoCo cannot have."""
+    pair = frozenset((a.key, b.key, what))
+    worst = int(np.argmax(np.abs(wanted - real)))
+    if abs(wanted[worst] - real[worst]) > 1e-6 and pair not in _warned:
         _warned.add(pair)
+        why = {
+            "friction": "it has one coefficient a shape where flexes touch. Equal coefficients of all bodies mend that",
+            "restitution": "a static mesh that is not convex is a rigid flex there, which cannot bounce anything. "
+            "Convex shapes in its place mend that",
+        }[what]
         log.warning(
-            "on mujoco %r and %r have the friction %.4g in place of %.4g: it has one coefficient a shape where flexes "
-            "touch. Equal coefficients of all bodies mend that", a.name, b.name, real[worst], mu[worst],
+            "on mujoco %r and %r have the %s %.4g in place of %.4g: %s", a.name, b.name, what, real[worst],
+            wanted[worst], why,
         )  # fmt: skip

@@ -87,6 +87,34 @@ def axis_of(spec: Any) -> np.ndarray:
     return np.asarray(quat.rotate(spec.turn, np.broadcast_to((0.0, 0.0, 1.0), spec.place.shape)))
 
 
+def inertias(tree: dict[str, Joint]) -> dict[Joint, np.ndarray]:
+    """Return of each joint of a tree what it carries as its bodies are now, by joint, (worlds,) [kg m2; kg].
+
+    That is the inertia about its axis of its body and all that hang on that, of a slider their mass.
+    """
+    axes: dict[str, tuple[Joint, np.ndarray, np.ndarray]] = {}
+    found: dict[Joint, Any] = {}
+    for key, joint in tree.items():
+        place, turn = joint.body.pose()
+        axes[key] = joint, place + quat.rotate(turn, joint.spec.place), quat.rotate(turn, axis_of(joint.spec))
+        found[joint] = 0.0
+    for joint in tree.values():
+        dynamics: Any = dynamics_of(joint.body)
+        mass, middle = np.asarray(dynamics.mass), dynamics.middle()
+        turn = np.broadcast_to(joint.body.pose()[1], (len(middle), 4))
+        above: str | None = joint.body.key
+        while above in axes:  # it is carried by all joints above it
+            carrier, point, axis = axes[above]
+            if carrier.kind == "slider":
+                found[carrier] = found[carrier] + mass
+            else:
+                local, arm = quat.rotate(quat.inverse(turn), axis), np.cross(axis, middle - point)
+                about = np.einsum("wx,wxy,wy->w", local, np.broadcast_to(dynamics.inertia, (len(local), 3, 3)), local)
+                found[carrier] = found[carrier] + about + mass * np.einsum("wx,wx->w", arm, arm)
+            above = None if carrier.target is None else carrier.target.key
+    return found
+
+
 class JointStates:
     """Coordinates of joints from the bodies' states, and back.
 

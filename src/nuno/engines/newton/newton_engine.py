@@ -11,6 +11,7 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.driven_motion import driven_hold, driven_points, kinematic_poses
 from nuno.engines.engine import Engine
+from nuno.engines.newton.newton_resolution import MINIMUM, substeps_for
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from nuno.engines.newton.newton_substeps import NewtonSubsteps
     from nuno.world.simulation import Simulation
 
-SUBSTEPS = 40
-"""Of a frame where the world gives no number: with few, block descent leaves a stiff cloth far too limp."""
 ITERATIONS = 5
 """Of a substep."""
 
@@ -48,6 +47,8 @@ class NewtonEngine(Engine):
         self._made: NewtonModel | None = None
         self._substeps: NewtonSubsteps | None = None
         self._gravity: tuple[float, ...] = ()
+        self._count = MINIMUM
+        self._settings: tuple[float, int | None] = (0.0, None)
 
     def attach(self, body: Body, material: Any) -> Dynamics:
         """Return dynamics for a static body in the shape that it has now, at rest."""
@@ -68,9 +69,7 @@ class NewtonEngine(Engine):
         """Return dynamics for a body in a state."""
         self.changed()
         kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
-        made = kind(body, material, friction, self.world, state)
-        made.substeps = self._count()
-        return made
+        return kind(body, material, friction, self.world, state)
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
@@ -89,13 +88,19 @@ class NewtonEngine(Engine):
             for each in attached(self.world):
                 each.grips_changed = False
             self._made, self._substeps, self._gravity = build_model(self.world), None, gravity
+            self._settings = (0.0, None)
+        settings = (float(self.world.frame_rate), self.world.substeps)
+        if settings != self._settings:
+            self._count, self._settings = substeps_for(self.world), settings
+            for each in attached(self.world):
+                each.substeps = self._count
         if self._substeps is None:
             from nuno.engines.newton.newton_substeps import NewtonSubsteps
 
             self._substeps = NewtonSubsteps(self._made, self.world, ITERATIONS)
         frame = 1.0 / self.world.frame_rate
         span = end - start
-        count = max(2, 2 * round(0.5 * self._count() * span / frame + 1e-6))  # even: states change places
+        count = max(2, 2 * round(0.5 * self._count * span / frame + 1e-6))  # even: states change places
         times = start + span * np.arange(1, count + 1) / count
         substeps, worlds = self._substeps, self.world.world_count
         for body in self._moving():
@@ -123,9 +128,6 @@ class NewtonEngine(Engine):
         substeps.run(count, span / count)
         for body in self._moving():
             substeps.read(body, dynamics_of(body))
-
-    def _count(self) -> int:
-        return self.world.substeps or SUBSTEPS
 
     def _moving(self) -> list[Body]:
         return [body for body in self.world.bodies if body.is_dynamic]
