@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -30,6 +31,7 @@ from nuno.estimate.pick_trials import PickTrials, try_picks
 from nuno.estimate.ranking import SURE
 from nuno.estimate.rotations import TURNS
 from nuno.estimate.seeing import begin_to_see
+from nuno.estimate.table_doubt import TableDoubt, with_view_of_table
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.validation import choice, number
 from nuno.world.progress import with_clock
@@ -157,8 +159,11 @@ def estimate_pick(
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
     measured = rectangle is None
+    doubt = with_view_of_table(settings, images) if measured else TableDoubt(settings)
+    settings = doubt.settings
     images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES), template)
-    if measured:
+    rectangle = replace(rectangle, warnings=(*doubt.warnings, *rectangle.warnings))
+    if measured and not doubt.is_seen:
         settings, rectangle = with_focal_of_rectangle(settings, images, rectangle)
     settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(
