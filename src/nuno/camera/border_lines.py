@@ -116,7 +116,7 @@ def _edges(image: np.ndarray, points: np.ndarray, normal: np.ndarray, reach: int
     """Colour contrast (k, 2 reach + 1) across a side at offsets along its normal, and where the image goes on."""
     offsets = np.arange(-reach - 3, reach + 4)
     at = (points[:, None] + offsets[None, :, None] * normal).astype(np.float32)
-    values = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    values: np.ndarray = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     values = cv2.blur(values.reshape(len(points), len(offsets), 3), (1, 3))  # along the side
     width = values.shape[1]
     before, after = ((values[:, k : width - 6 + k] + values[:, k + 1 : width - 5 + k]) / 2 for k in (1, 4))
@@ -138,8 +138,8 @@ def _score(
     A point is on it where the strongest edge around is: so a broad or a strong edge counts no more than a fine one.
     """
     strongest = cv2.dilate(edges.astype(np.float32), np.ones((1, 7)))
-    crests = ((edges >= strongest) & (edges > CONTRAST)).astype(np.float32)
-    crests = cv2.dilate(crests, np.ones((1, 3)))
+    found = ((edges >= strongest) & (edges > CONTRAST)).astype(np.float32)
+    crests = np.asarray(cv2.dilate(found, np.ones((1, 3))))
     reach = (edges.shape[1] - 1) // 2
     a, b = np.meshgrid(offsets, offsets, indexing="ij")
     whole = np.abs(a - b) < STEEP * length
