@@ -86,9 +86,10 @@ def estimate_pick(
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
             ``before_mask`` is given.
         after: RGB image of the cloth in the hand, or its path; None where ``after_mask`` is given.
-        camera: The camera of both images, or the ``camera`` entry of an input.json. Where the outline of the cloth
-            before is a rectangle with a clearly other focal length alone, that is taken instead, with a warning.
-        table_height: z of the table top [m].
+        camera: The camera of both images, or the ``camera`` entry of an input.json. Where the table's border in the
+            image before tells that it is clearly turned or focused otherwise, or the outline of the cloth is a
+            rectangle with another focal length alone, that is taken instead, with a warning.
+        table_height: z of the table top [m]; likewise.
         hand: (3,) where the picked point is now [m].
         table_half_extents: Half sizes of the top along x and y [m]; None: it is taken as endless.
         table_centre: x, y of the top's middle [m].

@@ -48,7 +48,8 @@ class PickResult:
             distance in pixels of the image), "iou", "eq1".
         eq1: (k,) float by candidate, the similarity of the paper's eq. (1), of futures that are not turned.
         rectangle: The cloth as it lay before, a ``ClothOutline`` where it was taken by its outline.
-        camera: The camera, with another focal length where the cloth's outline told so (a warning says it).
+        camera: The camera, as the table's border or the cloth's outline told where it was told wrongly (a warning says
+            it).
         grid: Candidates along both sides; (2, 2) where points were given.
         seconds: Wall time by stage [s].
         futures: The batch of imagined picks in which the best one is.
