@@ -157,14 +157,14 @@ def _refined(edges: np.ndarray, share: np.ndarray, at: np.ndarray, reach: int) -
     row = np.arange(len(share))
     for width in (3, 2, 2):
         middle = at[0] * (1.0 - share) + at[1] * share
-        window = np.round(middle)[:, None].astype(int) + np.arange(-width, width + 1)
-        column = np.clip(window + reach, 0, edges.shape[1] - 1)
+        nearby = np.round(middle)[:, None].astype(int) + np.arange(-width, width + 1)
+        column = np.clip(nearby + reach, 0, edges.shape[1] - 1)
         weights = np.maximum(edges[row[:, None], column] - 0.5 * CONTRAST, 0.0)
         mass = weights.sum(axis=1)
         good = mass > 0.0
         if good.sum() < 3:
             return at
-        found = (weights * window).sum(axis=1)[good] / mass[good]
+        found = (weights * nearby).sum(axis=1)[good] / mass[good]
         design = np.stack([1.0 - share[good], share[good]], axis=1)
         off = np.abs(found - design @ at)
         trust = 1.0 / (1.0 + (off / max(1.5 * float(np.median(off)), 0.3)) ** 2)

@@ -44,9 +44,9 @@ BORDER = "the table's border is where the image shows it only with "
 """How a warning begins of a mistake that is clear."""
 BORDER_UNCLEAR = "the table's border is not where it is told to be, and the image does not tell which mistake it is"
 """How one begins of a mistake that may be another as well."""
-LEAST_SIDES = 3
+MINIMUM_SIDES = 3
 """So many sides have to be seen."""
-ROUGH = 2.0
+LINEAR_NOISE = 2.0
 """[`NOISE`] of linear fits, which choose lines."""
 CHOICES = 3
 """Of lines are fitted, of those that are likeliest with mistakes and of those without."""
@@ -114,7 +114,7 @@ def view_of_table(image: np.ndarray, camera: Camera, table: Table) -> TableView 
         for k in range(4)
         if (side := lines_near(soft, corners[k], corners[(k + 1) % 4], camera)) is not None and side.lines
     ]
-    if len(sides) < LEAST_SIDES:
+    if len(sides) < MINIMUM_SIDES:
         return None
     choices = _likely(sides, camera, table)
     fits: list[tuple[float, tuple[str, ...], np.ndarray, int]] = []
@@ -147,12 +147,12 @@ def _sets() -> list[tuple[str, ...]]:
     return [names for count in range(len(GROUPS) + 1) for names in itertools.combinations(GROUPS, count)]
 
 
-def _spread(names: Sequence[str]) -> np.ndarray:
+def _deviations(names: Sequence[str]) -> np.ndarray:
     """(9,) float, standard deviations of all numbers where these are mistakes."""
-    spread = ORDINARY.copy()
+    deviations = ORDINARY.copy()
     for name in names:
-        spread[GROUPS[name]] = MISTAKE[GROUPS[name]]
-    return spread
+        deviations[GROUPS[name]] = MISTAKE[GROUPS[name]]
+    return deviations
 
 
 def _residuals(numbers: np.ndarray, chosen: Chosen, camera: Camera, table: Table) -> np.ndarray:
@@ -174,13 +174,13 @@ def _residuals(numbers: np.ndarray, chosen: Chosen, camera: Camera, table: Table
 
 def _fit(chosen: Chosen, names: Sequence[str], camera: Camera, table: Table) -> tuple[float, np.ndarray]:
     """The sum of squares of the best fit where these are mistakes, and its numbers (5,)."""
-    spread = _spread(names)
+    deviations = _deviations(names)
 
     def all_of(scaled: np.ndarray) -> np.ndarray:
-        return np.concatenate([_residuals(spread * scaled, chosen, camera, table), scaled])
+        return np.concatenate([_residuals(deviations * scaled, chosen, camera, table), scaled])
 
     found = least_squares(all_of, np.zeros(9), x_scale=1.0, max_nfev=20)
-    return float(2.0 * found.cost), spread[:5] * found.x[:5]
+    return float(2.0 * found.cost), deviations[:5] * found.x[:5]
 
 
 def _likely(sides: Sequence[tuple[int, SideLines]], camera: Camera, table: Table) -> list[Chosen]:
@@ -194,13 +194,13 @@ def _likely(sides: Sequence[tuple[int, SideLines]], camera: Camera, table: Table
             here = _residuals(np.zeros(9), one, camera, table)
             step = 1e-4 * np.eye(9) * scale
             jacobian = np.stack([(_residuals(s, one, camera, table) - here) / 1e-4 for s in step], axis=1)
-            of.append(((k, side, line), here / ROUGH, jacobian / ROUGH))
+            of.append(((k, side, line), here / LINEAR_NOISE, jacobian / LINEAR_NOISE))
         options.append([*of, (None, np.zeros(2), np.zeros((2, 9)))])
     ranked: list[tuple[list[float], Chosen]] = []
     narrow = np.diag((scale / ORDINARY) ** 2)
     for choice in itertools.product(*options):
         chosen = [line for line, *_ in choice if line is not None]
-        if len(chosen) < LEAST_SIDES:
+        if len(chosen) < MINIMUM_SIDES:
             continue
         here, jacobian = (np.concatenate([part[n] for part in choice]) for n in (1, 2))
         unused = UNUSED * (len(sides) - len(chosen))

@@ -21,6 +21,8 @@ from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
 from nuno.estimate.seeing import AWAY, COVERED
 
+FAIRLY = 10.0
+"""-log likelihood of a silhouette, without its pattern, up to which no other way of the hand is looked for."""
 WELL = 13.0
 """-log likelihood of a silhouette, without its pattern, up to which a future fits well; beyond, a warning says so."""
 BADLY = 19.0
