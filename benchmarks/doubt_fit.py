@@ -17,7 +17,6 @@ import numpy as np
 from evidence_file import COUNT, Evidence, read_evidence
 from scipy.optimize import minimize
 
-from nuno.camera.camera_of_table import BORDER_UNCLEAR
 from nuno.camera.focal_of_rectangle import FOCAL
 from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate import doubt
@@ -91,8 +90,7 @@ def ended(case: Evidence) -> Ended:
 def kinds_of(warnings: Sequence[str]) -> np.ndarray:
     """(3,) float, how many warnings there are of each kind that counts: of the hand, of the focal length, others."""
     counted = [w for w in warnings if not w.startswith((SQUARE, UNEVEN, POOR))]
-    of_hand = (ELSEWHERE, AWAY, COVERED, BORDER_UNCLEAR)
-    named = [sum(w.startswith(begin) for w in counted) for begin in (of_hand, FOCAL)]
+    named = [sum(w.startswith(begin) for w in counted) for begin in ((ELSEWHERE, AWAY, COVERED), FOCAL)]
     return np.array([*named, len(counted) - sum(named)], dtype=float)
 
 

@@ -2,8 +2,9 @@
 
 Scenes of ``varied_cases.py`` (ordinary, clutter, checks, dark, a low camera) are drawn by Nuno's renderer, a flat cloth
 on the table; nothing is simulated. Each is told as it is, with errors that are ordinary, and with one mistake: a camera
-that is tilted, rolled, of another focal length, or a table of another height. Judged by what is taken for wrong, and by
-how far points on the table and 0.2 m above are seen from where they are (root mean square), before and after.
+that is tilted, rolled, of another focal length, a table of another height, or of other extents. Judged by what is taken
+for wrong, and by how far points on the table and 0.2 m above are seen from where they are (root mean square), before
+and after.
 """
 
 from __future__ import annotations
@@ -28,10 +29,11 @@ from nuno.camera.camera_of_table import corrected, view_of_table
 from nuno.camera.table import Table
 
 KINDS = ("ordinary", "clutter", "checks", "dark", "ordinary", "low_camera")
-TOLD = ("as it is", "ordinary errors", "tilt", "roll", "height", "focal")
+TOLD = ("as it is", "ordinary errors", "tilt", "roll", "height", "focal", "extents")
 TURN = (1.0, 3.0)  # [degrees] of a camera that is tilted or rolled
 HEIGHT = (0.01, 0.03)  # [m] of a table that is told too high or low
 FOCAL = (0.05, 0.1)
+EXTENTS = (0.02, 0.04)  # [m] of half extents, both of which are told too large or too small
 ORDINARY = {"turn": 0.25, "focal": 0.008, "height": 0.004, "extents": 0.005}  # [degrees], [m]: standard deviations
 
 
@@ -45,6 +47,8 @@ def told(scene: Scene, what: str, rng: np.random.Generator) -> tuple[Camera, Tab
         height = sign * rng.uniform(*HEIGHT)
     elif what == "focal":
         focal = sign * rng.uniform(*FOCAL)
+    elif what == "extents":
+        extents[0] = sign * rng.uniform(*EXTENTS, 2)
     elif what == "ordinary errors":
         turn, focal = rng.normal(0, ORDINARY["turn"], 3), rng.normal(0, ORDINARY["focal"])
         height, extents = rng.normal(0, ORDINARY["height"]), rng.normal(0, ORDINARY["extents"], (2, 2))

@@ -24,9 +24,9 @@ def filled(image: np.ndarray, points: np.ndarray, colour: tuple[int, ...], camer
     cv2.fillConvexPoly(image, np.round(camera.project(points) * 16).astype(np.int32), colour, cv2.LINE_8, shift=4)
 
 
-def drawn(camera: Camera = TRUE, table: Table = TABLE, seed: int = 0) -> np.ndarray:
-    """(480, 640, 3) uint8, a table with its front face, a cloth on it, a line on the wall behind, and noise."""
-    fine = camera.scaled(FINE)
+def drawn(camera: Camera = TRUE, table: Table = TABLE, face=(90, 70, 55), finer: int = FINE) -> np.ndarray:
+    """(h, w, 3) uint8, a table with a front face of a colour, a cloth on it, a line on the wall behind, and noise."""
+    fine = camera.scaled(finer)
     image = np.full((fine.height, fine.width, 3), (70, 66, 62), np.uint8)
     image[: int(0.2 * fine.height)] = 150, 160, 170
     (x, y), (a, b), z = table.centre or (0.0, 0.0), table.half_extents or (1.0, 1.0), table.height
@@ -34,10 +34,10 @@ def drawn(camera: Camera = TRUE, table: Table = TABLE, seed: int = 0) -> np.ndar
     front = np.array([(x - a, y - b, z), (x - a, y + b, z), (x - a, y + b, low), (x - a, y - b, low)])
     top = np.array([(x - a, y - b, z), (x + a, y - b, z), (x + a, y + b, z), (x - a, y + b, z)])
     cloth = np.array([(-0.1, -0.2, z), (0.2, -0.25, z), (0.25, 0.15, z), (-0.05, 0.2, z)])
-    for points, colour in ((front, (90, 70, 55)), (top, (150, 120, 95)), (cloth, (60, 150, 60))):
+    for points, colour in ((front, face), (top, (150, 120, 95)), (cloth, (60, 150, 60))):
         filled(image, points, colour, fine)
     image = cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-    noise = np.random.default_rng(seed).normal(0.0, 3.0, image.shape)
+    noise = np.random.default_rng(0).normal(0.0, 3.0, image.shape)
     return np.clip(image + noise, 0, 255).astype(np.uint8)
 
 

@@ -53,6 +53,19 @@ def test_a_wrong_focal_length_is_set_right():
     assert corrected(camera, table, view.errors)[0].fx == pytest.approx(TRUE.fx, rel=0.01)
 
 
+def test_an_edge_beside_the_border_is_not_taken_for_it():
+    """Where the near edge of the top cannot be told from the face below it, the face's lower edge is seen alone."""
+    view = view_of_table(drawn(face=(150, 120, 95)), TRUE, TABLE)
+    assert view is not None and view.mistakes == ()
+
+
+def test_other_extents_leave_the_camera_alone():
+    """Half extents 3 and 4 cm too large are no mistake of the camera's; a warning names them."""
+    view = view_of_table(drawn(), TRUE, replace(TABLE, half_extents=(0.45, 0.64)))
+    assert view is not None and view.mistakes == ("extents",) and not view.errors.any()
+    assert view.warning is not None and "extents" in view.warning
+
+
 def test_a_table_that_is_not_seen_tells_nothing():
     """Without extents, in the floor's colour, or far beyond the image."""
     image = drawn()
@@ -64,7 +77,7 @@ def test_a_table_that_is_not_seen_tells_nothing():
 def test_large_and_distorted_images_tell_the_same():
     """Twice the pixels, and a lens with barrel distortion: the same turn, to 0.15 degrees as above."""
     camera, table = told(turn=(2.0, 0.0, 0.0))
-    view = view_of_table(drawn(TRUE.scaled(2.0)), camera.scaled(2.0), table)
+    view = view_of_table(drawn(TRUE.scaled(2.0), finer=1), camera.scaled(2.0), table)
     assert view is not None and np.rad2deg(view.errors[1]) == pytest.approx(-2.0, abs=0.15)
     lens = np.array([-0.15, 0.02, 0.0, 0.0])
     bent = replace(TRUE, distortion=lens)

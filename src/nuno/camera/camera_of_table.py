@@ -6,7 +6,8 @@ squares.
 All of them are off by a little as a rule, and so are the extents: ordinary errors, which nobody need correct. What is
 looked for are mistakes: a focal length, a turn or a height that is wrong by far more, while the others are as they are
 told. So for every set of mistakes the fit has wide priors for these and narrow ones for all else, and each mistake
-has to make the sum of squares less by `CLEARLY` squared.
+has to make the sum of squares less by `CLEARLY` squared. The extents may be a mistake themselves, alone: then camera
+and height are left as they are told.
 """
 
 from __future__ import annotations
@@ -25,31 +26,35 @@ from nuno.camera.table import Table
 
 WIDTH = 640
 """[px] Larger images are looked at in this width, which tells lines well enough."""
-NOISE = 1.0
-"""[px] Standard deviation of a line at either end: a real border is rounded, a lens not quite corrected."""
+NOISE = 0.5
+"""[px] Standard deviation of a line at either end: a real border is rounded, a lens not quite corrected. Rendered ones
+are true to 0.1 px."""
 ORDINARY = np.array([0.008, *[np.deg2rad(0.25)] * 3, 0.004, *[0.005] * 4])
 """Standard deviations of ordinary errors: logarithm of the focal length, turns about the camera's axes [rad], height
 [m], the top's middle and half extents [m]."""
-MISTAKE = np.array([0.1, *[np.deg2rad(2.5)] * 3, 0.03])
-"""Standard deviations of mistakes: of the same, but for the extents, which are taken as they are told."""
-GROUPS = {"focal": slice(0, 1), "turn": slice(1, 4), "height": slice(4, 5)}
+MISTAKE = np.array([0.1, *[np.deg2rad(2.5)] * 3, 0.03, *[0.02] * 4])
+"""Standard deviations of mistakes, of the same."""
+GROUPS = {"focal": slice(0, 1), "turn": slice(1, 4), "height": slice(4, 5), "extents": slice(5, 9)}
 """Which numbers are one mistake."""
+CAMERA = ("focal", "turn", "height")
+"""Mistakes that may come together, and are set right."""
 CLEARLY = 3.5
 """Standard deviations by which a mistake has to be clear."""
-ELSE = 2.5
+ELSE = 2.0
 """The same by which it must be clearer than any other."""
-UNUSED = 16.0
-"""Sum of squares of a side that shows no line that fits."""
+UNUSED = 9.0
+"""Sum of squares of a side that shows no line that fits: less than a mistake needs, so that no other edge that is taken
+for one side makes a mistake."""
 BORDER = "the table's border is where the image shows it only with "
 """How a warning begins of a mistake that is clear."""
 BORDER_UNCLEAR = "the table's border is not where it is told to be, and the image does not tell which mistake it is"
 """How one begins of a mistake that may be another as well."""
 MINIMUM_SIDES = 3
 """So many sides have to be seen."""
-LINEAR_NOISE = 2.0
+LINEAR_NOISE = 4.0
 """[`NOISE`] of linear fits, which choose lines."""
-CHOICES = 3
-"""Of lines are fitted, of those that are likeliest with mistakes and of those without."""
+CHOICES = 2
+"""Of lines are fitted, of those that are likeliest without a mistake, with those of the camera, and of the extents."""
 
 SideLine = tuple[int, SideLines, Line]
 """The number of a side, the lines near it, and one of them."""
@@ -63,7 +68,7 @@ class TableView:
     Attributes:
         mistakes: Names out of `GROUPS`.
         errors: (5,) float: logarithm of the ratio of the true focal length to the one told, turns about the camera's
-            axes [rad], how much higher the table is [m]; 0 where there is no mistake.
+            axes [rad], how much higher the table is [m]; 0 where there is no mistake, or it may be the extents'.
         is_clear: Whether no other mistakes explain the image about as well.
         sides: How many sides were seen.
     """
@@ -78,6 +83,10 @@ class TableView:
         """Words of warning, where there is a mistake."""
         if not self.mistakes:
             return None
+        are_right = "are the camera, table_height and the table's extents right?"
+        if not self.errors.any():
+            begins = f"{BORDER}other extents than are told" if self.is_clear else BORDER_UNCLEAR
+            return f"{begins}; the camera is taken as it is told: {are_right}"
         share, turn, height = np.expm1(self.errors[0]), np.linalg.norm(self.errors[1:4]), self.errors[4]
         words = {
             "focal": f"a focal length that is {100.0 * abs(share):.0f} % {'longer' if share > 0.0 else 'shorter'}",
@@ -85,7 +94,6 @@ class TableView:
             "height": f"a table that is {100.0 * abs(height):.1f} cm {'higher' if height > 0.0 else 'lower'}",
         }
         taken = " and ".join(words[name] for name in self.mistakes)
-        are_right = "are the camera, table_height and the table's extents right?"
         if self.is_clear:
             return f"{BORDER}{taken}, which is taken: {are_right}"
         return f"{BORDER_UNCLEAR}; {taken}, is taken: {are_right}"
@@ -116,7 +124,6 @@ def view_of_table(image: np.ndarray, camera: Camera, table: Table) -> TableView 
     ]
     if len(sides) < MINIMUM_SIDES:
         return None
-    choices = _likely(sides, camera, table)
     fits: list[tuple[float, tuple[str, ...], np.ndarray, int]] = []
 
     def fit(names: tuple[str, ...], among: Sequence[Chosen]) -> list[float]:
@@ -128,23 +135,20 @@ def view_of_table(image: np.ndarray, camera: Camera, table: Table) -> TableView 
         return costs
 
     choices = _likely(sides, camera, table)
-    none, *some, all_of_them = _sets()
-    if min(fit(none, choices)) >= CLEARLY**2:  # else no mistake can be clear
-        costs = np.array(fit(all_of_them, choices))
+    if min(fit((), choices)) >= CLEARLY**2:  # else no mistake can be clear
+        costs = np.array(fit(CAMERA, choices))
         good = [chosen for chosen, cost in zip(choices, costs, strict=True) if cost < costs.min() + UNUSED]
-        for names in some:
+        for names in (*itertools.combinations(CAMERA, 1), *itertools.combinations(CAMERA, 2)):
             fit(names, good)
+        fit(("extents",), choices)
     best, names, errors, count = min(fits, key=lambda fit: fit[0])
-    others = [cost for cost, other, *_ in fits if other and not set(other) >= set(names)]
+    others = {other: cost for cost, other, *_ in sorted(fits, key=lambda fit: -fit[0])}
+    close = [n for n in others if n and not set(n) >= set(names) and others[n] <= best + ELSE**2] if names else []
     taken = np.zeros(5)
-    for name in names:
-        taken[GROUPS[name]] = errors[GROUPS[name]]
-    return TableView(names, taken, not names or min(others, default=np.inf) > best + ELSE**2, count)
-
-
-def _sets() -> list[tuple[str, ...]]:
-    """All sets of mistakes, none among them."""
-    return [names for count in range(len(GROUPS) + 1) for names in itertools.combinations(GROUPS, count)]
+    for name in () if ("extents",) in close else names:
+        if name in CAMERA:
+            taken[GROUPS[name]] = errors[GROUPS[name]]
+    return TableView(names, taken, not close, count)
 
 
 def _deviations(names: Sequence[str]) -> np.ndarray:
@@ -173,31 +177,30 @@ def _residuals(numbers: np.ndarray, chosen: Chosen, camera: Camera, table: Table
 
 
 def _fit(chosen: Chosen, names: Sequence[str], camera: Camera, table: Table) -> tuple[float, np.ndarray]:
-    """The sum of squares of the best fit where these are mistakes, and its numbers (5,)."""
+    """The sum of squares of the best fit where these are mistakes, and its numbers (9,)."""
     deviations = _deviations(names)
 
     def all_of(scaled: np.ndarray) -> np.ndarray:
         return np.concatenate([_residuals(deviations * scaled, chosen, camera, table), scaled])
 
     found = least_squares(all_of, np.zeros(9), x_scale=1.0, max_nfev=20)
-    return float(2.0 * found.cost), deviations[:5] * found.x[:5]
+    return float(2.0 * found.cost), deviations * found.x
 
 
 def _likely(sides: Sequence[tuple[int, SideLines]], camera: Camera, table: Table) -> list[Chosen]:
     """Choices of one line for each side, or none, that fit together best, with mistakes and without; by linear fits."""
-    scale = np.append(MISTAKE, ORDINARY[5:])
+    priors = [np.diag((MISTAKE / _deviations(names)) ** 2) for names in ((), CAMERA, ("extents",))]
     options = []
     for k, side in sides:
         of: list[tuple[SideLine | None, np.ndarray, np.ndarray]] = []
         for line in side.lines:
             one = [(k, side, line)]
             here = _residuals(np.zeros(9), one, camera, table)
-            step = 1e-4 * np.eye(9) * scale
+            step = 1e-4 * np.eye(9) * MISTAKE
             jacobian = np.stack([(_residuals(s, one, camera, table) - here) / 1e-4 for s in step], axis=1)
             of.append(((k, side, line), here / LINEAR_NOISE, jacobian / LINEAR_NOISE))
         options.append([*of, (None, np.zeros(2), np.zeros((2, 9)))])
     ranked: list[tuple[list[float], Chosen]] = []
-    narrow = np.diag((scale / ORDINARY) ** 2)
     for choice in itertools.product(*options):
         chosen = [line for line, *_ in choice if line is not None]
         if len(chosen) < MINIMUM_SIDES:
@@ -205,12 +208,12 @@ def _likely(sides: Sequence[tuple[int, SideLines]], camera: Camera, table: Table
         here, jacobian = (np.concatenate([part[n] for part in choice]) for n in (1, 2))
         unused = UNUSED * (len(sides) - len(chosen))
         costs = []
-        for prior in (np.eye(9), narrow):
+        for prior in priors:
             step = np.linalg.solve(jacobian.T @ jacobian + prior, -jacobian.T @ here)
             costs.append(float(((here + jacobian @ step) ** 2).sum() + step @ prior @ step) + unused)
         ranked.append((costs, chosen))
     best: list[Chosen] = []
-    for n in (0, 1):
+    for n in range(len(priors)):
         for _, chosen in sorted(ranked, key=lambda entry: entry[0][n])[:CHOICES]:
             if not any(chosen is other for other in best):
                 best.append(chosen)

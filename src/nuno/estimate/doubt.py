@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from nuno.camera.camera_of_table import BORDER_UNCLEAR
 from nuno.camera.focal_of_rectangle import FOCAL
 from nuno.camera.rectangle import SQUARE, UNEVEN
 from nuno.estimate.hypotheses import Hypothesis
@@ -33,7 +32,7 @@ POOR = "even the best imagined pick looks little like the image after"
 """How the warning of a bad fit begins."""
 ELSEWHERE = "the image after looks as if the hand were "
 """How a warning begins that the hand is told to be where it is not."""
-SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1, BORDER_UNCLEAR: 0.4}
+SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERED: 0.4, FOCAL: 0.1}
 """Of the broad probabilities, by how a warning begins, of what those before it left. A square or rough outline told
 nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
 WARNED_SHARE = 0.1
