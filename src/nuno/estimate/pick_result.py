@@ -59,7 +59,8 @@ class PickResult:
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
         seen_warnings: What was odd about how it was seen.
-        trusted: No candidate is likelier than this, however sure the evidence is (`nuno.estimate.doubt`).
+        trusted: How likely the best candidate is, as far as the evidence may be trusted (`nuno.estimate.doubt`); 1 is
+            as the evidence says.
         sideways: Of the prior of the lift that is in scores of evidence (`nuno.estimate.lift_prior`); None is no prior.
     """
 
@@ -138,7 +139,7 @@ class PickResult:
     def probabilities(self) -> np.ndarray | None:
         """(k,) float by candidate, how likely each is; None where something else than evidence ranks."""
         likely = probabilities(self.score_name, self.scores)
-        return None if likely is None else tempered(self.scores, self.trusted)
+        return likely if likely is None or self.trusted == 1.0 else tempered(self.scores, self.trusted)
 
     @cached_property
     def warnings(self) -> list[str]:
