@@ -74,6 +74,16 @@ def test_a_table_that_is_not_seen_tells_nothing():
     assert view_of_table(image, TRUE, replace(TABLE, half_extents=(30.0, 30.0))) is None
 
 
+def test_what_no_mistake_explains_tells_nothing():
+    """A camera that looks 12 degrees aside, a table of half the size: none of their lines is where it is looked for."""
+    camera, table = told(turn=(0.0, 12.0, 0.0))
+    for view in (
+        view_of_table(drawn(), camera, table),
+        view_of_table(drawn(), TRUE, replace(TABLE, half_extents=(0.21, 0.3))),
+    ):
+        assert view is None or not view.errors.any()
+
+
 def test_large_and_distorted_images_tell_the_same():
     """Twice the pixels, and a lens with barrel distortion: the same turn, to 0.15 degrees as above."""
     camera, table = told(turn=(2.0, 0.0, 0.0))

@@ -45,6 +45,9 @@ ELSE = 2.0
 UNUSED = 9.0
 """Sum of squares of a side that shows no line that fits: less than a mistake needs, so that no other edge that is taken
 for one side makes a mistake."""
+GOOD = 20.0
+"""Sum of squares beyond which the lines are no table's, whatever is wrong; eight distances and nine numbers are in
+it."""
 BORDER = "the table's border is where the image shows it only with "
 """How a warning begins of a mistake that is clear."""
 BORDER_UNCLEAR = "the table's border is not where it is told to be, and the image does not tell which mistake it is"
@@ -100,7 +103,7 @@ class TableView:
 
 
 def view_of_table(image: np.ndarray, camera: Camera, table: Table) -> TableView | None:
-    """Return what a table's border tells; None where too little of it is seen, or the extents are not known.
+    """Return what a table's border tells; None where that is not known, too little seen, or explained by no mistake.
 
     Args:
         image: (h, w, 3) uint8.
@@ -142,6 +145,8 @@ def view_of_table(image: np.ndarray, camera: Camera, table: Table) -> TableView 
             fit(names, good)
         fit(("extents",), choices)
     best, names, errors, count = min(fits, key=lambda fit: fit[0])
+    if best - CLEARLY**2 * len(names) > GOOD:
+        return None
     others = {other: cost for cost, other, *_ in sorted(fits, key=lambda fit: -fit[0])}
     close = [n for n in others if n and not set(n) >= set(names) and others[n] <= best + ELSE**2] if names else []
     taken = np.zeros(5)
