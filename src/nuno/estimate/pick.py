@@ -163,7 +163,8 @@ def estimate_pick(
     doubt = with_view_of_table(settings, images) if measured else TableDoubt(settings)
     settings = doubt.settings
     images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES), template)
-    rectangle = replace(rectangle, warnings=(*doubt.warnings, *rectangle.warnings))
+    if doubt.warnings:
+        rectangle = replace(rectangle, warnings=(*doubt.warnings, *rectangle.warnings))
     if measured and not doubt.is_seen:
         settings, rectangle = with_focal_of_rectangle(settings, images, rectangle)
     settings = with_outline_candidates(settings, rectangle, spacing)
