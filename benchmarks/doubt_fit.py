@@ -29,11 +29,11 @@ BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97, 1.0001)
 NAMES = ("temperature", "well", "badly", "bad share", "breadth", "hand", "focal", "warned")
 BEGUN = np.array(
     [
-        1.0, doubt.WELL, doubt.BADLY, doubt.BAD_SHARE, doubt.BREADTH, doubt.SHARES[ELSEWHERE], doubt.SHARES[FOCAL],
-        doubt.WARNED_SHARE,
+        doubt.TEMPERATURE, doubt.WELL, doubt.BADLY, doubt.BAD_SHARE, doubt.BREADTH, doubt.SHARES[ELSEWHERE],
+        doubt.SHARES[FOCAL], doubt.WARNED_SHARE,
     ]
 )  # fmt: skip
-LOW = np.array([0.7, 5.0, 11.0, 0.0, 1.5, 0.0, 0.0, 0.0])
+LOW = np.array([0.5, 5.0, 11.0, 0.0, 1.5, 0.0, 0.0, 0.0])
 HIGH = np.array([4.0, 16.0, 25.0, 0.95, 12.0, 0.9, 0.9, 0.9])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from nuno.camera.camera import Camera
-from nuno.estimate.hand_error import GROSS_SHARE
 from nuno.estimate.lift_prior import SIDEWAYS, log_prior_of_lift
 from nuno.estimate.ranking import Comparison
 
@@ -48,18 +47,8 @@ class Evidence:
 
     @cached_property
     def comparisons(self) -> list[Comparison]:
-        """Of all stages, mistakes of the hand weighed as an estimate weighs them."""
-        found = []
-        for k, mistakes in enumerate(self.row["mistakes"]):
-            comparison = self.comparison(f"stage{k}")
-            added = 0.0 if comparison.correction is None else comparison.correction
-            found.append(
-                replace(
-                    comparison,
-                    correction=added + np.log(np.where(np.array(mistakes) != 0.0, GROSS_SHARE, 1.0))[:, None],
-                )
-            )
-        return found
+        """Of all stages; mistakes of the hand are weighed in them, as in the estimate that they are of."""
+        return [self.comparison(f"stage{k}") for k in range(len(self.row["mistakes"]))]
 
     def comparison(self, name: str) -> Comparison:
         """A comparison as it was dumped."""

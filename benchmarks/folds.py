@@ -2,6 +2,7 @@
 
 Nuno's own engine folds each cloth on a finer mesh and with a shorter step than the replay's; true masks are compared.
 One line a fold: the bending rigidity, the mean overlap of the best limp preset and of the best of all materials.
+With ``--cases DIR``, folders as `nuno.read_fold_case` reads them, which have true masks (mask_NNN.png by frame).
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 from generated_cases import REST_HEIGHT, looking_at
+from processes import in_processes
 
 import nuno
+from nuno.camera.image import read_image
 from nuno.estimate.fold import MATERIALS
 
 CELL = 0.0165  # [m] about; a replay has 0.02 and more
@@ -40,8 +43,10 @@ def hand_paths(size: np.ndarray, reach: float, seconds: float) -> list[nuno.Hand
     ]  # fmt: skip
 
 
-def one_fold(rng: np.random.Generator, rigidity: float, device: str) -> dict[str, Any]:
+def one_fold(seed: tuple[int, int], rigidity: float, device: str) -> dict[str, Any]:
     """Fold one cloth and replay it."""
+    wp.config.log_level = wp.LOG_ERROR
+    rng = np.random.default_rng(seed)
     size = np.array([rng.uniform(0.4, 0.55), rng.uniform(0.3, 0.38)])
     material = {
         "bending_rigidity": rigidity, "area_density": float(rng.uniform(0.15, 0.35)),
@@ -81,20 +86,48 @@ def one_fold(rng: np.random.Generator, rigidity: float, device: str) -> dict[str
     }  # fmt: skip
 
 
+def one_case(folder: Path, device: str) -> dict[str, Any]:
+    """Replay a folder's fold, and compare it with the true masks."""
+    case = nuno.read_fold_case(folder)
+    result = case.replay(device=device, progress=False)
+    overlaps = {}
+    for k, mask in enumerate(result.masks):
+        path = folder / f"mask_{k:03d}.png"
+        if path.is_file():
+            true = read_image(path)[..., 0] > 127
+            overlaps[k] = float((true & mask).sum() / max((true | mask).sum(), 1))
+    values = list(overlaps.values())
+    return {
+        "case": folder.name, "frames": len(values), "mean": float(np.mean(values)), "last": values[-1],
+        "lowest": min(values), "kept": result.material_name, "warnings": result.warnings,
+    }  # fmt: skip
+
+
 def main() -> None:
     """Fold and replay."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=10, help="folds, from 1e-5 to 1e-3 N m in even steps of the log")
     parser.add_argument("--seed", type=int, default=40)
+    parser.add_argument("--cases", type=Path, help="folder of folders with true masks, in place of folds made here")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     wp.config.log_level = wp.LOG_ERROR
     rows = []
-    for k, rigidity in enumerate(np.geomspace(1e-5, 1e-3, options.count)):
-        rows.append(one_fold(np.random.default_rng((options.seed, k)), float(rigidity), options.device))
-        row = rows[-1]
-        print(f"{rigidity:.1e} N m: limp {row['limp']:.3f}, all {row['all']:.3f} ({row['kept']})", flush=True)
+    if options.cases:
+        for folder in sorted(p for p in options.cases.iterdir() if (p / "input.json").is_file()):
+            rows.append(one_case(folder, options.device))
+            print(rows[-1], flush=True)
+            if options.json:
+                options.json.write_text(json.dumps(rows, indent=1))
+        return
+    rigidities = np.geomspace(1e-5, 1e-3, options.count).tolist()
+    parts = [((options.seed, k), rigidity, options.device) for k, rigidity in enumerate(rigidities)]
+    for row in in_processes(one_fold, parts, options.jobs):
+        rows.append(row)
+        told = f"limp {row['limp']:.3f}, all {row['all']:.3f} ({row['kept']})"
+        print(f"{row['bending_rigidity']:.1e} N m: {told}", flush=True)
         if options.json:
             options.json.write_text(json.dumps(rows, indent=1))
     best = np.array([row["all"] for row in rows])

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from moving_cloths import CELLS, ENGINES, MOTIONS, RADIUS, TOP, Motion, motion, resampled, truth
+from processes import in_processes
 
 import nuno
 
@@ -238,23 +239,13 @@ def resampled_order(towel: Any) -> np.ndarray:
     return np.linalg.norm(rest[:, None] - flat.reshape(1, -1, 2), axis=-1).argmin(axis=1)
 
 
-def main() -> None:
-    """Follow all sequences, and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--engines", nargs="+", default=list(ENGINES), choices=ENGINES)
-    parser.add_argument("--motions", nargs="+", default=list(MOTIONS), choices=MOTIONS)
-    parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
-    parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
-    parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
-    parser.add_argument("--unseen", nargs="+", type=int, metavar="SEED", help="other cloths, hands and cameras")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--strip", type=Path, help="a picture: truth, follower and open loop, of the first sequence")
-    options = parser.parse_args()
+def followed(
+    seed: int | None, engine: str, name: str, options: argparse.Namespace, first: bool
+) -> list[dict[str, Any]]:
+    """The lines of a motion, seen whole and half hidden, by each tracker; of the first a picture, if asked for."""
     logging.disable(logging.WARNING)
     rows = []
-    wanted = itertools.product(options.unseen or [None], options.engines, options.motions, (False, True))
-    print("engine   motion  seed  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
-    for seed, engine, name, hidden in wanted:
+    for hidden in (False, True):
         case, shapes = seen(engine, name, hidden, seed), {}
         towel = own_world(case["motion"], RADIUS[engine])[1]
         for tracker in options.trackers:
@@ -265,13 +256,36 @@ def main() -> None:
             row = {"engine": engine, "motion": name, "seed": seed, "hidden": hidden, "tracker": tracker}
             row |= {"mean_mm": float(off.mean()), "worst_mm": float(off.max())}
             rows.append(row | {"hidden_mm": covered, "cpu_s": spent})
-            figures = f"{off.mean():6.1f} {off.max():6.1f} {covered:6.1f}  {spent:18.3f}"
-            print(f"{engine:8} {name:7} {seed!s:5} {hidden!s:7} {tracker:10} {figures}", flush=True)
-            if options.json:
-                options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
-        if options.strip and len(rows) == len(options.trackers):
-            shown = {each: shapes[each] for each in ("follow", "open loop") if each in shapes}
-            strip(case, shown, options.strip)
+        if options.strip and first and not hidden:
+            strip(case, {each: shapes[each] for each in ("follow", "open loop") if each in shapes}, options.strip)
+    return rows
+
+
+def main() -> None:
+    """Follow all sequences, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--engines", nargs="+", default=list(ENGINES), choices=ENGINES)
+    parser.add_argument("--motions", nargs="+", default=list(MOTIONS), choices=MOTIONS)
+    parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
+    parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
+    parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
+    parser.add_argument("--unseen", nargs="+", type=int, metavar="SEED", help="other cloths, hands and cameras")
+    parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--strip", type=Path, help="a picture: truth, follower and open loop, of the first sequence")
+    options = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    wanted = itertools.product(options.unseen or [None], options.engines, options.motions)
+    parts = [(*which, options, k == 0) for k, which in enumerate(wanted)]
+    print("engine   motion  seed  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
+    for found in in_processes(followed, parts, options.jobs):
+        rows += found
+        for row in found:
+            figures = f"{row['mean_mm']:6.1f} {row['worst_mm']:6.1f} {row['hidden_mm']:6.1f}  {row['cpu_s']:18.3f}"
+            which = f"{row['engine']:8} {row['motion']:7} {row['seed']!s:5} {row['hidden']!s:7}"
+            print(f"{which} {row['tracker']:10} {figures}", flush=True)
+        if options.json:
+            options.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     for tracker in options.trackers:
         own = [row for row in rows if row["tracker"] == tracker]
         print(

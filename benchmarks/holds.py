@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from generated_cases import HAND_RADIUS, displaced, looking_at
+from processes import in_processes
 
 import nuno
 from nuno.camera.camera import Camera
@@ -176,32 +177,47 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=9000, help="settings were chosen on seeds below 100")
     parser.add_argument("--mujoco", action="store_true", help="cases by MuJoCo's flex in place of Nuno's")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--chunks", type=int, default=1, help="of each garment's cases: other measures each")
+    parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    each = max(1, options.count // len(options.garments))
+    each = max(1, options.count // len(options.garments) // options.chunks)
+    parts = [
+        (name, each, options.seed + k, options.images, options.mujoco, options.device)
+        for k in range(options.chunks)
+        for name in options.garments
+    ]
     rows: list[dict[str, Any]] = []
-    for name in options.garments:
-        clock = time.process_time()
-        if options.mujoco:
-            cases = from_mujoco(name, each, options.seed)
-        else:
-            cases = from_nuno(name, each, options.seed, options.device)
-        made = time.process_time() - clock
-        garment = nuno.garment(name, cell=CELL[name])
-        clock = time.process_time()
-        holds = nuno.imagine_holds(garment, spacing=SPACING.get(name, USUAL_SPACING), device=options.device)
-        imagined = time.process_time() - clock
-        clock = time.process_time()
-        for images in options.images:
-            found = [judged(case, images, holds) for case in cases]
-            rows += found
-            print(name, images, "images", len(holds.candidates), "candidates", summary(found), flush=True)
-        report = {f"{n} images": summary([r for r in rows if r["images"] == n]) for n in options.images}
+    for found, told in in_processes(chunk, parts, options.jobs):
+        rows += found
+        print(told, flush=True)
+        report = {
+            f"{name}, {n} images": summary(of)
+            for name in (*options.garments, "all")
+            for n in options.images
+            if (of := [r for r in rows if r["images"] == n and name in ("all", r["garment"])])
+        }
         if options.json:
             options.json.write_text(json.dumps(report | {"rows": rows}, indent=1))
-        told = (time.process_time() - clock) / (len(cases) * len(options.images))
-        print(f"  CPU s: cases {made:.0f}, holds {imagined:.0f}, an estimate {told:.2f}", flush=True)
     print(json.dumps(report, indent=1))
+
+
+def chunk(
+    name: str, count: int, seed: int, images: list[int], mujoco: bool, device: str
+) -> tuple[list[dict[str, Any]], str]:
+    """The lines of some cases of a garment, and the CPU seconds that they took."""
+    clock = time.process_time()
+    cases = from_mujoco(name, count, seed) if mujoco else from_nuno(name, count, seed, device)
+    made = time.process_time() - clock
+    garment = nuno.garment(name, cell=CELL[name])
+    clock = time.process_time()
+    holds = nuno.imagine_holds(garment, spacing=SPACING.get(name, USUAL_SPACING), device=device)
+    imagined = time.process_time() - clock
+    clock = time.process_time()
+    rows = [judged(case, n, holds) for n in images for case in cases]
+    each = (time.process_time() - clock) / max(len(rows), 1)
+    told = f"{name}: CPU s: {len(cases)} cases {made:.0f}, {len(holds.candidates)} candidates {imagined:.0f}"
+    return rows, f"{told}, an estimate {each:.2f}"
 
 
 if __name__ == "__main__":

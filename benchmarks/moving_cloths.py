@@ -183,10 +183,16 @@ def _mujoco(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: fl
 
 
 def _newton(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: float) -> np.ndarray:
+    import warp as wp
+
+    with wp.ScopedDevice("cuda:0" if wp.get_cuda_device_count() else "cpu"):
+        return _newton_on_device(hands, times, cells, radius)
+
+
+def _newton_on_device(hands: Motion, times: np.ndarray, cells: tuple[int, int], radius: float) -> np.ndarray:
     import newton
     import warp as wp
 
-    wp.set_device("cpu")
     start = flat(cells, radius, hands.size).reshape(-1, 3)
     columns = cells[0] + 1
     quads = [(j * columns + i, j * columns + i + 1) for j in range(cells[1]) for i in range(cells[0])]

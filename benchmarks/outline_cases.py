@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from generated_cases import HAND_RADIUS, REST_HEIGHT, displaced, looking_at
+from processes import in_processes
 
 from nuno import Cloth, Path, World, box, cloth_mesh, estimate_pick, garment, plane
 from nuno.camera.camera import Camera
@@ -146,27 +147,54 @@ def judged(case: OutlineCase, device: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def scene(shape: str, picks: int, seed: int, device: str, layers: int) -> list[dict[str, Any]]:
+    """The lines of a scene's cases."""
+    return [judged(case, device) | {"seed": seed} for case in generate((shape,), picks, seed, device, layers)]
+
+
 def main() -> None:
     """Make cases, estimate, print a line of each."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shapes", nargs="+", default=list(SHAPES), choices=SHAPES)
-    parser.add_argument("--picks", type=int, default=4, help="of each shape")
+    parser.add_argument("--scenes", type=int, default=4, help="of each shape")
+    parser.add_argument("--picks", type=int, default=1, help="of each scene")
     parser.add_argument("--seed", type=int, default=9000)
     parser.add_argument("--layers", type=int, default=1, choices=[1, 2], help="of garments that have two")
     parser.add_argument("--device", default="cpu")
+    parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=FilePath)
     options = parser.parse_args()
-    rows = []
-    for case in generate(tuple(options.shapes), options.picks, options.seed, options.device, options.layers):
-        rows.append(judged(case, options.device))
-        print(rows[-1], flush=True)
-    print({
+    rows: list[dict[str, Any]] = []
+    parts = [
+        (shape, options.picks, options.seed + k, options.device, options.layers)
+        for k in range(options.scenes)
+        for shape in options.shapes
+    ]
+    for found in in_processes(scene, parts, options.jobs):
+        rows += found
+        for row in found:
+            print(row, flush=True)
+        if options.json:
+            options.json.write_text(json.dumps(rows, indent=1))
+    for shape in (*options.shapes, None):
+        of = [r for r in rows if shape in (None, r["shape"])]
+        if of:
+            print({"shape": shape or "all", **summary(of)})
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Counts and means over cases."""
+    sure = [r for r in rows if r["confidence"] >= 0.8]
+    return {
         "cases": len(rows), "nearest_first": sum(r["rank"] == 1 for r in rows),
         "nearest_in_three": sum(r["rank"] <= 3 for r in rows),
+        "within_5_cm": sum(r["distance"] <= 0.05 for r in rows),
+        "of_three_within_5_cm": sum(r["of_three"] <= 0.05 for r in rows),
+        "sure": len(sure), "sure_within_5_cm": sum(r["distance"] <= 0.05 for r in sure),
+        "mean_confidence": round(float(np.mean([r["confidence"] for r in rows])), 2),
         "median_distance_m": round(float(np.median([r["distance"] for r in rows])), 3),
-    })  # fmt: skip
-    if options.json:
-        options.json.write_text(json.dumps(rows, indent=1))
+        "median_cpu_s": round(float(np.median([r["cpu_s"] for r in rows])), 1),
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ ALLOWED = {
     r"(frame_|key_|_frame_|_grip_|_same_|_with_equal_)?times|_times": "points in time [s]",
     r"(\w*_)?turn(s|_\w+)?|TURNS?|checked_turns": "a rotation, as quaternion or angle [rad]",
     r"roll|fill_?|sliding_window_view|ListedColormap": "names of NumPy, Warp, Matplotlib",
-    r"query_ball_point|fill(Convex)?Poly|_least_squares": "names of SciPy and OpenCV; the field's least squares",
+    r"query_ball_point|fill(Convex)?Poly|_?least_squares": "names of SciPy and OpenCV; the field's least squares",
     r"fill_(doubtful_)?holes": "morphology's hole filling",
     r"(taught_|find_|vertex_)?[lL]ayers": "the layers of a folded cloth, public names",
     r"over": "what lies over a point, public: `Layers.over`",

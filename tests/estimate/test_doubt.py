@@ -11,6 +11,7 @@ from nuno.estimate.doubt import (
     ELSEWHERE,
     POOR,
     SHARES,
+    TEMPERATURE,
     WARNED_SHARE,
     WELL,
     doubted,
@@ -31,13 +32,19 @@ def comparison(chamfer, iou=1.0):
     )  # fmt: skip
 
 
+def at_temperature(scores):
+    """Probabilities that are as exp of the scores over the temperature."""
+    weights = np.exp(scores / TEMPERATURE)
+    return weights / weights.sum()
+
+
 def test_many_good_fits_are_trusted():
-    """Where every guess says the same of well-fitting futures, the probabilities are those of the evidence."""
+    """Where every guess says the same of fair futures, the probabilities are the evidence's at a temperature."""
     seen = comparison([[1.0, 9.0], [1.0, 9.0], [1.0, 9.0]])
     ranked = rank([seen], "evidence", 2)
     with_doubt = doubted([seen], "evidence", 2, None)
     np.testing.assert_array_equal(with_doubt.scores, ranked.scores)
-    np.testing.assert_allclose(with_doubt.likely, ranked.probabilities, rtol=1e-9)
+    np.testing.assert_allclose(with_doubt.likely, at_temperature(ranked.scores), rtol=1e-9)
 
 
 def test_a_single_chance_fit_does_not_decide():
@@ -65,18 +72,18 @@ def test_a_bad_fit_is_doubted():
     assert misfit([bad], 0) == pytest.approx(5.0 * np.log(20.0) + 5.0) and misfit([bad], 0) > BADLY
     doubt = doubted([bad], "evidence", 2, None)
     # (1 + 59) / (1 + 19) = (1 + 5) / (1 + 1) = 3, so the evidence alone is as sure of both
-    np.testing.assert_allclose(rank([bad], "evidence", 2).probabilities, good.likely, rtol=1e-9)
+    np.testing.assert_allclose(at_temperature(rank([bad], "evidence", 2).scores), good.likely, rtol=1e-9)
     assert doubt.likely[0] < good.likely[0] - 0.1
     assert "looks little like the image" in oddities([bad], 0, "evidence", Hypothesis(1e-4))[0]
     assert oddities([bad], 0, "iou", Hypothesis(1e-4)) == ()
 
 
 def test_a_fair_fit_is_trusted():
-    """Below `WELL` the probabilities are those of the evidence, and nothing is told."""
+    """Below `WELL` the probabilities are the evidence's at a temperature, and nothing is told."""
     fair = comparison([[11.0, 110.0]] * 3)  # 5 ln 12 = 12.4
     assert 12.0 < misfit([fair], 0) < WELL
     likely = doubted([fair], "evidence", 2, None).likely
-    np.testing.assert_allclose(likely, rank([fair], "evidence", 2).probabilities, rtol=1e-9)
+    np.testing.assert_allclose(likely, at_temperature(rank([fair], "evidence", 2).scores), rtol=1e-9)
     assert oddities([fair], 0, "evidence", Hypothesis(1e-4)) == ()
 
 

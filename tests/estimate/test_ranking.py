@@ -91,10 +91,13 @@ def test_a_future_that_is_no_number_is_never_the_best():
 
 
 def test_probabilities_are_tempered_to_what_is_trusted():
-    """The best one's is what is trusted, the others' order and shares of logarithms stay; what is less sure stays."""
+    """The best one's is what is trusted, more or less than it was; the others' order and shares of logarithms stay."""
     scores = np.array((0.0, -1.0, -3.0, -np.inf))
     plain = np.exp(scores) / np.exp(scores).sum()
-    np.testing.assert_allclose(tempered(scores, 0.9), plain, rtol=1e-12)
+    np.testing.assert_allclose(tempered(scores, plain[0]), plain, rtol=1e-9)
+    assert plain[0] < 0.75 and tempered(scores, 0.9)[0] == pytest.approx(0.9, abs=1e-9)
+    alike = np.array((0.0, 0.0))
+    np.testing.assert_array_equal(tempered(alike, 0.9), (0.5, 0.5))
     cooled = tempered(scores, 0.5)
     assert cooled[0] == pytest.approx(0.5, abs=1e-9) and cooled.sum() == pytest.approx(1.0)
     ratios = np.log(cooled[:3] / cooled[0])

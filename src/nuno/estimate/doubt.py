@@ -20,6 +20,8 @@ from nuno.estimate.hypotheses import Hypothesis
 from nuno.estimate.ranking import CONTOUR_WEIGHT, EVIDENCE, OVERLAP_WEIGHT, Comparison, Ranked, rank
 from nuno.estimate.seeing import AWAY, COVERED
 
+FAIRLY = 10.0
+"""-log likelihood of a silhouette, without its pattern, up to which no other way of the hand is looked for."""
 WELL = 13.0
 """-log likelihood of a silhouette, without its pattern, up to which a future fits well; beyond, a warning says so."""
 BADLY = 19.0
@@ -35,6 +37,9 @@ SHARES = {SQUARE: 0.0, UNEVEN: 0.0, POOR: 0.0, ELSEWHERE: 0.4, AWAY: 0.4, COVERE
 nothing of answers (docs/reports/accuracy.md), and how badly the best future fits counts by itself."""
 WARNED_SHARE = 0.1
 """The same of any other warning."""
+TEMPERATURE = 0.8
+"""Evidence's logarithms are divided by this. Its weights were chosen to rank; by them right answers are doubted too
+much (docs/reports/accuracy.md)."""
 BREADTH = 6.0
 """Evidence's logarithms are divided by this for the broad probabilities."""
 
@@ -107,7 +112,8 @@ def doubted(
     if score not in EVIDENCE or not np.isfinite(ranked.scores).any():
         return ranked
     without = rank(comparisons, score, count, log_prior_of_candidates, without_best=True)
-    logs = np.logaddexp(_log_shares(ranked.scores), _log_shares(without.scores)) - np.log(2.0)
+    with_and_without = (_log_shares(scores / TEMPERATURE) for scores in (ranked.scores, without.scores))
+    logs = np.logaddexp(*with_and_without) - np.log(2.0)
     found = misfit(comparisons, int(ranked.order[0]))
     share = share_of_doubt(found, warnings)
     if share > 0.0:

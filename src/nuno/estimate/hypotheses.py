@@ -51,12 +51,15 @@ class Discretisation:
         hypotheses: The hypotheses that are run on it.
         best: It looks at so many of the candidates that are best so far at most, and at no more than are plausible
             (`nuno.estimate.ranking.SHARE`); None is all.
+        all_if_poor: It looks at all candidates nevertheless where even the best future so far fits poorly
+            (`nuno.estimate.doubt.FAIRLY`) and the hand's way is not known.
     """
 
     cells: int
     substeps: int
     hypotheses: tuple[Hypothesis, ...]
     best: int | None = None
+    all_if_poor: bool = False
 
 
 RIGIDITIES = (3e-5, 1e-4, 3e-4, 8e-4, 1.6e-3)
@@ -114,11 +117,13 @@ _MISTAKES = tuple(
 DISCRETISATIONS = (
     Discretisation(20, 14, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
     Discretisation(
+        20, 14, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, all_if_poor=True
+    ),
+    Discretisation(
         20, 14,
         (
-            _loose(3e-4, 0.25, up_first=True), _firm(3e-5, 0.25), _firm(3e-4, 0.25, up_first=True),
-            _firm(8e-4, 0.5, hand=_HIGHER), _firm(5e-3, 0.3), _firm(1e-4, 0.5, hand=_LOWER), _loose(1e-4, 0.25),
-            _loose(1e-3, 0.25), _loose(1e-4, 0.5, up_first=True), _loose(1e-3, 0.5),
+            _loose(3e-4, 0.25, up_first=True), _firm(3e-5, 0.25), _firm(8e-4, 0.5, hand=_HIGHER), _firm(5e-3, 0.3),
+            _firm(1e-4, 0.5, hand=_LOWER), _loose(1e-4, 0.25), _loose(1e-3, 0.25), _loose(1e-3, 0.5),
         ),
         best=16,
     ),
@@ -140,7 +145,8 @@ the others of both kinds at the best, and a finer and stiffer weave and one that
 lifted cloth buckles depends on how it stretches and shears and on the mesh: those that differ in all three had more
 right answers than any one (docs/reports/accuracy.md). Some take it that the hand went up first and sideways then, that
 it is a standard deviation higher or lower than it is told, or, by mistake, much more. A cloth that is led up first
-swings, and takes half as much time again as others to be imagined, so no such guess looks at every candidate.
+swings, and takes half as much time again as others to be imagined. So such guesses look at every candidate only where
+the best of the straight ways fits poorly: the first stage then often takes the true candidate for one of the worst.
 """
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -30,6 +31,7 @@ from nuno.estimate.pick_trials import PickTrials, try_picks
 from nuno.estimate.ranking import SURE
 from nuno.estimate.rotations import TURNS
 from nuno.estimate.seeing import begin_to_see
+from nuno.estimate.table_doubt import TableDoubt, with_view_of_table
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.validation import choice, number
 from nuno.world.progress import with_clock
@@ -84,9 +86,10 @@ def estimate_pick(
         before: RGB image (h, w, 3) uint8 of the cloth flat on the table, or its path; None where ``rectangle`` or
             ``before_mask`` is given.
         after: RGB image of the cloth in the hand, or its path; None where ``after_mask`` is given.
-        camera: The camera of both images, or the ``camera`` entry of an input.json. Where the outline of the cloth
-            before is a rectangle with a clearly other focal length alone, that is taken instead, with a warning.
-        table_height: z of the table top [m].
+        camera: The camera of both images, or the ``camera`` entry of an input.json. Where the table's border in the
+            image before tells that it is clearly turned or focused otherwise, or the outline of the cloth is a
+            rectangle with another focal length alone, that is taken instead, with a warning.
+        table_height: z of the table top [m]; likewise.
         hand: (3,) where the picked point is now [m].
         table_half_extents: Half sizes of the top along x and y [m]; None: it is taken as endless.
         table_centre: x, y of the top's middle [m].
@@ -157,8 +160,12 @@ def estimate_pick(
     wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
     measured = rectangle is None
+    doubt = with_view_of_table(settings, images) if measured else TableDoubt(settings)
+    settings = doubt.settings
     images, rectangle = find_cloth_before(images, rectangle, hint, settings, choice("shape", shape, SHAPES), template)
-    if measured:
+    if doubt.warnings:
+        rectangle = replace(rectangle, warnings=(*doubt.warnings, *rectangle.warnings))
+    if measured and not doubt.is_seen:
         settings, rectangle = with_focal_of_rectangle(settings, images, rectangle)
     settings = with_outline_candidates(settings, rectangle, spacing)
     wait_for_seen = begin_to_see(

@@ -48,7 +48,8 @@ class PickResult:
             distance in pixels of the image), "iou", "eq1".
         eq1: (k,) float by candidate, the similarity of the paper's eq. (1), of futures that are not turned.
         rectangle: The cloth as it lay before, a ``ClothOutline`` where it was taken by its outline.
-        camera: The camera, with another focal length where the cloth's outline told so (a warning says it).
+        camera: The camera, as the table's border or the cloth's outline told where it was told wrongly (a warning says
+            it).
         grid: Candidates along both sides; (2, 2) where points were given.
         seconds: Wall time by stage [s].
         futures: The batch of imagined picks in which the best one is.
@@ -58,7 +59,8 @@ class PickResult:
         masks: (k, h, w) bool, each candidate's best imagined silhouette, turned, at the resolution of ``real``.
         real: The silhouette that was seen.
         seen_warnings: What was odd about how it was seen.
-        trusted: No candidate is likelier than this, however sure the evidence is (`nuno.estimate.doubt`).
+        trusted: How likely the best candidate is, as far as the evidence may be trusted (`nuno.estimate.doubt`); 1 is
+            as the evidence says.
         sideways: Of the prior of the lift that is in scores of evidence (`nuno.estimate.lift_prior`); None is no prior.
     """
 
@@ -137,7 +139,7 @@ class PickResult:
     def probabilities(self) -> np.ndarray | None:
         """(k,) float by candidate, how likely each is; None where something else than evidence ranks."""
         likely = probabilities(self.score_name, self.scores)
-        return None if likely is None else tempered(self.scores, self.trusted)
+        return likely if likely is None or self.trusted == 1.0 else tempered(self.scores, self.trusted)
 
     @cached_property
     def warnings(self) -> list[str]:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.errors import EstimationError
-from nuno.estimate.doubt import doubted, oddities
+from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
 from nuno.estimate.hypotheses import Discretisation
@@ -99,11 +100,15 @@ def try_picks(
     outline: Outline | None = None
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
     meshes = settings.discretisations
+    # an outline's triangles take several times as long as a rectangle's grid
+    may_be_wide = settings.with_evidence and settings.hand_path is None and not isinstance(rectangle, ClothOutline)
     for k, discretisation in enumerate(with_bar(meshes, "imagining", settings.progress, "mesh")):
         chosen = np.arange(len(uv))
-        if ranked is not None and discretisation.best is not None:
+        is_wide = discretisation.all_if_poor and may_be_wide and _fits_poorly(comparisons, ranked)
+        if ranked is not None and discretisation.best is not None and not is_wide:
             chosen = ranked.plausible(discretisation.best)
-        futures: Futures | None = None if ahead is None else ahead.part(meshes[k:], chosen)
+        # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
+        futures: Futures | None = None if ahead is None or is_wide else ahead.part(meshes[k:], chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)
         stages.end("imagine")
@@ -132,6 +137,11 @@ def try_picks(
     ranked = doubted(comparisons, settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
     return PickTrials(comparisons, batches, ranked, seen, odd, trusted)
+
+
+def _fits_poorly(comparisons: list[Comparison], ranked: Ranked | None) -> bool:
+    """Return True if even the best future so far fits poorly."""
+    return ranked is not None and misfit(comparisons, int(ranked.order[0])) > FAIRLY
 
 
 def _weighed(comparison: Comparison, discretisation: Discretisation) -> Comparison:

@@ -31,6 +31,8 @@ SURE = 0.96
 """A candidate as likely as this after some of the guesses, with and without the best of them, needs no more."""
 HOTTEST = 12.0
 """Logarithm of the highest temperature, at which all are alike."""
+COLDEST = -2.0
+"""The same of the lowest."""
 SHARE = 0.95
 """Further guesses look at the candidates that together hold so much of the probability."""
 
@@ -200,24 +202,24 @@ def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:
 
 
 def tempered(scores: np.ndarray, trusted: float) -> np.ndarray:
-    """Return probabilities (k,) in the order of the scores (k,), of which the best one's is no more than is trusted.
+    """Return probabilities (k,) in the order of the scores (k,), of which the best one's is what is trusted.
 
-    They are as exp of the scores divided by a temperature, 1 where the best one's is no more as it is.
+    They are as exp of the scores divided by a temperature, which lies between `COLDEST` and `HOTTEST`.
     """
     finite = np.isfinite(scores)
     best = np.where(finite, scores, -np.inf).max()
 
-    def at(temperature: float) -> np.ndarray:
-        weights = np.where(finite, np.exp(np.where(finite, scores - best, 0.0) / temperature), 0.0)
+    def at(log_temperature: float) -> np.ndarray:
+        weights = np.where(finite, np.exp(np.where(finite, scores - best, 0.0) / np.exp(log_temperature)), 0.0)
         return np.asarray(weights / weights.sum())
 
-    low, high = 0.0, HOTTEST
-    if at(1.0).max() <= trusted:
-        return at(1.0)
+    low, high = COLDEST, HOTTEST
+    if at(low).max() <= trusted:
+        return at(low)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if at(float(np.exp(middle))).max() <= trusted else (middle, high)
-    return at(float(np.exp(high)))
+        low, high = (low, middle) if at(middle).max() <= trusted else (middle, high)
+    return at(high)
 
 
 def confidence(name: str, scores: np.ndarray) -> float:

@@ -1,0 +1,61 @@
+"""Stages of a pick: which candidates each of them looks at."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_pick_settings import settings
+
+from nuno.camera.rectangle import ClothRectangle
+from nuno.estimate import pick_trials
+from nuno.estimate.hypotheses import Discretisation, Hypothesis
+from nuno.estimate.ranking import Comparison
+from nuno.kernels.compile_watch import Stages
+
+CORNERS = np.array([(-0.3, -0.2, 0.0), (0.3, -0.2, 0.0), (0.3, 0.2, 0.0), (-0.3, 0.2, 0.0)])
+RECTANGLE = ClothRectangle(CORNERS, 0.6, 0.4, np.zeros(3), 0.0, 0.0)
+STAGES = (
+    Discretisation(20, 14, (Hypothesis(1e-4), Hypothesis(1e-3))),
+    Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, all_if_poor=True),
+    Discretisation(20, 14, (Hypothesis(1e-5),), best=3),
+)
+
+
+def looked_at(monkeypatch: pytest.MonkeyPatch, chamfer: float, **changes: Any) -> list[int]:
+    """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
+    numbers: list[int] = []
+
+    def compare(futures: Any, chosen: np.ndarray, seen: Any, given: Any) -> Comparison:
+        numbers.append(len(chosen))
+        shape = (len(given.turns), len(futures.discretisation.hypotheses), len(chosen))
+        far = np.where(np.isin(chosen, (0, 1)), chamfer, 40.0)
+        return Comparison(
+            chosen, given.turns, np.broadcast_to(far, shape), np.full(shape, 0.9), np.full(shape, 0.9),
+            np.ones(shape[1:], dtype=bool),
+        )  # fmt: skip
+
+    def imagine(candidates: np.ndarray, discretisation: Discretisation, **_: Any) -> Any:
+        return SimpleNamespace(discretisation=discretisation, candidates=len(candidates))
+
+    monkeypatch.setattr(pick_trials, "compare", compare)
+    monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
+    given = settings(discretisations=STAGES, turns=(0.0,), learned=False, sideways=None, **changes)
+    seen: Any = SimpleNamespace(warnings=())
+    pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))
+    return numbers
+
+
+def test_another_way_of_the_hand_is_tried_on_all_candidates_where_none_fits_well(monkeypatch):
+    """Contours 1.5 px off cost 5 ln 2.5 + 1 = 5.6, those 6 px off 10.7: above 10 is poor; the next stage is as ever."""
+    assert looked_at(monkeypatch, 1.5) == [6, 2, 2]
+    assert looked_at(monkeypatch, 6.0) == [6, 6, 2]
+
+
+def test_a_known_way_of_the_hand_is_no_guess(monkeypatch):
+    """Where it is given, and where no evidence ranks, as few are looked at as by any stage."""
+    way = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)])
+    assert looked_at(monkeypatch, 6.0, hand_path=way)[1] < 6
+    assert looked_at(monkeypatch, 6.0, score="iou")[1] == 3
