@@ -9,7 +9,11 @@ from typing import Any
 from nuno.errors import InvalidInputError
 from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.files.out_folder import check_out_folder
+from nuno.kernels.command_device import device_of_command
 from nuno.kernels.start_warp import start_warp
+
+KERNELS = "nuno.plans.run_blocks_shared"
+"""Of a batch of picks on CUDA, compiled for about a minute."""
 
 
 def add_pick(commands: Any) -> argparse.ArgumentParser:
@@ -56,9 +60,10 @@ def run_pick(options: argparse.Namespace) -> str:
     case = read_case(options.case)
     start_warp()
     grid = (int(parts[0]), int(parts[1]))
+    device = device_of_command(options.device, KERNELS) if options.engine == "nuno" else options.device
     result = case.estimate(
         candidates=grid, sideways=sideways, hand_std=options.hand_std, shape=options.shape, spacing=options.spacing,
-        device=options.device, engine=options.engine, progress=options.progress,
+        device=device, engine=options.engine, progress=options.progress,
     )  # fmt: skip
     result.save(options.out)
     a, b = result.best
