@@ -62,8 +62,8 @@ def test_different_ways_are_those_of_robots_alone():
 def test_many_frames_at_once_are_those_one_by_one():
     """Two copies of which one's arm comes to rest earlier: run at once, and stepped; links, joints, loads to the bit.
 
-    A hand leads a corner of a cloth, and a cube. In the first frame the commands are looked at, and one of them takes up
-    another piece as its way ends.
+    A hand leads a corner of a cloth, and a cube. In the first frame the commands are looked at; one takes up another
+    piece as its way ends.
     """
     world = nuno.World(device="cpu")
     robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
