@@ -62,13 +62,20 @@ def test_different_ways_are_those_of_robots_alone():
 
 
 def test_many_frames_at_once_are_those_one_by_one():
-    """Two copies of which one's arm comes to rest earlier: run at once, and stepped; links and joints to the bit.
+    """Two copies of which one's arm comes to rest earlier: run at once, and stepped; links, joints, loads to the bit.
 
-    In the first frame the commands are looked at, and one takes up another piece as its way ends.
+    A hand leads a corner of a cloth, and a cube. In the first frame the commands are looked at; one takes up another
+    piece as its way ends.
     """
     world = nuno.World(device="cpu")
-    world.attach(world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=(3.0, 0.0, 1.0))))
-    nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world)
+    hand = robot.hands["left_hand"].body
+    sheet = world.add(nuno.sheet((0.1, 0.1), cells=(2, 2), position=hand.position - (0.0, 0.0, 0.3)))
+    cube = world.add(nuno.box((0.05, 0.05, 0.05), name="cube", position=hand.position - (0.0, -0.4, 0.0)))
+    world.attach(sheet)
+    world.attach(cube, nuno.Rigid(density=300.0))
+    world.grip(sheet, [0], to=hand)
+    world.grip(cube, to=hand)
     found = []
     for at_once in (True, False):
         futures = world.imagine(2)
@@ -82,6 +89,7 @@ def test_many_frames_at_once_are_those_one_by_one():
             for _ in range(18):
                 futures.step()
         places = [body._position for body in futures.bodies] + [body._quaternion for body in futures.bodies]
+        places += [futures.find(body.name).vertices for body in (sheet, cube)]
         states = futures.robot.state()
         found.append((len(counted), places, [state.q for state in states], [state.v for state in states], futures.time))
     assert found[0][0] < 8 and found[1][0] == 18

@@ -126,7 +126,7 @@ class BatchMotion:
 
     @cached_property
     def between(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What ``Path.keys_around`` says of the run's times; what rounding alone keeps from a key is at the key.
+        """Keys around the run's times as of ``Path.keys_around``; what rounding alone keeps from a key is at the key.
 
         So it makes no difference how many frames a run has.
         """

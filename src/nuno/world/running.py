@@ -81,7 +81,9 @@ class Running(Advancing):
         # the poses of what follows a path are laid out for so many frames
         most = CUDA_CHUNK if self._device.startswith("cuda") and not self._kinematic_bodies() else CHUNK
         chunk = min(most, math.gcd(*(watcher.frames for watcher in self._watchers)) or most)
-        chunk, most = (1, chunk) if self.drivers else (chunk, 1)  # they are asked frame by frame, or for some at once
+        # drivers are asked frame by frame, or for some at once where nobody watches
+        ahead = chunk if self.drivers and not self._watchers else 1
+        chunk = 1 if self.drivers else chunk
         pieces = max(1, math.ceil(math.floor(frames + 1e-6) / chunk))
         for piece in with_bar(range(1, pieces + 1), "simulating", progress):
             end = finish if piece == pieces else begin + piece * chunk / self.frame_rate
@@ -90,10 +92,10 @@ class Running(Advancing):
                 last = min(end, self._time + 2.0 * chunk / self.frame_rate)
                 stop = self._pace.next_stop(self._time, last, 1.0 / self.frame_rate)
                 with self._call():
-                    if stop == end and each_frame is None and most > 1:
+                    if stop == end and each_frame is None and ahead > 1:
                         ends = [
                             finish if k == pieces else begin + k * chunk / self.frame_rate
-                            for k in range(piece, min(piece + most, pieces + 1))
+                            for k in range(piece, min(piece + ahead, pieces + 1))
                         ]
                         stop = ends[self._frames_ahead(ends) - 1]
                     if stop - self._time > SOON:

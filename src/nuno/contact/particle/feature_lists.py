@@ -201,11 +201,11 @@ def names_sets(topo: Any):
 
 
 @wp.func
-def element_of(listed: int, sets: int, named: bool):
-    """Return which element is listed; -1 where it sleeps, or touches none of some sets of shapes."""
-    element = listed
-    if named and listed >= 0:
-        element = wp.where((listed & sets) != 0, listed & ((1 << SETS) - 1), -1)
+def element_of(number: int, sets: int, named: bool):
+    """Return the element of a number in a list; -1 where it sleeps, or may touch none of some sets of shapes."""
+    element = number
+    if named and number >= 0:
+        element = wp.where((number & sets) != 0, number & ((1 << SETS) - 1), -1)
     return element
 
 
