@@ -18,8 +18,8 @@ PAGES = {
 SLOW = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
 # and those of some three seconds or more; `test_docs.py` looks for all names of all pages, and runs the first program
 LONG = {
-    "engines", "folds", "following", "garments", "learning", "planning", "robot-dynamics", "robot-interface", "scenes",
-    "sensors", "soft-bodies", "viewer", "worlds",
+    "engines", "folds", "following", "garments", "getting-started", "learning", "planning", "robot-dynamics",
+    "robot-interface", "scenes", "sensors", "soft-bodies", "viewer", "wire", "worlds",
 }  # fmt: skip
 MARKS = {**dict.fromkeys(SLOW, pytest.mark.slow), **dict.fromkeys(LONG, pytest.mark.long)}
 

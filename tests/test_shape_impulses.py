@@ -278,6 +278,7 @@ def test_copies_sum_up_too(build, tmp_path):
     assert all(world.contacts(name).impulses for name in names)
 
 
+@pytest.mark.long
 def test_worlds_of_a_batch_have_their_own():
     """Each world of a batch is told the weight of its own towel, and of the box on it."""
     world = nuno.World(device="cpu")

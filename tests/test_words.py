@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import nuno
@@ -66,10 +67,16 @@ ALLOWED = {
 }
 
 
+@cache
+def tree_of(path):
+    """Return a module's syntax tree."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def identifiers(path):
     """Yield every identifier of a file, its own name among them."""
     yield path.stem
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         for field in ("id", "attr", "arg", "name"):
             if isinstance(value := getattr(node, field, None), str):
                 yield value
@@ -121,7 +128,7 @@ def test_docstrings_begin_without_invented_words():
     lines = [
         f"{path.relative_to(PACKAGE).as_posix()}: {text}"
         for path in sorted(PACKAGE.rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
         and invented.search(text := (ast.get_docstring(node) or "").partition("\n")[0])
     ]

@@ -138,6 +138,7 @@ def test_in_pixels_at_an_unknown_scale():
     np.testing.assert_array_equal(best.polygon, again.polygon)
 
 
+@pytest.mark.long
 def test_segmentation_by_template():
     """Where colours take the rags for the towel, the template finds it; where both agree, colours give the mask."""
     truth = mask_of(PLACE)

@@ -38,7 +38,9 @@ def striped() -> Pair:
     return pair("blue stripes on wood")
 
 
-@pytest.mark.parametrize("name", [look.name for look in LOOKS])
+@pytest.mark.parametrize(
+    "name", [pytest.param(look.name, marks=pytest.mark.long if k % 2 else ()) for k, look in enumerate(LOOKS)]
+)
 def test_flat_cloth_is_found(name: str) -> None:
     """The mask before is right to about half a pixel along its outline, for every pattern and colour."""
     scene = pair(name, lift=False)

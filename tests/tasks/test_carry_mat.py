@@ -124,6 +124,7 @@ def test_finished_trials_are_not_run_again(talos, glides, mat, tmp_path, monkeyp
     assert again.trials == first.trials
 
 
+@pytest.mark.long
 def test_a_trial_that_diverges_has_failed(talos, glides, mat, monkeypatch):
     """Its error is the reason, without a time; the others go on."""
     from nuno.tasks import carry_trials

@@ -7,7 +7,7 @@ import nuno
 from nuno.tasks.lift import lift_soft_cube
 
 
-@pytest.mark.parametrize("mu", [0.3, 0.6])
+@pytest.mark.parametrize("mu", [pytest.param(0.3, marks=pytest.mark.long), 0.6])
 def test_the_least_squeeze_is_coulombs(mu):
     """Closed form: 2 mu N >= m g; the issue asks for 10 %, of which the search's own steps are 1 %."""
     material = nuno.Soft(density=200.0, youngs_modulus=2e4, poisson_ratio=0.3, friction=mu, damping=0.01)

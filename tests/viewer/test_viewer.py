@@ -313,7 +313,9 @@ def test_worlds_of_a_batch_stand_side_by_side():
         Viewer(futures, worlds=[0, 3])
 
 
-@pytest.mark.parametrize(("name", "elbow"), [("talos", "arm_left_4_joint"), ("g1", "left_elbow_joint")])
+@pytest.mark.parametrize(
+    ("name", "elbow"), [("talos", "arm_left_4_joint"), pytest.param("g1", "left_elbow_joint", marks=pytest.mark.long)]
+)
 def test_robots_are_drawn_by_their_visual_meshes(name, elbow):
     """Each visual mesh is where Pinocchio has it, also of a robot that enters while it looks, and moves."""
     world = nuno.World(device="cpu")

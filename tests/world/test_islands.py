@@ -105,6 +105,7 @@ def test_islands_are_those_that_meet_through_others():
     np.testing.assert_array_equal(islands.at(few), [[0, 0, 0], [1, 1, 0], [2, 2, 2], [3, 3, 3]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_span_in_pieces_is_the_span(device):
     """Promise: where runs begin and end changes no bit, also where worlds go through frames with other substeps."""

@@ -192,7 +192,7 @@ def _render(
 
 
 def _moves_on_device(world: Any, body: Any) -> bool:
-    """Return whether the vertices that are drawn are those that a batch's solver has, which need not pass the host."""
+    """Return True if the drawn vertices are those that a batch's solver has, which need not pass the host."""
     return getattr(body.shape, "is_cloth", False) and body.is_dynamic and hasattr(world, "state")
 
 
