@@ -274,6 +274,25 @@ def test_joints_come_and_go_while_bodies_move():
     world.run(0.1)
 
 
+def test_a_grip_tells_what_it_bears_of_a_body_on_a_joint():
+    """A slider bears nothing along its axis, a hinge no torque about it: the grip bears the weight, and the torque."""
+    world = world_of()
+    block = world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 1.0), name="block").rotate(0.7, "x"))
+    world.attach(block, nuno.Rigid(mass=1.0))
+    nuno.slider(block, None, axis=(0.0, 0.0, 1.0))
+    grip = world.grip(block, to=block.position)
+    world.run(0.3)
+    assert grip.wrench[0][2] == pytest.approx(-G, rel=1e-3)
+    world = world_of(gravity=(0.0, 0.0, 0.0))
+    rod = world.add(nuno.box((0.2, 0.02, 0.02), position=(0.0, 0.0, 1.0), name="rod").rotate(0.7, "x"))
+    world.attach(rod, nuno.Rigid(mass=1.0))
+    nuno.hinge(rod, None, point=rod.position, axis=(0.0, 0.0, 1.0))
+    grip = world.grip(rod, to=rod.position)
+    world.push(rod, (0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.3), duration=1.0)
+    world.run(0.3)
+    assert grip.wrench[1][2] == pytest.approx(0.3, rel=1e-3)
+
+
 def test_drives_of_ball_joints_are_refused():
     """MuJoCo's range of a ball is of its whole turn, not of the axis' lean; nothing is joined."""
     world = world_of()

@@ -60,8 +60,17 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
             force[world], torque[world] = -each.sum(axis=0), -np.cross(places - middle, each).sum(axis=0)
             continue
         at, turn = int(own.dof[0]), dynamics.values["turn"][world]
-        force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
-        if held.helper is not None:  # what leads bears the helper's share of the mass besides
+        if own.depth:  # it has no coordinates of its own: by the constraint's rows, as MuJoCo writes a weld's
+            rows = data.efc_force[mine]
+            force[world] = rows[:3]
+            if len(rows) == 6:
+                scale = model.eq_data[held.rows[0], 10]
+                torque[world] = 0.5 * scale * quat.rotate(turn, rows[3:])
+            else:  # a connected point, which bears no torque about itself
+                torque[world] = np.cross(quat.rotate(turn, grip.spec.place[world]), force[world])
+        else:
+            force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
+        if held.helper is not None and not own.depth:  # what leads bears the helper's share of the mass besides
             share = THIN * float(dynamics.mass[world]) * (model.opt.gravity - data.qacc[at : at + 3])
             force[world] += share
             torque[world] += np.cross(quat.rotate(turn, dynamics.centre), share)
