@@ -41,6 +41,13 @@ def test_what_is_right_stays_as_it_is():
     assert unseen.settings is right and not unseen.is_seen
 
 
+def test_wrong_extents_are_told_and_change_nothing():
+    """Half extents 3 and 4 cm too large: the very settings, a warning, and the cloth's outline is asked as ever."""
+    wrong = given(TRUE, replace(TABLE, half_extents=(0.45, 0.64)))
+    doubt = with_view_of_table(wrong, PickImages(drawn(), None, None, None, None))
+    assert doubt.settings is wrong and not doubt.is_seen and "extents" in doubt.warnings[0]
+
+
 def test_a_hand_stays_above_the_table():
     """A table that would rise above the hand is left where it is told."""
     camera, table = told(height=-0.03)

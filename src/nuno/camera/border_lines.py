@@ -18,8 +18,11 @@ REACH = 0.08
 """Of the image's width: so far from where a side should be its line is looked for."""
 SHORTEST = 0.12
 """Of the image's width: of a shorter side in the image too little is seen."""
-CONTRAST = 8.0
-"""Levels between both sides of an edge from which on it is one; noise of a camera is three or so."""
+CONTRAST = 4.0
+"""Levels between both sides of an edge from which on it is one: noise of three levels leaves 1.5 where `ALONG` points
+are averaged."""
+ALONG = 5
+"""Points of a side that are averaged."""
 SEEN_SHARE = 0.5
 """Of a side must lie on a line."""
 LINES = 4
@@ -117,7 +120,7 @@ def _edges(image: np.ndarray, points: np.ndarray, normal: np.ndarray, reach: int
     offsets = np.arange(-reach - 3, reach + 4)
     at = (points[:, None] + offsets[None, :, None] * normal).astype(np.float32)
     values: np.ndarray = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    values = cv2.blur(values.reshape(len(points), len(offsets), 3), (1, 3))  # along the side
+    values = cv2.blur(values.reshape(len(points), len(offsets), 3), (1, ALONG))
     width = values.shape[1]
     before, after = ((values[:, k : width - 6 + k] + values[:, k + 1 : width - 5 + k]) / 2 for k in (1, 4))
     contrast = np.linalg.norm(after - before, axis=2)

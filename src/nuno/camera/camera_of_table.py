@@ -2,12 +2,11 @@
 
 A table whose extents are known is a rectangle of known size. Its sides in the image tell the focal length, how the
 camera is turned, and the table's height: those are fitted to the lines found (`nuno.camera.border_lines`) by least
-squares.
-All of them are off by a little as a rule, and so are the extents: ordinary errors, which nobody need correct. What is
-looked for are mistakes: a focal length, a turn or a height that is wrong by far more, while the others are as they are
-told. So for every set of mistakes the fit has wide priors for these and narrow ones for all else, and each mistake
-has to make the sum of squares less by `CLEARLY` squared. The extents may be a mistake themselves, alone: then camera
-and height are left as they are told.
+squares. All of them are off by a little as a rule, and so are the extents: ordinary errors, which nobody need correct.
+What is looked for are mistakes: a focal length, a turn or a height that is wrong by far more, while the others are as
+they are told. So for every set of mistakes the fit has wide priors for these and narrow ones for all else, and each
+mistake has to make the sum of squares less by `CLEARLY` squared. The extents may be a mistake themselves, alone: then
+camera and height are left as they are told.
 """
 
 from __future__ import annotations

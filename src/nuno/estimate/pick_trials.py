@@ -101,14 +101,14 @@ def try_picks(
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
     meshes = settings.discretisations
     # an outline's triangles take several times as long as a rectangle's grid
-    may_be_wide = settings.with_evidence and settings.hand_path is None and not isinstance(rectangle, ClothOutline)
+    may_look_at_all = settings.with_evidence and settings.hand_path is None and not isinstance(rectangle, ClothOutline)
     for k, discretisation in enumerate(with_bar(meshes, "imagining", settings.progress, "mesh")):
         chosen = np.arange(len(uv))
-        is_wide = discretisation.all_if_poor and may_be_wide and _fits_poorly(comparisons, ranked)
-        if ranked is not None and discretisation.best is not None and not is_wide:
+        looks_at_all = discretisation.all_if_poor and may_look_at_all and _fits_poorly(comparisons, ranked)
+        if ranked is not None and discretisation.best is not None and not looks_at_all:
             chosen = ranked.plausible(discretisation.best)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
-        futures: Futures | None = None if ahead is None or is_wide else ahead.part(meshes[k:], chosen)
+        futures: Futures | None = None if ahead is None or looks_at_all else ahead.part(meshes[k:], chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)
         stages.end("imagine")

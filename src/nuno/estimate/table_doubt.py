@@ -16,7 +16,7 @@ class TableDoubt:
 
     Attributes:
         settings: With camera and table as they are taken.
-        is_seen: Whether the border tells anything: then no outline of a cloth need be asked.
+        is_seen: Whether the border tells what is right: then no outline of a cloth need be asked.
         warnings: Of what is taken otherwise than it is told.
     """
 
@@ -39,6 +39,8 @@ def with_view_of_table(settings: PickSettings, images: PickImages) -> TableDoubt
     view = view_of_table(images.before, settings.camera, settings.table)
     if view is None or view.warning is None:
         return TableDoubt(settings, view is not None)
+    if not view.errors.any():
+        return TableDoubt(settings, False, (view.warning,))
     camera, table = corrected(settings.camera, settings.table, view.errors)
     if settings.hand[2] < table.height:  # a hand below the table holds nothing
         return TableDoubt(settings)
