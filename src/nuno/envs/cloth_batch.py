@@ -110,7 +110,8 @@ class ClothBatch:
 
     def _at_key_points(self, array: Any) -> np.ndarray:
         """Return what an array (worlds, n) of vec3 has of the observed vertices, which alone leave the device."""
-        chosen: Any = wp.indexedarray(array, [None, self._key])
+        every: Any = None
+        chosen: Any = wp.indexedarray(array, [every, self._key])
         found: np.ndarray = chosen.numpy()
         return found
 

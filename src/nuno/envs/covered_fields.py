@@ -33,7 +33,7 @@ def read_fields(
     found_out[world, k] = masks[world, field[0], field[1]]
 
 
-def count_covered(masks: wp.array) -> np.ndarray:
+def count_covered(masks: Any) -> np.ndarray:
     """Return how many pixels of each mask (worlds, h, w) bool are set, (worlds,) int."""
     if masks.device.is_cpu:
         return np.asarray(np.count_nonzero(masks.numpy().reshape(len(masks), -1), axis=1))
@@ -42,7 +42,7 @@ def count_covered(masks: wp.array) -> np.ndarray:
     return np.asarray(counts.numpy())
 
 
-def look_up_covered(masks: wp.array, fields: np.ndarray) -> np.ndarray:
+def look_up_covered(masks: Any, fields: np.ndarray) -> np.ndarray:
     """Return the values of masks (worlds, h, w) bool at rows and columns (worlds, k, 2) int: (worlds, k) bool."""
     if masks.device.is_cpu:
         return np.asarray(masks.numpy()[np.arange(len(fields))[:, None], fields[..., 0], fields[..., 1]])
