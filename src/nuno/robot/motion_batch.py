@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from nuno.robot.wanted_motion import Servo, WantedMotion
 
 
+AT_ONCE = 8192
+"""Frames of all worlds that are worked out at once: some 25 MB of poses."""
+
+
 @dataclass(frozen=True, eq=False)
 class FramesAhead:
     """Frames that were worked out ahead.
@@ -64,6 +68,7 @@ class MotionBatch:
         Those are worked out in which no copy must be asked.
         """
         self._ahead = ahead = FramesAhead(start)
+        ends = ends[: max(1, AT_ONCE // len(self._motions))]
         joints, everyone = self._prepared(), np.ones(len(self._motions), dtype=bool)
         kept = joints.clock.copy(), joints.motion, joints.desired
         configurations = np.array([aim.q for aim in self._aims])
@@ -176,7 +181,7 @@ class MotionBatch:
 
     def forget(self) -> None:
         """Begin anew with the copies as they are."""
-        self._joints, self._pending = None, ()
+        self._joints, self._pending, self._ahead = None, (), FramesAhead(0.0)
 
     def _prepared(self) -> JointBatch:
         """Return the joints of all copies as arrays."""
