@@ -6,9 +6,10 @@ import warp as wp
 
 from nuno.contact.particle.feature_contact import push_active, push_features, travel_of_substep
 from nuno.contact.particle.feature_lists import EARLIEST, TRAVELLED, clear_features, list_features, mark_features
-from nuno.contact.particle.shape_contact import measure_box, reset_box, select_shapes, sort_shapes
+from nuno.contact.particle.shape_contact import measure_box, reset_box, select_shapes, shape_speed_of, sort_shapes
 from nuno.numbers.block_group import BlockGroup, grid_barrier, wait_for
 from nuno.numbers.crew import Crew
+from nuno.numbers.lanes import lane_max
 from nuno.plans.contact_phases import take_own_moves
 from nuno.plans.stage_kernels import BlockShare
 from nuno.state.cloth_state import SELF_CONTACT, Settings, Shapes, Topology
@@ -58,7 +59,7 @@ class FeatureClock:
 def read_clock(t: Any, shapes: Shapes):
     """The odometer as the run before left it."""
     clock = FeatureClock()
-    clock.shape_speed = shapes.shape_speed[0]
+    clock.shape_speed = lane_max(shape_speed_of(t, shapes))
     clock.travelled = t.feature_due[TRAVELLED]
     clock.earliest = t.feature_due[EARLIEST]
     return clock

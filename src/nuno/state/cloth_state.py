@@ -233,7 +233,7 @@ class Shapes:
     """Static shapes: a row of numbers each, for all worlds (stride 0) or per world.
 
     What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
-    each, ``shape_speed`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
+    each, ``shape_speed`` how fast any of it moves [m/s], per world where ``pose_stride`` is not 0. A hull has its ``faces``, first and last, among ``planes``: an
     outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners``:
     places, and the cells from which on each is sharp [m], the least first. Its ``hull_grid`` has a first cell and the
     cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a metre; cell c has, of the hull's

@@ -21,6 +21,7 @@ from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
 from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
+from nuno.contact.particle.shape_contact import shape_speed_of
 from nuno.numbers.crew import barrier, shares_work
 from nuno.numbers.lanes import add, anywhere, full_like, lane_max, mul, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import vec3
@@ -29,9 +30,9 @@ from nuno.state.cloth_state import SPEED, Settings, Shapes
 
 
 @wp.func
-def travel_of_substep(t: Any, run: Settings, shape_speed: float):
+def travel_of_substep(t: Any, run: Settings, shape_speed: Any):
     """Return the way that vertices and shapes, up to ``shape_speed`` [m/s], may have gone in the substep before [m]."""
-    return (lane_max(sqrt(t.notes[SPEED])) + shape_speed) * run.dt
+    return (lane_max(sqrt(t.notes[SPEED])) + lane_max(shape_speed)) * run.dt
 
 
 @wp.func
@@ -227,7 +228,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
 @wp.func
 def push_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, size: int):
     """All listed edges and triangles against the sharp shapes nearby; what was gone until now is in `State`."""
-    travelled = t.feature_due[TRAVELLED] + travel_of_substep(t, run, shapes.shape_speed[0])
+    travelled = t.feature_due[TRAVELLED] + travel_of_substep(t, run, shape_speed_of(t, shapes))
     earliest = t.feature_due[EARLIEST]
     # once all know
     barrier(size)

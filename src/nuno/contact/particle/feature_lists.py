@@ -34,14 +34,14 @@ MAX_SLACK = wp.constant(100.0)
 
 
 @wp.func
-def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
-    """Place [m] and rotation (row major, shape to world) of a shape after ``clock`` substeps."""
+def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int, substep: int):
+    """Place [m] and rotation (row major, shape to world) of a shape: see `kinematic_pose`."""
     origin = origin_of(t)
     centre = three_of(like, t, shapes, s * COLUMNS) - origin
     turn = rotation_of(like, t, shapes, s * COLUMNS)
     slot = shapes.slot[s]
     if slot >= 0:
-        centre, turn = kinematic_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+        centre, turn = kinematic_pose(like, shapes, slot, clock, substep, t.group, t.worlds, origin)
     return centre, turn
 
 
@@ -129,7 +129,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
         s = t.shape_list[1 + near]
         kind = shapes.kind[s]
         if kind < PLANE or kind == HULL:
-            centre, r = pose_of(like, t, shapes, s, clock)
+            centre, r = pose_of(like, t, shapes, s, clock, clock + 1)
             extent = three_of(like, t, shapes, s * COLUMNS + 12)
             # the cloth's box as the shape sees it
             low = vec3(t.box[0], t.box[1], t.box[2])
