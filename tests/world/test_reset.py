@@ -165,7 +165,8 @@ def test_what_stands_in_a_world_that_is_reset_keeps_its_turn():
     scaled to it.
     """
     world = nuno.World(device="cpu")
-    box = world.attach(world.add(nuno.box((0.1, 0.2, 0.05), position=(0.0, 0.0, 1.0))), angular_velocity=(1.0, 2.0, 3.0))
+    box = world.add(nuno.box((0.1, 0.2, 0.05), position=(0.0, 0.0, 1.0)))
+    world.attach(box, angular_velocity=(1.0, 2.0, 3.0))
     world.run(0.3)
     world.detach(box)
     turn = box.quaternion

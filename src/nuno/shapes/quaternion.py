@@ -78,7 +78,7 @@ def to_matrix(q: np.ndarray) -> np.ndarray:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Interpolate the short way from a (s = 0) to b (s = 1); a, b (..., 4), s (...); between equal ones none changes."""
+    """Interpolate the short way from a (s = 0) to b (s = 1); a, b (..., 4), s (...). Equal ones stay."""
     same = (a == b).all(axis=-1, keepdims=True)
     dot = np.sum(a * b, axis=-1, keepdims=True)
     b = np.where(dot < 0.0, -b, b)

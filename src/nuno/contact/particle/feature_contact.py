@@ -23,7 +23,19 @@ from nuno.contact.particle.feature_push import push_apart
 from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
 from nuno.contact.particle.shape_contact import shape_speed_of
 from nuno.numbers.crew import barrier, shares_work
-from nuno.numbers.lanes import add, anywhere, full_like, lane_max, mul, sqrt, sub  # noqa: F401
+from nuno.numbers.lanes import (  # noqa: F401
+    LANES,
+    add,
+    anywhere,
+    full_like,
+    in_lanes,
+    lane,
+    lane_max,
+    lanes_without,
+    mul,
+    sqrt,
+    sub,
+)
 from nuno.numbers.vec3 import vec3
 from nuno.numbers.warps import WARP, anyone, lowest, union_of_warp
 from nuno.state.cloth_state import SPEED, Settings, Shapes
@@ -32,7 +44,7 @@ from nuno.state.cloth_state import SPEED, Settings, Shapes
 @wp.func
 def travel_of_substep(t: Any, run: Settings, shape_speed: Any):
     """Return the way that vertices and shapes, up to ``shape_speed`` [m/s], may have gone in the substep before [m]."""
-    return (lane_max(sqrt(t.notes[SPEED])) + lane_max(shape_speed)) * run.dt
+    return (sqrt(t.notes[SPEED]) + shape_speed) * run.dt
 
 
 @wp.func
@@ -61,7 +73,45 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
 
 
 @wp.func
-def earliest_due(t: Any, soon: float, rank: int, size: int):
+def find_active_features(t: Any, topo: Any, travelled: lane, rank: int, size: int):
+    active = int(0)
+    soon = float(FAR)
+    for c in range(topo.feature_colour.shape[0] - 1):
+        first = topo.feature_colour[c]
+        for k in range(first + rank, first + t.feature_shapes[1 + c], size):
+            element = t.feature_list[k]
+            element = wp.max(element, -1 - element)
+            due = t.feature_due[DUE + k]
+            awake = lanes_without(due - travelled)
+            if awake != 0:
+                t.feature_due[DUE + k] = in_lanes(due, awake, FAR)
+                t.feature_asleep[k] = ((1 << LANES) - 1) ^ awake
+                active += 1
+            else:
+                element = -1 - element
+                soon = wp.min(soon, -lane_max(-1.0 * due))
+            t.feature_list[k] = element
+    return active, soon
+
+
+@wp.func
+def asleep(like: float, t: Any, k: int):
+    """The lanes, bit by bit, in which an active element sleeps."""
+    return int(0)
+
+
+@wp.func
+def asleep(like: lane, t: Any, k: int):
+    return t.feature_asleep[k]
+
+
+@wp.func
+def earliest_due(t: Any, travelled: lane, soon: float, rank: int, size: int):
+    return soon
+
+
+@wp.func
+def earliest_due(t: Any, travelled: float, soon: float, rank: int, size: int):
     """The least of what all threads have."""
     barrier(size)
     if rank == 0:
@@ -75,7 +125,7 @@ def earliest_due(t: Any, soon: float, rank: int, size: int):
 
 @wp.func
 def push_elements(
-    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, travelled: float, queued: int, rank: int, size: int
+    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, travelled: Any, queued: int, rank: int, size: int
 ):
     """The elements that are active against one shape: those ``queued``, or all of them in turn where that is 0."""
     like = full_like(t.x[0], 0.0)
@@ -84,6 +134,7 @@ def push_elements(
     h = feature_pose(like, t, run, shapes, s)
     edges = topo.side.shape[0]
     colours = topo.feature_colour.shape[0] - 1
+    unlisted = t.feature_shapes[topo.feature_colour.shape[0] + shapes.count + s]
     # at a box or a hull each edge has two points
     points = int(1)
     if (h.kind == BOX or h.kind == HULL) and shares_work(size):
@@ -103,8 +154,10 @@ def push_elements(
         elif start + mine < t.feature_shapes[1 + c]:
             entry = topo.feature_colour[c] + start + mine
         element = int(-1)
+        without = int(unlisted)
         if entry >= 0:
             element = t.feature_list[entry]
+            without = unlisted | asleep(like, t, entry)
             if queued > 0:
                 # its sign tells of another time
                 element = wp.max(element, -1 - element)
@@ -129,7 +182,7 @@ def push_elements(
                     j = corners[1]
                     k = corners[2]
                     on, bj, bk, point, normal, gap = triangle_point(
-                        t, h, shapes, s, entry, travelled, i, j, k, run.cell
+                        t, h, shapes, s, entry, travelled, without, i, j, k, run.cell
                     )  # fmt: skip
                     bi = one - bj - bk
             elif element >= 0:
@@ -138,7 +191,7 @@ def push_elements(
                 j = ends[1]
                 k = i
                 on, more, bj, point, normal, gap = edge_point(
-                    t, h, shapes, s, entry, travelled, i, j, point_index, run.cell
+                    t, h, shapes, s, entry, travelled, without, i, j, point_index, run.cell
                 )  # fmt: skip
                 bi = one - bj
             if shares_work(size):
@@ -182,7 +235,7 @@ def push_elements(
 
 
 @wp.func
-def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: float, rank: int, size: int):
+def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: Any, rank: int, size: int):
     """Push the active ones of the listed edges and triangles out of the sharp shapes nearby.
 
     Args:
@@ -214,14 +267,14 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         if shares_work(size):
             active = int(anyone(active > 0))
     if active > 0:
-        soon = travelled
+        soon = lane_max(travelled)
         for k in range(t.feature_shapes[0]):
             s = t.feature_shapes[topo.feature_colour.shape[0] + k]
             push_elements(t, topo, run, shapes, s, travelled, queued, rank, size)
         if queued > 0:
             forget_queue(t, topo, queued, rank, size)
     elif shares_work(size):
-        soon = earliest_due(t, soon, rank, size)
+        soon = earliest_due(t, travelled, soon, rank, size)
     return soon
 
 
@@ -229,12 +282,12 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
 def push_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, size: int):
     """All listed edges and triangles against the sharp shapes nearby; what was gone until now is in `State`."""
     travelled = t.feature_due[TRAVELLED] + travel_of_substep(t, run, shape_speed_of(t, shapes))
-    earliest = t.feature_due[EARLIEST]
+    earliest = lane_max(t.feature_due[EARLIEST])
     # once all know
     barrier(size)
-    if travelled >= earliest:
+    if lane_max(travelled) >= earliest:
         earliest = push_active(t, topo, run, shapes, travelled, rank, size)
         barrier(size)
     if rank == 0:
         t.feature_due[TRAVELLED] = travelled
-        t.feature_due[EARLIEST] = earliest
+        t.feature_due[EARLIEST] = full_like(travelled, earliest)
