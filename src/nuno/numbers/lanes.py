@@ -268,39 +268,6 @@ def anywhere(a: lane) -> bool: ...
 
 
 @wp.func
-def lanes_without(a: float):
-    """Return the lanes, bit by bit, in which a number is not above zero; 0 of a number by itself."""
-    return 0
-
-
-@wp.func
-def lanes_without(a: lane):
-    found = int(0)
-    lanes = int(LANES)  # a variable, or Warp would unroll the loop
-    for k in range(lanes):
-        if a[k] <= 0.0:
-            found = found | (1 << k)
-    return found
-
-
-@wp.func
-def in_lanes(a: float, lanes: int, other: float):
-    """Return a number, but ``other`` in the lanes given bit by bit."""
-    return a
-
-
-@wp.func
-def in_lanes(a: lane, lanes: int, other: float):
-    result = a
-    if lanes != 0:
-        count = int(LANES)
-        for k in range(count):
-            if (lanes >> k) & 1 != 0:
-                result[k] = other
-    return result
-
-
-@wp.func
 def lane_max(a: float):
     """The largest lane."""
     return a

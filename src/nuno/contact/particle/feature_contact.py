@@ -23,15 +23,14 @@ from nuno.contact.particle.feature_push import push_apart
 from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
 from nuno.contact.particle.shape_contact import shape_speed_of
 from nuno.numbers.crew import barrier, shares_work
+from nuno.numbers.lane_masks import in_lanes, lanes_without
 from nuno.numbers.lanes import (  # noqa: F401
     LANES,
     add,
     anywhere,
     full_like,
-    in_lanes,
     lane,
     lane_max,
-    lanes_without,
     mul,
     sqrt,
     sub,
@@ -82,10 +81,10 @@ def find_active_features(t: Any, topo: Any, travelled: lane, rank: int, size: in
             element = t.feature_list[k]
             element = wp.max(element, -1 - element)
             due = t.feature_due[DUE + k]
-            awake = lanes_without(due - travelled)
-            if awake != 0:
-                t.feature_due[DUE + k] = in_lanes(due, awake, FAR)
-                t.feature_asleep[k] = ((1 << LANES) - 1) ^ awake
+            now = lanes_without(due - travelled)
+            if now != 0:
+                t.feature_due[DUE + k] = in_lanes(due, now, FAR)
+                t.feature_asleep[k] = ((1 << LANES) - 1) ^ now
                 active += 1
             else:
                 element = -1 - element

@@ -18,6 +18,7 @@ from nuno.contact.particle.distances import BOX, CYLINDER, FAR, HULL, PLANE
 from nuno.contact.particle.hull import box_clearance, meets_corners, meets_ridges
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
+from nuno.numbers.lane_masks import lanes_without
 from nuno.numbers.lanes import (  # noqa: F401
     LANES,
     absolute,
@@ -27,7 +28,6 @@ from nuno.numbers.lanes import (  # noqa: F401
     lane,
     lane_int,
     lane_max,
-    lanes_without,
     maximum,
     minimum,
     mul,
@@ -168,7 +168,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                 if found == 0:
                     for i in range(rank, topo.particles, size):
                         t.feature_mark[i] = unmarked(like)
-                listed = along
+                whole = along
                 if rank == 0:
                     t.feature_shapes[topo.feature_colour.shape[0] + found] = s
                     t.feature_shapes[topo.feature_colour.shape[0] + shapes.count + s] = lanes_without(along)
@@ -182,7 +182,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         at_once, _point = stands_between(
                             shapes, s, kind, p, vec3(soon, soon, soon), soon, extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
-                        mark_vertex(t, i, minimum(along, listed), point, at_once)
+                        mark_vertex(t, i, minimum(along, whole), point, at_once)
     if rank == 0:
         t.feature_shapes[0] = found
         t.feature_due[EARLIEST] = full_like(t.notes[SPEED], wp.where(found > 0, 0.0, FAR))
@@ -298,13 +298,13 @@ def list_marked(like: lane, t: Any, topo: Any, rank: int, size: int):
     lanes = int(LANES)
     for k in range(rank, topo.side.shape[0] + topo.face.shape[0], size):
         due = full_like(like, FAR)
-        listed = int(0)
+        marked_anywhere = int(0)
         for world in range(lanes):
             slack = slack_of(t, topo, k, world)
             if slack >= 0:
-                listed = 1
+                marked_anywhere = 1
                 due[world] = 1.0e-6 * float(slack)
-        if listed != 0:
+        if marked_anywhere != 0:
             place = place_of(t, topo, k)
             t.feature_due[DUE + place] = due
 

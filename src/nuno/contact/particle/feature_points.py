@@ -19,6 +19,7 @@ from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
 from nuno.contact.particle.hull import box_clearance, meets_corners, outermost_corner
 from nuno.contact.particle.hull_ridges import hull_edge_point
+from nuno.numbers.lane_masks import in_lanes
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
     add,
@@ -26,7 +27,6 @@ from nuno.numbers.lanes import (  # noqa: F401
     choose,
     div,
     full_like,
-    in_lanes,
     lane,
     maximum,
     minimum,

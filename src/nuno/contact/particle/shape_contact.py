@@ -26,15 +26,14 @@ from nuno.contact.particle.distances import (
 from nuno.contact.particle.hull import distance_hull, way_into_hull
 from nuno.contact.particle.kinematic_pose import kinematic_pose, stands
 from nuno.numbers.element_access import at
+from nuno.numbers.lane_masks import in_lanes, lanes_without
 from nuno.numbers.lanes import (  # noqa: F401
     add,
     anywhere,
     choose,
     div,
     full_like,
-    in_lanes,
     lane_max,
-    lanes_without,
     maximum,
     minimum,
     mul,
@@ -266,7 +265,7 @@ def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
 
 @wp.func
 def shape_speed_of(t: Any, shapes: Shapes):
-    """How fast any shape moves [m/s]."""
+    """The speed of the world's fastest shape [m/s]."""
     return per_world(t.notes[SPEED], shapes.shape_speed, t.group, wp.min(shapes.pose_stride, 1), t.worlds, 0)
 
 
