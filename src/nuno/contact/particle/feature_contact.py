@@ -81,8 +81,8 @@ def find_active_features(t: Any, topo: Any, travelled: lane, rank: int, size: in
             element = t.feature_list[k]
             element = wp.max(element, -1 - element)
             due = t.feature_due[DUE + k]
-            now = lanes_without(due - travelled)
-            if now != 0:
+            if lane_max(travelled - due) >= 0.0:
+                now = lanes_without(due - travelled)
                 t.feature_due[DUE + k] = in_lanes(due, now, FAR)
                 t.feature_asleep[k] = ((1 << LANES) - 1) ^ now
                 active += 1
