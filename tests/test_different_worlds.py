@@ -168,6 +168,36 @@ def test_edges_thrown_farther_than_expected_meet_what_they_would_alone(height, o
     np.testing.assert_array_equal(torn(height, other)[0], torn(height))
 
 
+@pytest.mark.parametrize(("height", "way"), [(0.028, (0.8, 0.0, -0.5)), (0.035, (0.6, 0.0, -0.2))])
+def test_edges_thrown_past_a_post_near_others_meet_what_they_would_alone(height, way):
+    """A sheet between two posts that grips tear past one, beside a world whose sheet has its other edges near that one.
+
+    Each edge looks only at the posts that it may touch: those at one end of the sheet at one post, in the world alone.
+    Where they looked at what they may touch in any world of a batch, they met the other post there: by 91 and 102 mm.
+    """
+
+    def torn(*starts):
+        world = nuno.World(device="cpu", substeps=6)
+        for x in (-0.12, 0.12):
+            world.add(nuno.cylinder(0.02, 0.05, position=(x, 0.013, 0.0)))
+        sheet = world.add(nuno.sheet((0.3, 0.3), cells=(4, 4), position=(0.0, 0.0, height)))
+        world.attach(sheet)
+        batch = world.imagine(len(starts), thorough=False) if len(starts) > 1 else world
+        batch._quiet = True
+        cloth = batch.find(sheet.name)
+        if len(starts) > 1:
+            cloth.locate(np.array([(x, 0.0, height) for x in starts]))
+        points = np.atleast_3d(cloth.vertices).reshape(len(starts), -1, 3)
+        for corner in (0, 4, 20, 24):
+            start = points[:, corner]
+            there = np.stack([start, start + way], axis=1)
+            batch.grip(cloth, [corner], to=nuno.Path((0.0, 2.0 / 60.0), there if len(starts) > 1 else there[0]))
+        batch.run(0.05)
+        return cloth.vertices
+
+    np.testing.assert_array_equal(torn(0.0, 0.2)[0], torn(0.0))
+
+
 @pytest.mark.parametrize("kind", ["box", "plane"])
 def test_what_stands_on_a_path_is_touched_as_what_has_none(kind):
     """A sheet on a tilted tray that is put somewhere, beside a world in which the tray moves.
