@@ -73,7 +73,7 @@ def write_key(pose: wp.array(dtype=float), frame: int, key: int, place: wp.vec3d
 
 @wp.func
 def write_row(pose: wp.array(dtype=float), frame: int, place: wp.vec3d, turn: wp.vec4d):
-    """Where what stands throughout a frame is, as the table of static shapes has it."""
+    """The place and rotation of what stands throughout a frame, as the table of static shapes has them."""
     one = wp.float64(1.0)
     two = wp.float64(2.0)
     w = turn[0]
