@@ -81,6 +81,7 @@ def test_what_stands_throughout_a_frame_is_where_the_table_of_shapes_has_it(apar
     places, turns = random.normal(0.0, 0.1, (2, 3, 5, 3)), random.normal(size=(2, 3, 5, 4))
     places[:, :, 3:], turns[:, :, 3:] = places[:, :, 2:3], turns[:, :, 2:3]
     places[:, 1], turns[:, 1] = places[:, 1, :1], turns[:, 1, :1]
+    turns[0, 1] = 0.6, 0.7, 0.6, 0.7  # two of its products cancel out
     turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
     times = 0.1 + FRAME * np.arange(5)
     for body, place, turn in zip(bodies, places, turns, strict=True):

@@ -71,6 +71,18 @@ def write_key(pose: wp.array(dtype=float), frame: int, key: int, place: wp.vec3d
         pose[at + 3 + c] = float(turn[c])
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return __dmul_rn(a, b);
+#else
+return a * b;
+#endif
+""")
+def rounded_product(a: wp.float64, b: wp.float64) -> wp.float64:
+    """The product, rounded by itself as NumPy's: as a part of a fused sum, products that cancel out would not."""
+    ...
+
+
 @wp.func
 def write_row(pose: wp.array(dtype=float), frame: int, place: wp.vec3d, turn: wp.vec4d):
     """The place and rotation of what stands throughout a frame, as the table of static shapes has them."""
@@ -80,18 +92,27 @@ def write_row(pose: wp.array(dtype=float), frame: int, place: wp.vec3d, turn: wp
     x = turn[1]
     y = turn[2]
     z = turn[3]
+    xx = rounded_product(x, x)
+    yy = rounded_product(y, y)
+    zz = rounded_product(z, z)
+    xy = rounded_product(x, y)
+    xz = rounded_product(x, z)
+    yz = rounded_product(y, z)
+    wx = rounded_product(w, x)
+    wy = rounded_product(w, y)
+    wz = rounded_product(w, z)
     at = frame + ROW
     for c in range(3):
         pose[at + c] = float(place[c])
-    pose[at + 3] = float(one - two * (y * y + z * z))
-    pose[at + 4] = float(two * (x * y - w * z))
-    pose[at + 5] = float(two * (x * z + w * y))
-    pose[at + 6] = float(two * (x * y + w * z))
-    pose[at + 7] = float(one - two * (x * x + z * z))
-    pose[at + 8] = float(two * (y * z - w * x))
-    pose[at + 9] = float(two * (x * z - w * y))
-    pose[at + 10] = float(two * (y * z + w * x))
-    pose[at + 11] = float(one - two * (x * x + y * y))
+    pose[at + 3] = float(one - two * (yy + zz))
+    pose[at + 4] = float(two * (xy - wz))
+    pose[at + 5] = float(two * (xz + wy))
+    pose[at + 6] = float(two * (xy + wz))
+    pose[at + 7] = float(one - two * (xx + zz))
+    pose[at + 8] = float(two * (yz - wx))
+    pose[at + 9] = float(two * (xz - wy))
+    pose[at + 10] = float(two * (yz + wx))
+    pose[at + 11] = float(one - two * (xx + yy))
 
 
 @wp.kernel(enable_backward=False)

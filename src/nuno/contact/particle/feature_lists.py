@@ -7,8 +7,8 @@ cloth lies on a table, far from its rim, that is one question about its bounding
 bit, so that it does not matter what else is listed.
 
 What goes farther than was expected may touch what it was not listed for. Lanes of worlds share the lists, so each keeps
-what it would list alone: its own marks, with the sets of shapes that elements look at, and when its own elements wake. An
-element's number in a list has the sets of all lanes.
+what it would list alone: its own marks, with the sets of shapes that elements look at, and when its own elements wake.
+An element's number in a list has the sets of all lanes.
 """
 
 from typing import Any
