@@ -75,6 +75,10 @@ class FreeFall:
         """(worlds, n, 3)."""
         return self.v.copy()
 
+    def velocities_apart(self):
+        """Their x, y and z, (worlds, n) each."""
+        return tuple(np.moveaxis(self.v, -1, 0))
+
     def bounds(self):
         """(worlds, 3) each."""
         return self.x.min(axis=1), self.x.max(axis=1)

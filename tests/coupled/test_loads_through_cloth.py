@@ -134,13 +134,14 @@ def test_a_ball_on_a_level_towel_does_not_roll_off():
 @pytest.mark.parametrize("cell", [0.01, 0.02])
 @pytest.mark.parametrize(("mass", "shape"), [(0.1, "cup"), (0.3, "cup"), (0.05, "box"), (5.0, "box")])
 def test_nothing_wanders_in_a_minute(mass, shape, cell):
-    """What stands on a towel on a table wanders less than 0.1 mm in 60 s."""
+    """What stands on a towel on a table is slower than 1 mm/s after 2 s, and wanders less than 0.1 mm in 60 s."""
     world = nuno.World(device="cpu")
     table(world)
     towel(world, cell=cell)
     body = load(world, mass, nuno.cylinder(0.04, 0.1) if shape == "cup" else None)
     world.run(2.0, progress=False)
     start = body.position.copy()
+    assert np.linalg.norm(body.velocities, axis=-1).max() < 1e-3
     for _ in range(60):
         world.run(1.0, progress=False)
         assert np.linalg.norm(body.position - start) < 1e-4
@@ -188,14 +189,15 @@ BEYOND = "5 kg need 153 N/m where 100 are resolved: the towel is 3.0 mm ahead of
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "mass",
+    ("mass", "borne"),
     [
-        pytest.param(1.0, marks=pytest.mark.slow),
-        2.0,
-        pytest.param(5.0, marks=[pytest.mark.slow, pytest.mark.xfail(strict=True, reason=BEYOND)]),
+        pytest.param(1.0, 0.0, marks=pytest.mark.slow),
+        (2.0, 0.0),
+        pytest.param(5.0, 0.0, marks=[pytest.mark.slow, pytest.mark.xfail(strict=True, reason=BEYOND)]),
+        pytest.param(5.0, 250.0, marks=pytest.mark.slow),
     ],
 )
-def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass):
+def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass, borne):
     """What a load lags behind a drawn towel is the towel's own stretch, under friction of the table F = mu (m + m_t) g.
 
     L of free towel stretch by F L / (k w). Under the box, which is as wide as the towel, tension falls to nothing over
@@ -204,7 +206,7 @@ def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass):
     size, length, free, mu = (0.2, 0.16), 0.1, 0.04, 0.5
     world = nuno.World(device="cpu")
     table(world, mu)
-    cloth = towel(world, size)
+    cloth = towel(world, size, max_tension=borne)
     box = load(world, mass, nuno.box((length, size[1], 0.05)))
     world.run(0.3, progress=False)
     rest, start = cloth.vertices, box.position[0]

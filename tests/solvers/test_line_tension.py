@@ -52,13 +52,13 @@ def test_a_cloth_mesh_has_no_grid_lines():
     world.run(0.5)
 
 
-def pulled(tension, substeps=None, worlds=1, name="strip"):
+def pulled(tension, substeps=None, worlds=1, name="strip", **material):
     """A strip held at one end and pulled at the other by a load [N/m], a number or one a world, for half a second."""
     world = nuno.World(device="cpu", gravity=(0, 0, 0), substeps=substeps)
     world.add(nuno.sheet((LENGTH, WIDTH), cells=CELLS, position=(0, 0, 1), name=name))
     world = world.imagine(worlds) if worlds > 1 else world
     strip = world.find(name)
-    world.attach(strip, nuno.Cloth(air_drag=5.0))
+    world.attach(strip, nuno.Cloth(air_drag=5.0, **material))
     start = strip.vertices.reshape(-1, *strip.vertices.shape[-2:])[0]
     left, right = (np.flatnonzero(np.abs(start[:, 0] - x) < 1e-6) for x in (-0.5 * LENGTH, 0.5 * LENGTH))
     world.grip(strip, left, to=start[left].mean(axis=0))
@@ -78,7 +78,10 @@ def warnings_in(caplog):
 
 
 def test_a_load_beyond_what_is_borne_is_told_once_with_the_cure(caplog):
-    """Promise: silent under what `resolution.tension` says, one warning above, by name, with substeps that bear it."""
+    """Promise: silent under what `resolution.tension` says, one warning above, by name, with a material that bears it.
+
+    That material makes no less of its other stiffnesses, so that no other warning sends one back.
+    """
     with caplog.at_level(logging.WARNING, logger="nuno"):
         _, strip = pulled(85.0, name="light")
         assert 85.0 < strip.resolution.tension < 110.0
@@ -90,16 +93,29 @@ def test_a_load_beyond_what_is_borne_is_told_once_with_the_cure(caplog):
         assert len(warnings_in(caplog)) == 1
     (text,) = warnings_in(caplog)
     assert "'heavy'" in text and "'heavy'.resolution.tension" in text
-    substeps = int(text.partition("World(substeps=")[2].partition(")")[0])
+    enough = int(text.partition("Cloth(max_tension=")[2].partition(")")[0])
     needed = strip.resolution.substeps * np.sqrt(150.0 / strip.resolution.tension)
-    assert needed < substeps
     caplog.clear()
     with caplog.at_level(logging.WARNING, logger="nuno"):
-        world, strip = pulled(150.0, substeps=substeps, name="cured")
+        world, strip = pulled(150.0, name="cured", max_tension=enough)
         world.run(0.5)
-    assert not warnings_in(caplog)
+    assert needed < strip.resolution.substeps < 1.1 * needed and strip.resolution.tension >= enough
+    assert not caplog.records
     x = strip.vertices[:, 0]
     assert np.ptp(x) / LENGTH == pytest.approx(1.0 + 150.0 / 1000.0, abs=0.005)  # T = k e
+
+
+def test_given_substeps_are_told_how_many_bear_a_load(caplog):
+    """Promise: where substeps were given the cure is their number, for a load and for a tension that is asked for."""
+    with caplog.at_level(logging.WARNING, logger="nuno"):
+        pulled(50.0, substeps=40, name="few")
+        asked = pulled(1.0, substeps=40, name="asked", max_tension=200.0)[1].resolution
+    (text,) = warnings_in(caplog)
+    assert "World(substeps=" in text and "max_tension" not in text
+    (text,) = (record.getMessage() for record in caplog.records if "is to bear" in record.getMessage())
+    enough = int(text.partition("World(substeps=")[2].partition(")")[0])
+    assert text.startswith("'asked' is to bear 200 N/m")
+    assert enough == np.ceil(40 * np.sqrt(200.0 / asked.tension))
 
 
 def test_a_load_in_one_world_of_a_batch_is_told(caplog):

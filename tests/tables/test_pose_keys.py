@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, ROW, STANDING
+from nuno.contact.particle.shape_contact import COLUMNS
+from nuno.shapes.path import path_as_it_is
 from nuno.shapes.shape import Hull
 from nuno.tables.colliders import Colliders
 from nuno.tables.kinematic_motion import make_schedule
@@ -21,7 +23,7 @@ def lead(group, bodies, times, places, turns):
 
 
 def sent(worlds, frames, apart):
-    """Return the table and the greatest speed for boxes and a hull that are sent on ways of so many frames."""
+    """Return the table and the worlds' greatest speeds for boxes and a hull sent on ways of so many frames."""
     random = np.random.default_rng(4)
     wedge = [(0, 0, 0), (0.3, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]  # its box's middle is not its origin, their mean
     hull = nuno.Body(Hull(wedge, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]), name="hull")
@@ -43,12 +45,12 @@ def sent(worlds, frames, apart):
     assert len(schedule.path_batches) == 1 - apart
     colliders.follow(schedule)
     table = colliders.shapes.pose.numpy().reshape(-1, len(bodies), FRAMES, FRAME_SIZE)[:, :, : frames + 1]
-    return table, float(colliders.shapes.shape_speed.numpy()[0])
+    return table, colliders.shapes.shape_speed.numpy().astype(float)
 
 
 def poses_in(table):
     """Return positions (..., frames, 3, 3) and quaternions of the table's keys, w above zero."""
-    keys = table[..., 3:].reshape(*table.shape[:-1], 3, KEY_SIZE).astype(float)
+    keys = table[..., 3:STANDING].reshape(*table.shape[:-1], 3, KEY_SIZE).astype(float)
     turns = keys[..., 3:] * np.where(keys[..., 3:4] < 0.0, -1.0, 1.0)
     return table[..., None, :3] + keys[..., :3], turns
 
@@ -61,7 +63,43 @@ def test_a_batch_is_where_its_paths_are(worlds, frames):
     for found, expected in zip(poses_in(batch), poses_in(alone), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)
     # a bound, of turns that are near to each other up to 1 % above
-    assert 0.999 * fastest_alone < fastest < 1.02 * fastest_alone
+    assert len(fastest) == worlds
+    assert (fastest > 0.999 * fastest_alone).all() and (fastest < 1.02 * fastest_alone).all()
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_stands_throughout_a_frame_is_where_the_table_of_shapes_has_it(apart):
+    """The same bits, in the world and the frames in which it stands, also at the end; a world that stands has no speed.
+
+    Of the paths' keys the last three are one, and in one world of three all are. The frame after the first of them may
+    begin a rounding before it.
+    """
+    wedge = [(0, 0, 0), (0.3, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]
+    hull = nuno.Body(Hull(wedge, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]), name="hull")
+    bodies = [nuno.box((0.1, 0.2, 0.1), name="box"), hull]
+    random = np.random.default_rng(6)
+    places, turns = random.normal(0.0, 0.1, (2, 3, 5, 3)), random.normal(size=(2, 3, 5, 4))
+    places[:, :, 3:], turns[:, :, 3:] = places[:, :, 2:3], turns[:, :, 2:3]
+    places[:, 1], turns[:, 1] = places[:, 1, :1], turns[:, 1, :1]
+    turns[0, 1] = 0.6, 0.7, 0.6, 0.7  # two of its products cancel out
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    times = 0.1 + FRAME * np.arange(5)
+    for body, place, turn in zip(bodies, places, turns, strict=True):
+        body._position, body._quaternion = place[:, -1], turn[:, -1]
+        body._path = path_as_it_is(times, place, turn)
+    if not apart:
+        lead(KinematicGroup(tuple(body.key for body in bodies)), bodies, times, places, turns)
+    colliders = Colliders.from_bodies(bodies, 3)
+    colliders.follow(make_schedule(bodies, 0.1, 4 * FRAME, FRAME))
+    table = colliders.shapes.pose.numpy().reshape(3, 2, FRAMES, FRAME_SIZE)[:, :, :5]
+    expected = np.zeros((3, 2, 5), dtype=bool)
+    expected[:, :, 3:] = expected[1] = True
+    np.testing.assert_array_equal(np.delete(table[..., STANDING] == 1.0, 2, axis=2), np.delete(expected, 2, axis=2))
+    rows = colliders.shapes.table.numpy().reshape(3, 2, COLUMNS)[:, :, None, :12]
+    found = table[..., ROW : ROW + 12]
+    np.testing.assert_array_equal(found[expected], np.broadcast_to(rows, found.shape)[expected])
+    speeds = colliders.shapes.shape_speed.numpy()
+    assert speeds[1] == 0.0 and speeds[0] > 0.0 and speeds[2] > 0.0
 
 
 def test_frames_of_a_run_are_those_of_runs_of_one_frame():

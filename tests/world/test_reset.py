@@ -158,6 +158,32 @@ def test_a_path_that_has_ended_is_no_obstacle():
     assert_same_alone(batch, world, {0: middle.pick(0), 1: start.at(middle.time)}, 0.15)
 
 
+def test_what_stands_in_a_world_that_is_reset_keeps_its_turn():
+    """Of a box that tumbled, to the bit, while it follows a path in another world, and in that world adopted.
+
+    What comes out of the dynamics has a turn of float32, whose length is 1 within 6e-8: made a part of a path, it was
+    scaled to it.
+    """
+    world = nuno.World(device="cpu")
+    box = world.add(nuno.box((0.1, 0.2, 0.05), position=(0.0, 0.0, 1.0)))
+    world.attach(box, angular_velocity=(1.0, 2.0, 3.0))
+    world.run(0.3)
+    world.detach(box)
+    turn = box.quaternion
+    assert np.linalg.norm(turn) != 1.0
+    batch = world.imagine(2)
+    start = batch.save()
+    path = nuno.Path([world.time, world.time + 0.2], np.stack([box.position, (0.0, 0.0, 2.0)]), np.stack([turn, turn]))
+    batch.move(box, path)
+    batch.run(0.05)
+    batch.reset([1], start)
+    batch.run(0.05)
+    np.testing.assert_array_equal(batch.find(box.name).quaternion[1], turn)
+    world.adopt(batch, 1)
+    world.run(0.05)
+    np.testing.assert_array_equal(box.quaternion, turn)
+
+
 def test_a_rigid_body_is_led_from_where_its_leader_is_in_each_world():
     """A ledge that leads a box goes back to where it was before it had led: so does the box, in that world alone."""
     world, _ = scene()

@@ -47,7 +47,7 @@ def entry(shapes: Shapes, world: int, worlds: int, row: int):
 
 
 @wp.func
-def pose_of(around: Surroundings, s: int, clock: int, world: int, origin: wp.vec3):
+def pose_of(around: Surroundings, s: int, clock: int, substep: int, world: int, origin: wp.vec3):
     """A shape's centre, relative to the solver's origin, and its rotation matrix, after ``clock`` substeps."""
     shapes = around.shapes
     slot = shapes.slot[s]
@@ -61,8 +61,8 @@ def pose_of(around: Surroundings, s: int, clock: int, world: int, origin: wp.vec
             for b in range(3):
                 turn[a, b] = entry(shapes, world, n, row + 3 + 3 * a + b)
     else:
-        cx, cy, cz = kinematic_position(0.0, shapes, slot, clock, world, n, origin[0], origin[1], origin[2])
-        r00, r01, r02, r10, r11, r12, r20, r21, r22 = kinematic_rotation(0.0, shapes, slot, clock, world, n)
+        cx, cy, cz = kinematic_position(0.0, shapes, slot, clock, substep, world, n, origin[0], origin[1], origin[2])
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = kinematic_rotation(0.0, shapes, slot, clock, substep, world, n)
         centre = wp.vec3(cx, cy, cz)
         turn = wp.mat33(r00, r01, r02, r10, r11, r12, r20, r21, r22)
     return centre, turn
@@ -136,7 +136,7 @@ def bound_particles(
         before = clock
         if around.shapes.slot[s] >= 0:
             before = clock - 1
-        centre, turn = pose_of(around, s, before, world, origin)
+        centre, turn = pose_of(around, s, before, clock, world, origin)
         x = wp.transpose(turn) * (p - centre)
         found = shape_gap(around, s, world, x, far)
         gap = found[0]
@@ -144,7 +144,7 @@ def bound_particles(
             n = turn * wp.vec3(found[1], found[2], found[3])
             motion = wp.vec3(0.0, 0.0, 0.0)
             if around.shapes.slot[s] >= 0:
-                after, turned_on = pose_of(around, s, clock, world, origin)
+                after, turned_on = pose_of(around, s, clock, clock, world, origin)
                 motion = (after - centre) + (turned_on - turn) * x
             mean = wp.sqrt(own_friction * entry(around.shapes, world, around.worlds, row + 15))
             pair = entry(around.shapes, world, around.worlds, row + 16)

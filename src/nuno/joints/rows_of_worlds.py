@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import BodyStateError
 from nuno.joints.grip import GripSpec
 from nuno.joints.tie import HoldSpec, TieSpec
-from nuno.shapes.path import Path
+from nuno.shapes.path import Path, path_as_it_is
 
 SOON = 1e-9  # [s], below which two instants are the same
 
@@ -114,7 +114,7 @@ def merge_path(
         if path is None:
             return None
         place, turn = (at.merged(own, theirs, 1)[..., None, :] for own, theirs in zip(pose, there, strict=True))
-        return Path(path.times[-1:], place, None if path.quaternions is None else turn)
+        return path_as_it_is(path.times[-1:], place, None if path.quaternions is None else turn)
     if path is not None and other is not None and under_way and other_under_way:
         if not _clocks_agree(path.times, other.times) or path.interpolation != other.interpolation:
             raise BodyStateError(_under_way(f"the path of {name!r}"))
@@ -127,7 +127,7 @@ def merge_path(
         full = np.array(np.broadcast_to(mine, (at.world_count, *mine.shape[-2:])))
         full[at.worlds] = at.of_rows(new, 2)
         merged.append(full)
-    return Path(lead.times, merged[0], merged[1] if turns else None, lead.interpolation)
+    return path_as_it_is(lead.times, merged[0], merged[1] if turns else None, lead.interpolation)
 
 
 def _keys(path: Path | None, rest: tuple[np.ndarray, np.ndarray], count: int) -> list[np.ndarray]:

@@ -98,6 +98,23 @@ class Path:
         return first, last, s
 
 
+def path_as_it_is(
+    times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None, interpolation: str = "linear"
+) -> Path:
+    """Return a path through poses that bodies have: arrays as those of `Path`, whose turns keep every bit.
+
+    What came out of the dynamics turned by a float32 is not of length 1 to the last digit, and stands as it is.
+    """
+    path: Path = object.__new__(Path)
+    for name, array in (("times", times), ("positions", positions), ("quaternions", quaternions)):
+        if array is not None:
+            array = np.array(array)
+            array.setflags(write=False)
+        path.__dict__[name] = array
+    path.__dict__["interpolation"] = interpolation
+    return path
+
+
 def minimum_jerk(share: np.ndarray) -> np.ndarray:
     """Return how far a motion of least jerk, from rest to rest, is at a share of its time, both in [0, 1].
 

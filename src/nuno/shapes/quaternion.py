@@ -78,12 +78,13 @@ def to_matrix(q: np.ndarray) -> np.ndarray:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Interpolate the short way from a (s = 0) to b (s = 1); a, b (..., 4), s (...)."""
+    """Interpolate the short way from a (s = 0) to b (s = 1); a, b (..., 4), s (...). Equal ones stay."""
+    same = (a == b).all(axis=-1, keepdims=True)
     dot = np.sum(a * b, axis=-1, keepdims=True)
     b = np.where(dot < 0.0, -b, b)
     if np.ndim(s) == 0 and s in (0.0, 1.0):  # at an end, to the bit as below
         q = 0.0 * a + b if s == 1.0 else a + 0.0 * b
-        return q / np.linalg.norm(q, axis=-1, keepdims=True)
+        return np.where(same, a, q / np.linalg.norm(q, axis=-1, keepdims=True))
     angle = np.arccos(np.clip(np.abs(dot), 0.0, 1.0))
     near = angle < 1e-6  # the weights below are 0/0 there, and their limit is linear
     safe = np.where(near, 1.0, np.sin(angle))
@@ -91,4 +92,4 @@ def slerp(a: np.ndarray, b: np.ndarray, s: np.ndarray) -> np.ndarray:
     first = np.where(near, 1.0 - s, np.sin((1.0 - s) * angle) / safe)
     second = np.where(near, s, np.sin(s * angle) / safe)
     q = first * a + second * b
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(same, a, q / np.linalg.norm(q, axis=-1, keepdims=True))

@@ -107,7 +107,7 @@ class ClothSolver(ClothLaunches):
         self._softening = max(soft.values())
         frame, density = 1.0 / frame_rate, float(values["area_density"].min())
         stiffness = max(float(values[f"stretch_stiffness_{side}"].max()) for side in ("warp", "weft"))
-        rule = (down, frame, density, rigidity, self._softening, stiffness)
+        rule = (down, frame, density, rigidity, self._softening, stiffness, float(values["max_tension"].max()))
         self.substeps = int(substeps) if substeps else default_substeps(topology, *rule)
         # substeps that are given are taken as they are, one pass each
         self.sweeps = (

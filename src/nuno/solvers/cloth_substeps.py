@@ -19,16 +19,16 @@ FEWEST, MAX_SUBSTEPS = 10, 240
 
 def default_substeps(
     topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
-    softening: float = 0.0, stretch: float = 0.0,
+    softening: float = 0.0, stretch: float = 0.0, load: float = 0.0,
 ) -> int:  # fmt: skip
     """Substeps a frame, within bounds, for `wanted_substeps`, which has the arguments."""
-    wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening, stretch)
+    wanted = wanted_substeps(topology, gravity, frame, density, rigidity, softening, stretch, load)
     return min(max(FEWEST, wanted), MAX_SUBSTEPS)
 
 
 def wanted_substeps(
     topology: ClothTopology, gravity: float, frame: float, density: float = 0.2, rigidity: float = 0.0,
-    softening: float = 0.0, stretch: float = 0.0,
+    softening: float = 0.0, stretch: float = 0.0, load: float = 0.0,
 ) -> int:  # fmt: skip
     """Substeps a frame from the cell size h and the cloth's extent L [m], its density rho and rigidity B.
 
@@ -39,7 +39,8 @@ def wanted_substeps(
     the same (`MESH_SAG`). In bending, B dt^2 / (rho h^4) stays at or under 1 / `BENDING_STEP`: a strip then hangs
     within 10 % of its rigidity; so does one of a mesh by `PATCH_STEP`. Shear, and a mesh's stretch, have several sweeps
     a substep: what `nuno.constraints.relaxation.SOFTEST_STEP` says would need too many has shorter substeps. A sheet
-    bears the tension of the strain `TAUT`, but at most `MAX_TAUT` (see `bearable_tension`).
+    bears the tension of the strain `TAUT`, but at most `MAX_TAUT` (see `bearable_tension`), and a load beyond that
+    where its material names one.
 
     Args:
         topology: The cloth's elements.
@@ -49,6 +50,7 @@ def wanted_substeps(
         rigidity: Largest bending rigidity [N m].
         softening: What `nuno.constraints.relaxation.softening` gives, the larger of the two [1/s2].
         stretch: Largest stretch stiffness [N/m].
+        load: The tension that a sheet is to bear anyhow [N/m].
     """
     h = topology.cell_size
     allowed = SAG if len(topology.edges) else MESH_SAG
@@ -60,8 +62,8 @@ def wanted_substeps(
             step = min(step, h**2 * math.sqrt(density / (BENDING_STEP * rigidity)))
     if softening > 0.0:
         step = min(step, math.sqrt(SOFTEST_STEP / softening))
-    if len(topology.edges) and stretch > 0.0:
-        taut = min(TAUT * stretch, MAX_TAUT)
+    if len(topology.edges) and max(stretch, load) > 0.0:
+        taut = max(min(TAUT * stretch, MAX_TAUT), load)
         step = min(step, math.sqrt(bearable_tension(topology, 1.0, density) / taut))
     return max(1, math.ceil(frame / step - 1e-9))
 

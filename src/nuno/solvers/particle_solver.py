@@ -88,7 +88,7 @@ class ParticleSolver(ParticleState):
             shapes = colliders.shapes
         self._colliders, self.shapes = colliders, shapes
         self._size.shape_list = 1 + 2 * max(1, int(shapes.count))
-        self._size.feature_shapes = len(self._surface.feature_colour) + max(1, int(shapes.count)) + 1
+        self._size.feature_shapes = len(self._surface.feature_colour) + 2 * max(1, int(shapes.count)) + 1
         self.state.shape_list, self.state.feature_shapes = (
             self._empty(self._size.shape_list, int),
             self._empty(self._size.feature_shapes, int),

@@ -113,8 +113,11 @@ class ParticleState:
         state.notes = self._empty(NOTES, self._number)
         state.box = self._empty(6, self._number)
         self._size.feature_list = len(self._surface.side) + len(self._surface.face)
-        state.feature_mark, state.feature_list = self._empty(n, int), self._empty(self._size.feature_list, int)
-        state.feature_due = self._empty(self._size.feature_list + 2, float)
+        state.feature_mark = self._empty(n, self._integer)
+        state.feature_due = self._empty(self._size.feature_list + 2, self._number)
+        state.feature_list = state.feature_asleep = self._empty(self._size.feature_list, int)
+        if self.lanes > 1:  # one world by itself is awake where an element is
+            state.feature_asleep = self._empty(self._size.feature_list, int)
         state.worlds = self.world_count
 
     def positions(self) -> np.ndarray:

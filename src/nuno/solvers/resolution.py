@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.solvers.cloth_substeps import MAX_SUBSTEPS
+
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.world.simulation import Simulation
@@ -62,7 +64,19 @@ class Resolution:
 def warn_of_resolution(body: Body, world: Simulation) -> None:
     """Warn, once for a body and its copies, where it comes out much softer than its material says."""
     found = body.resolution
-    if found is None or world._quiet or body.key in _warned or found.least >= WARNED_BELOW:
+    if found is None or world._quiet or body.key in _warned:
+        return
+    asked = float(np.max(getattr(body.material, "max_tension", 0.0)))
+    if found.tension is not None and asked > found.tension * (1.0 + 1e-6):
+        _warned.add(body.key)
+        logger.warning(
+            "%r is to bear %.3g N/m (max_tension), and bears %.3g N/m in %d substeps a frame. World(substeps=%d), "
+            "coarser cells or heavier cloth mend that; %r.resolution.tension says what is borne",
+            body.name, asked, found.tension, found.substeps,
+            math.ceil(found.substeps * math.sqrt(asked / found.tension)), body.name,
+        )  # fmt: skip
+        return
+    if found.least >= WARNED_BELOW:
         return
     _warned.add(body.key)
     shares = {"stretch": found.stretch, "shear": found.shear, "bending": found.bending}
@@ -97,10 +111,13 @@ def warn_of_overloads(bodies: list[Body], time: float) -> None:
         _overloaded.add(body.key)
         substeps = round(math.sqrt(float(borne[world]) / found.tension) * found.substeps)
         enough = math.ceil(substeps * math.sqrt(OVERLOAD * share))
+        cure = f"World(substeps={enough})"
+        if not found.given and enough <= MAX_SUBSTEPS:
+            cure = f"Cloth(max_tension={math.ceil(OVERLOAD * float(load[world]))})"
         logger.warning(
             "%r is stretched as by %.3g N/m at %.3g s, and bears %.3g N/m in %d substeps a frame: beyond, it flutters, "
-            "is longer than its material says and slips on what it touches. World(substeps=%d) bears a tenth more than "
-            "that, as what is borne goes with the square of the substeps; less load, slower moves, coarser cells or "
-            "heavier cloth mend it too; %r.resolution.tension says what is borne",
-            body.name, load[world], time, borne[world], substeps, enough, body.name,
+            "is longer than its material says and slips on what it touches. %s bears a tenth more than that, as "
+            "what is borne goes with the square of the substeps; less load, slower moves, coarser cells or heavier "
+            "cloth mend it too; %r.resolution.tension says what is borne",
+            body.name, load[world], time, borne[world], substeps, cure, body.name,
         )  # fmt: skip

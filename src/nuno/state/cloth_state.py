@@ -45,7 +45,7 @@ MOTION, COMPLIANT_GRIPS, SELF_CONTACT, SHAPES, VELOCITIES = 1, 2, 4, 8, 16
 ALL_PARTS = 31
 
 
-INTEGERS = ("moved", "shape_list", "feature_shapes", "feature_mark", "feature_list", "work_counts", "work_queue")
+INTEGERS = ("moved", "shape_list", "feature_shapes", "feature_list", "feature_asleep", "work_counts", "work_queue")
 """Whole numbers that lanes share."""
 
 
@@ -62,6 +62,7 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
         "box",
         "reference",
         "middle",
+        "feature_due",
     )
     numbers += ("grid_line_gain", "grid_line_pull", "grid_line_inverse", "grid_line_goal", "cell_sum", "triangle_sum")
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_inverse_mass", "grip_load")
@@ -77,11 +78,11 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
         "active_edge",
         "active_count",
         "leaf_pairs",
+        "feature_mark",
     )
     fields = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=integer) for name in integers}
     fields |= {name: wp.array(dtype=int) for name in INTEGERS}
-    fields["feature_due"] = wp.array(dtype=float)
     fields |= {name: wp.array(dtype=place) for name in PLACES}
     return fields | {"group": int, "worlds": int, "spare_blocks": int}
 
@@ -233,11 +234,11 @@ class Shapes:
     """Static shapes: a row of numbers each, for all worlds (stride 0) or per world.
 
     What moves has a slot of poses besides (else slot -1): ``timing`` is the first frame of a launch and the substeps of
-    each, ``shape_speed`` how fast any of it moves [m/s]. A hull has its ``faces``, first and last, among ``planes``: an
-    outward normal and the distance from the hull's origin [m]; and so its ``corner_ends`` among ``corners``:
-    places, and the cells from which on each is sharp [m], the least first. Its ``hull_grid`` has a first cell and the
-    cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a metre; cell c has, of the hull's
-    planes, those of ``cell_planes`` from ``cell_ends[c]`` to the next.
+    each, ``shape_speed`` how fast any of it moves [m/s], per world where ``pose_stride`` is not 0. A hull has its
+    ``faces``, first and last, among ``planes``: an outward normal and the distance from the hull's origin [m]; and so
+    its ``corner_ends`` among ``corners``: places, and the cells from which on each is sharp [m], the least first. Its
+    ``hull_grid`` has a first cell and the cells along x, y and z (0: none), ``hull_low`` the grid's corner and cells a
+    metre; cell c has, of the hull's planes, those of ``cell_planes`` from ``cell_ends[c]`` to the next.
     """
 
     count: int
@@ -315,6 +316,7 @@ def view(s: Any, group: int, n: int, sizes: Sizes):
     t.feature_shapes = subarray(s.feature_shapes, group * sizes.feature_shapes, sizes.feature_shapes)
     t.feature_mark = subarray(s.feature_mark, group * n, n)
     t.feature_list = subarray(s.feature_list, group * sizes.feature_list, sizes.feature_list)
+    t.feature_asleep = subarray(s.feature_asleep, group * sizes.feature_list, sizes.feature_list)
     t.feature_due = subarray(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
     t.work_counts = subarray(s.work_counts, group * WORK_COUNTS, WORK_COUNTS)
     t.leaf_pairs = subarray(s.leaf_pairs, group * sizes.leaf_pairs, sizes.leaf_pairs)

@@ -18,17 +18,17 @@ SHIFTS = ("shift_x", "shift_y", "shift_z")
 
 def _make(name: str, number: type, integer: type, place: type) -> Any:
     """A struct under the names that `nuno.state.cloth_state` has for the arrays that all particles have."""
-    numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box")
+    numbers = (*PARTICLE_ARRAYS, "fx", "fy", "fz", "mu", "bulk", "scalars", "notes", "box", "feature_due")
     numbers += SHIFTS
     numbers += ("grip_x", "grip_y", "grip_z", "grip_weight", "grip_inverse_mass", "grip_load")
     fields: dict[str, Any] = {name: wp.array(dtype=number) for name in numbers}
     fields |= {name: wp.array(dtype=place) for name in PLACES}
-    fields |= {"grip_corner": wp.array(dtype=integer), "group": int, "worlds": int}
+    fields |= {name: wp.array(dtype=integer) for name in ("grip_corner", "feature_mark")}
+    fields |= {"group": int, "worlds": int}
     fields |= {
         name: wp.array(dtype=int)
-        for name in ("shape_list", "feature_shapes", "feature_mark", "feature_list", "reached", "moved")
+        for name in ("shape_list", "feature_shapes", "feature_list", "feature_asleep", "reached", "moved")
     }
-    fields["feature_due"] = wp.array(dtype=float)
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 
@@ -166,6 +166,7 @@ def view(s: Any, group: int, n: int, sizes: SoftSizes):
     t.reached = subarray(s.reached, group, 1)
     t.feature_mark = subarray(s.feature_mark, group * n, n)
     t.feature_list = subarray(s.feature_list, group * sizes.feature_list, sizes.feature_list)
+    t.feature_asleep = subarray(s.feature_asleep, group * sizes.feature_list, sizes.feature_list)
     t.feature_due = subarray(s.feature_due, group * (sizes.feature_list + 2), sizes.feature_list + 2)
     t.moved = subarray(s.moved, group * sizes.moved, sizes.moved)
     return t

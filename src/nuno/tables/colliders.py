@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
-from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, SLOT_SIZE
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, ROW, SLOT_SIZE, STANDING
 from nuno.contact.particle.shape_contact import COLUMNS
 from nuno.errors import BodyStateError
 from nuno.plans.recorded_launches import RecordedLaunches
@@ -146,7 +146,7 @@ class Colliders:
         shapes.slot = wp.array(slots, dtype=int, device=device)
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
-        shapes.shape_speed = wp.zeros(1, dtype=float, device=device)
+        shapes.shape_speed = wp.zeros(worlds, dtype=float, device=device)
         edged = (kinds == BOX) | (kinds == CYLINDER) | (kinds == HULL)
         curved = np.where(edged, 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
         keys = [body.key for body in bodies]
@@ -160,19 +160,19 @@ class Colliders:
         if not 1 <= frames < FRAMES:
             raise ValueError(f"a run may have 1 to {FRAMES - 1} frames, got {frames}")
         slots = [self._slots[key] for key in schedule.alone if key in self._slots]
-        shape_speed = self._follow_alone(schedule, slots) if slots else 0.0
+        shape_speed = self._follow_alone(schedule, slots) if slots else np.zeros(self._worlds)
         if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
-            self._shape_speed_on_cpu[0] = shape_speed
+            self._shape_speed_on_cpu[:] = shape_speed
         else:
             if slots:
                 self.shapes.pose.assign(self._table.ravel())
-            self.shapes.shape_speed.assign(np.array([shape_speed], dtype=np.float32))
+            self.shapes.shape_speed.assign(shape_speed.astype(np.float32))
         for motion in schedule.path_batches:
             self._follow_batch(motion)
         self._times = schedule.times
 
-    def _follow_alone(self, schedule: Schedule, slots: list[int]) -> float:
-        """Take where bodies on paths of their own are, and return how fast any point of them moves [m/s]."""
+    def _follow_alone(self, schedule: Schedule, slots: list[int]) -> np.ndarray:
+        """Take where bodies on paths of their own are, and return how fast any point of them moves [m/s], by world."""
         worlds, rows = self._worlds, np.array(slots)
         place = np.empty((worlds, len(slots), len(schedule.times), 3))
         turn = np.empty((worlds, len(slots), len(schedule.times), 4))
@@ -180,11 +180,11 @@ class Colliders:
             place[:, k], turn[:, k] = schedule.alone[self.kinematic[slot].key]
         if self._has_centres:
             place += quat.rotate(turn, self._centres[:, rows, None])
-        shape_speed = 0.0
+        shape_speed = np.zeros(worlds)
         for own, alike in _alike_or_not(place, turn):
             which = slice(0, 1) if alike else slice(None)
             speed = self._write_keys(rows[own], place[which, own], turn[which, own], schedule.times)
-            shape_speed = max(shape_speed, speed)
+            np.maximum(shape_speed, speed, out=shape_speed)
         return shape_speed
 
     def _follow_batch(self, motion: BatchMotion) -> None:
@@ -228,8 +228,18 @@ class Colliders:
     def _worlds(self) -> int:
         return len(self.shapes.pose) // (len(self.kinematic) * SLOT_SIZE)
 
-    def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> float:
-        """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s]."""
+    def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s].
+
+        Args:
+            rows: Slots of k bodies.
+            place: (worlds, k, times, 3) [m], one world where all are alike.
+            turn: (worlds, k, times, 4).
+            times: [s].
+
+        Returns:
+            (worlds,).
+        """
         frames = len(times) // 2
         # the short way round between neighbours, which the kernels blend number by number
         flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
@@ -238,21 +248,34 @@ class Colliders:
         base = np.round(place[:, :, first] * 1024.0) / 1024.0
         keys = np.empty((*base.shape[:3], FRAME_SIZE), dtype=np.float32)
         keys[..., :3] = base
+        rests = (place[:, :, 1:] == place[:, :, :-1]).all(axis=-1) & (turn[:, :, 1:] == turn[:, :, :-1]).all(axis=-1)
         for k in range(3):
             # the frame that begins at the end stands still
             which = np.minimum(first + k, 2 * frames)
             into = keys[..., 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
             into[..., :3] = place[:, :, which] - base
             into[..., 3:] = turn[:, :, which]
+        # the frame that begins at the end stands where the last one stands: what moves ends where its keys say
+        stands = (rests[:, :, ::2] & rests[:, :, 1::2])[:, :, np.minimum(np.arange(frames + 1), frames - 1)]
+        keys[..., STANDING] = stands
+        if stands.any():
+            still = keys[stands]
+            still[:, ROW : ROW + 3] = place[:, :, first][stands]
+            still[:, ROW + 3 : ROW + 12] = rotation_matrices(turn[:, :, first][stands]).reshape(-1, 9)
+            keys[stands] = still
         self._table[:, rows, : frames + 1] = keys
-        return self._shape_speed(times, place, turn, self._radii[rows])
+        return self._shape_speed(times, place, turn, rests, self._radii[rows])
 
-    def _shape_speed(self, times: np.ndarray, place: np.ndarray, turn: np.ndarray, radii: np.ndarray) -> float:
-        """Return the fastest that any point of kinematic bodies of some radii [m] moves [m/s]."""
+    def _shape_speed(
+        self, times: np.ndarray, place: np.ndarray, turn: np.ndarray, rests: np.ndarray, radii: np.ndarray
+    ) -> np.ndarray:
+        """Return the fastest that any point of kinematic bodies of some radii [m] moves [m/s], by world."""
         span, radii = np.diff(times), radii[:, None]
         speed = np.linalg.norm(place[:, :, 1:] - place[:, :, :-1], axis=-1) / span
         dot = np.minimum(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 1.0)
-        return float((speed + 2.0 * np.arccos(dot) / span * radii).max())
+        # of a turn that stays the same the arc cosine is what rounding makes it
+        speed = np.where(rests, 0.0, speed + 2.0 * np.arccos(dot) / span * radii)
+        return np.asarray(speed.max(axis=(1, 2)))
 
     @cached_property
     def _radii(self) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, Pose, compose
-from nuno.shapes.path import Path
+from nuno.shapes.path import Path, path_as_it_is
 from nuno.tables.path_batch import BatchMotion, KinematicGroup, PathBatch
 
 if TYPE_CHECKING:
@@ -174,10 +174,11 @@ def path_for(body: Body, to: Path, world_count: int) -> Path:
 def of_world(path: Path, world: int) -> Path:
     """Return the path of one world."""
     turns = path.quaternions
-    return replace(
-        path,
-        positions=path.positions[world] if path.positions.ndim == 3 else path.positions,
-        quaternions=turns[world] if turns is not None and turns.ndim == 3 else turns,
+    return path_as_it_is(
+        path.times,
+        path.positions[world] if path.positions.ndim == 3 else path.positions,
+        turns[world] if turns is not None and turns.ndim == 3 else turns,
+        path.interpolation,
     )
 
 

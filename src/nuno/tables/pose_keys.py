@@ -5,7 +5,7 @@ What a kernel does here with some thousand links takes NumPy longer than a small
 
 import warp as wp
 
-from nuno.contact.particle.kinematic_pose import FRAME_SIZE, KEY_SIZE, SLOT_SIZE
+from nuno.contact.particle.kinematic_pose import FRAME_SIZE, KEY_SIZE, ROW, SLOT_SIZE, STANDING
 
 BASES = wp.constant(wp.float64(1024.0))
 """Bases of frames are whole parts of a metre by this."""
@@ -71,6 +71,50 @@ def write_key(pose: wp.array(dtype=float), frame: int, key: int, place: wp.vec3d
         pose[at + 3 + c] = float(turn[c])
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return __dmul_rn(a, b);
+#else
+return a * b;
+#endif
+""")
+def rounded_product(a: wp.float64, b: wp.float64) -> wp.float64:
+    """The product, rounded by itself as NumPy's: as a part of a fused sum, products that cancel out would not."""
+    ...
+
+
+@wp.func
+def write_row(pose: wp.array(dtype=float), frame: int, place: wp.vec3d, turn: wp.vec4d):
+    """The place and rotation of what stands throughout a frame, as the table of static shapes has them."""
+    one = wp.float64(1.0)
+    two = wp.float64(2.0)
+    w = turn[0]
+    x = turn[1]
+    y = turn[2]
+    z = turn[3]
+    xx = rounded_product(x, x)
+    yy = rounded_product(y, y)
+    zz = rounded_product(z, z)
+    xy = rounded_product(x, y)
+    xz = rounded_product(x, z)
+    yz = rounded_product(y, z)
+    wx = rounded_product(w, x)
+    wy = rounded_product(w, y)
+    wz = rounded_product(w, z)
+    at = frame + ROW
+    for c in range(3):
+        pose[at + c] = float(place[c])
+    pose[at + 3] = float(one - two * (yy + zz))
+    pose[at + 4] = float(two * (xy - wz))
+    pose[at + 5] = float(two * (xz + wy))
+    pose[at + 6] = float(two * (xy + wz))
+    pose[at + 7] = float(one - two * (xx + zz))
+    pose[at + 8] = float(two * (yz - wx))
+    pose[at + 9] = float(two * (xz - wy))
+    pose[at + 10] = float(two * (yz + wx))
+    pose[at + 11] = float(one - two * (xx + yy))
+
+
 @wp.kernel(enable_backward=False)
 def write_pose_keys(
     positions: wp.array3d(dtype=wp.vec3d),
@@ -95,7 +139,7 @@ def write_pose_keys(
         radii: (slots,) [m], within which shapes are about their middle.
         stride: Numbers of a world in the table.
         pose: The table.
-        shape_speed: (1,), the fastest that a point of any of them moves [m/s], where that is faster than it says.
+        shape_speed: (worlds,), the fastest that a point of any of them moves [m/s], where that is faster than it says.
     """
     w, k = wp.tid()
     slot = rows[k, 0]
@@ -106,6 +150,7 @@ def write_pose_keys(
     place = wp.vec3d()
     turn = wp.vec4d()
     fastest = wp.float64(0.0)
+    moved = wp.float64(0.0)
     for f in range(between.shape[0]):
         for i in range(3):
             before = place
@@ -117,19 +162,27 @@ def write_pose_keys(
             turn = turn_between(quaternions[row, own, first], quaternions[row, own, last], part)
             place = a + (positions[row, own, last] - a) * part + turned(turn, centre)
             if i == 0:
+                moved = wp.float64(0.0)
                 for c in range(3):
                     pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
             else:
                 # the short way round between neighbours, which the contacts' kernels blend number by number
                 if wp.dot(turn, turn_before) < wp.float64(0.0):
                     turn = -turn
+                moved += wp.length_sq(place - before) + wp.length_sq(turn - turn_before)
                 way = wp.length(place - before) + angle_between(turn, turn_before) * radii[slot]
                 fastest = wp.max(fastest, way / (between[f, i, 3] - between[f, i - 1, 3]))
             write_key(pose, frame, i, place, turn)
+        pose[frame + STANDING] = wp.where(moved > wp.float64(0.0), 0.0, 1.0)
+        if moved == wp.float64(0.0):
+            write_row(pose, frame, place, turn)
         frame += FRAME_SIZE
-    # the frame that begins at the end stands still
+    # the frame that begins at the end stands still, where the last one stands: what moves ends where its keys say
     for c in range(3):
         pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
     for i in range(3):
         write_key(pose, frame, i, place, turn)
-    wp.atomic_max(shape_speed, 0, float(fastest))
+    pose[frame + STANDING] = wp.where(moved > wp.float64(0.0), 0.0, 1.0)
+    if moved == wp.float64(0.0):
+        write_row(pose, frame, place, turn)
+    wp.atomic_max(shape_speed, w, float(fastest))

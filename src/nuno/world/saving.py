@@ -71,8 +71,7 @@ class Saving(Running):
         Bodies, dynamics, materials and rules stay those of the batch; what was gripped or let go since is gripped as
         it was. The worlds' own clocks (``clock``) go back, ``time`` goes on for all: what is under way in the snapshot
         goes on from now, as ``saved.at(world.time)`` says. A static body that follows a path in other worlds, and none
-        in ``saved``, stands where it was as on a path that leads nowhere: cloth and soft bodies that touch it differ in
-        their last digits at first from those that touch one without a path.
+        in ``saved``, stands where it was, to the bit.
 
         Args:
             worlds: Indices of the worlds, one or (k,), or a mask (worlds,) bool.

@@ -18,7 +18,7 @@ from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, batched_spec
 from nuno.materials import Material
 from nuno.shapes.coordinates import Pose
-from nuno.shapes.path import Path
+from nuno.shapes.path import Path, path_as_it_is
 from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import of_world
 from nuno.validation import checked, number
@@ -189,7 +189,7 @@ class Snapshot:
         bodies = [
             replace(
                 body,
-                path=None if body.path is None else Path(
+                path=None if body.path is None else path_as_it_is(
                     body.path.times + later, body.path.positions, body.path.quaternions, body.path.interpolation
                 ),
                 dynamics=body.dynamics and replace(

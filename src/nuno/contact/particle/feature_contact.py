@@ -21,17 +21,28 @@ from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
 from nuno.contact.particle.feature_queue import COLOUR, MAX_COLOURS, QUEUE, forget_queue, queue_active, room_of
+from nuno.contact.particle.shape_contact import shape_speed_of
 from nuno.numbers.crew import barrier, shares_work
-from nuno.numbers.lanes import add, anywhere, full_like, lane_max, mul, sqrt, sub  # noqa: F401
+from nuno.numbers.lane_masks import ALL_LANES, in_lanes, lanes_without, lanes_without_bits
+from nuno.numbers.lanes import (  # noqa: F401
+    add,
+    anywhere,
+    full_like,
+    lane,
+    lane_max,
+    mul,
+    sqrt,
+    sub,
+)
 from nuno.numbers.vec3 import vec3
 from nuno.numbers.warps import WARP, anyone, lowest, union_of_warp
 from nuno.state.cloth_state import SPEED, Settings, Shapes
 
 
 @wp.func
-def travel_of_substep(t: Any, run: Settings, shape_speed: float):
+def travel_of_substep(t: Any, run: Settings, shape_speed: Any):
     """Return the way that vertices and shapes, up to ``shape_speed`` [m/s], may have gone in the substep before [m]."""
-    return (lane_max(sqrt(t.notes[SPEED])) + shape_speed) * run.dt
+    return (sqrt(t.notes[SPEED]) + shape_speed) * run.dt
 
 
 @wp.func
@@ -63,7 +74,74 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
 
 
 @wp.func
-def earliest_due(t: Any, soon: float, rank: int, size: int):
+def find_active_features(t: Any, topo: Any, travelled: lane, rank: int, size: int):
+    active = int(0)
+    sets = int(0)
+    soon = float(FAR)
+    for c in range(topo.feature_colour.shape[0] - 1):
+        first = topo.feature_colour[c]
+        for k in range(first + rank, first + t.feature_shapes[1 + c], size):
+            element = t.feature_list[k]
+            element = wp.max(element, -1 - element)
+            due = t.feature_due[DUE + k]
+            if lane_max(travelled - due) >= 0.0:
+                now = lanes_without(due - travelled)
+                t.feature_due[DUE + k] = in_lanes(due, now, FAR)
+                t.feature_asleep[k] = ALL_LANES ^ now
+                active += 1
+                sets = sets | (element >> SETS << SETS)
+            else:
+                element = -1 - element
+                soon = wp.min(soon, -lane_max(-1.0 * due))
+            t.feature_list[k] = element
+    return active, soon, sets
+
+
+@wp.func
+def asleep(like: float, t: Any, k: int):
+    """The lanes, bit by bit, in which an active element sleeps."""
+    return int(0)
+
+
+@wp.func
+def asleep(like: lane, t: Any, k: int):
+    return t.feature_asleep[k]
+
+
+@wp.func
+def not_marked(like: float, t: Any, topo: Any, element: int, own: int, named: bool):
+    """The lanes, bit by bit, in which an element that is listed in others is not, or not for a set of shapes."""
+    return int(0)
+
+
+@wp.func
+def not_marked(like: lane, t: Any, topo: Any, element: int, own: int, named: bool):
+    edges = topo.side.shape[0]
+    flag = int(1)
+    corners = wp.vec3i(0, 0, 0)
+    if element < edges:
+        e = topo.side[element]
+        corners = wp.vec3i(e[0], e[1], e[1])
+    else:
+        flag = int(2)
+        f = topo.face[element - edges]
+        corners = wp.vec3i(f[0], f[1], f[2])
+    a = t.feature_mark[corners[0]]
+    b = t.feature_mark[corners[1]]
+    c = t.feature_mark[corners[2]]
+    found = lanes_without_bits(a, b, c, flag)
+    if named:
+        found = found | lanes_without_bits(a, b, c, own)
+    return found
+
+
+@wp.func
+def earliest_due(t: Any, travelled: lane, soon: float, rank: int, size: int):
+    return soon
+
+
+@wp.func
+def earliest_due(t: Any, travelled: float, soon: float, rank: int, size: int):
     """The least of what all threads have."""
     barrier(size)
     if rank == 0:
@@ -77,7 +155,7 @@ def earliest_due(t: Any, soon: float, rank: int, size: int):
 
 @wp.func
 def push_elements(
-    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, own: int, travelled: float, queued: int, rank: int,
+    t: Any, topo: Any, run: Settings, shapes: Shapes, s: int, own: int, travelled: Any, queued: int, rank: int,
     size: int,
 ):  # fmt: skip
     """The elements that are active against one shape: those ``queued``, or all of them in turn where that is 0.
@@ -91,6 +169,7 @@ def push_elements(
     h = feature_pose(like, t, run, shapes, s)
     edges = topo.side.shape[0]
     colours = topo.feature_colour.shape[0] - 1
+    unlisted = t.feature_shapes[topo.feature_colour.shape[0] + shapes.count + s]
     # at a box or a hull each edge has two points
     points = int(1)
     if (h.kind == BOX or h.kind == HULL) and shares_work(size):
@@ -110,15 +189,19 @@ def push_elements(
         elif start + mine < t.feature_shapes[1 + c]:
             entry = topo.feature_colour[c] + start + mine
         element = int(-1)
+        without = int(unlisted)
         if entry >= 0:
             element = t.feature_list[entry]
+            without = unlisted | asleep(like, t, entry)
             if queued > 0:
                 # its sign tells of another time
                 element = wp.max(element, -1 - element)
             element = element_of(element, own, named)
+            if element >= 0:
+                without = without | not_marked(like, t, topo, element, own, named)
         point_index = rank % points
         more = int(1)
-        if element < 0 and not shares_work(size):
+        if (element < 0 or without == ALL_LANES) and not shares_work(size):
             more = 0
         while more > 0:
             more = 0
@@ -139,7 +222,7 @@ def push_elements(
                     j = corners[1]
                     k = corners[2]
                     on, bj, bk, point, normal, gap = triangle_point(
-                        t, h, shapes, s, entry, travelled, i, j, k, run.cell
+                        t, h, shapes, s, entry, travelled, without, i, j, k, run.cell
                     )  # fmt: skip
                     bi = one - bj - bk
             elif element >= 0:
@@ -148,7 +231,7 @@ def push_elements(
                 j = ends[1]
                 k = i
                 on, more, bj, point, normal, gap = edge_point(
-                    t, h, shapes, s, entry, travelled, i, j, point_index, run.cell
+                    t, h, shapes, s, entry, travelled, without, i, j, point_index, run.cell
                 )  # fmt: skip
                 bi = one - bj
             if shares_work(size):
@@ -192,7 +275,7 @@ def push_elements(
 
 
 @wp.func
-def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: float, rank: int, size: int):
+def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: Any, rank: int, size: int):
     """Push the active ones of the listed edges and triangles out of the sharp shapes nearby.
 
     Args:
@@ -225,7 +308,7 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         if shares_work(size):
             active = int(anyone(active > 0))
     if active > 0:
-        soon = travelled
+        soon = lane_max(travelled)
         for k in range(t.feature_shapes[0]):
             s = t.feature_shapes[topo.feature_colour.shape[0] + k]
             own = set_of(s)
@@ -234,20 +317,20 @@ def push_active(t: Any, topo: Any, run: Settings, shapes: Shapes, travelled: flo
         if queued > 0:
             forget_queue(t, topo, queued, rank, size)
     elif shares_work(size):
-        soon = earliest_due(t, soon, rank, size)
+        soon = earliest_due(t, travelled, soon, rank, size)
     return soon
 
 
 @wp.func
 def push_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, size: int):
     """All listed edges and triangles against the sharp shapes nearby; what was gone until now is in `State`."""
-    travelled = t.feature_due[TRAVELLED] + travel_of_substep(t, run, shapes.shape_speed[0])
-    earliest = t.feature_due[EARLIEST]
+    travelled = t.feature_due[TRAVELLED] + travel_of_substep(t, run, shape_speed_of(t, shapes))
+    earliest = lane_max(t.feature_due[EARLIEST])
     # once all know
     barrier(size)
-    if travelled >= earliest:
+    if lane_max(travelled) >= earliest:
         earliest = push_active(t, topo, run, shapes, travelled, rank, size)
         barrier(size)
     if rank == 0:
         t.feature_due[TRAVELLED] = travelled
-        t.feature_due[EARLIEST] = earliest
+        t.feature_due[EARLIEST] = full_like(travelled, earliest)

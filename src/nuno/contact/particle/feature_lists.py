@@ -5,6 +5,10 @@ cylinder and a ball as small as a cell touch the cloth's edges and triangles bet
 which of those may come that near within the frame (`nuno.contact.particle.feature_contact` looks at them); where a
 cloth lies on a table, far from its rim, that is one question about its bounding box. What does not touch changes no
 bit, so that it does not matter what else is listed.
+
+What goes farther than was expected may touch what it was not listed for. Lanes of worlds share the lists, so each keeps
+what it would list alone: its own marks, with the sets of shapes that elements look at, and when its own elements wake.
+An element's number in a list has the sets of all lanes.
 """
 
 from typing import Any
@@ -15,9 +19,24 @@ from nuno.contact.particle.distances import BOX, CYLINDER, FAR, HULL, PLANE
 from nuno.contact.particle.hull import box_clearance, meets_corners, meets_ridges
 from nuno.contact.particle.kinematic_pose import kinematic_pose
 from nuno.contact.particle.shape_contact import COLUMNS, origin_of, reach_of_frame, rotation_of, three_of
-from nuno.numbers.lanes import absolute, add, anywhere, lane_max, maximum, minimum, mul, sqrt, sub  # noqa: F401
+from nuno.numbers.lane_masks import lanes_without
+from nuno.numbers.lanes import (  # noqa: F401
+    LANES,
+    absolute,
+    add,
+    anywhere,
+    full_like,
+    lane,
+    lane_int,
+    lane_max,
+    maximum,
+    minimum,
+    mul,
+    sqrt,
+    sub,
+)
 from nuno.numbers.vec3 import position, transposed_mul, vec3
-from nuno.state.cloth_state import CLOCK, THICKNESS, Settings, Shapes
+from nuno.state.cloth_state import CLOCK, SPEED, THICKNESS, Settings, Shapes
 
 ROUND = wp.constant(3.0)
 """Cells. What is curved less than with a radius of so many is left to the vertices: a straight edge of a cell cuts a
@@ -40,14 +59,14 @@ SETS = wp.constant(17)
 
 
 @wp.func
-def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int):
-    """Place [m] and rotation (row major, shape to world) of a shape after ``clock`` substeps."""
+def pose_of(like: Any, t: Any, shapes: Shapes, s: int, clock: int, substep: int):
+    """Place [m] and rotation (row major, shape to world) of a shape: see `kinematic_pose`."""
     origin = origin_of(t)
     centre = three_of(like, t, shapes, s * COLUMNS) - origin
     turn = rotation_of(like, t, shapes, s * COLUMNS)
     slot = shapes.slot[s]
     if slot >= 0:
-        centre, turn = kinematic_pose(like, shapes, slot, clock, t.group, t.worlds, origin)
+        centre, turn = kinematic_pose(like, shapes, slot, clock, substep, t.group, t.worlds, origin)
     return centre, turn
 
 
@@ -107,12 +126,13 @@ def stands_between(
 def clear_features(t: Any, topo: Any, rank: int):
     """Start the lists anew; one thread does it.
 
-    `State.feature_shapes` has how many shapes are listed, how many elements of each colour, and then the shapes.
+    `State.feature_shapes` has how many shapes are listed, how many elements of each colour, then the shapes, and for
+    each shape there is the lanes that would not list it, bit by bit.
     """
     if rank == 0:
         for k in range(topo.feature_colour.shape[0]):
             t.feature_shapes[k] = 0
-        t.feature_due[TRAVELLED] = 0.0
+        t.feature_due[TRAVELLED] = full_like(t.notes[SPEED], 0.0)
 
 
 @wp.func
@@ -135,7 +155,7 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
         s = t.shape_list[1 + near]
         kind = shapes.kind[s]
         if kind < PLANE or kind == HULL:
-            centre, r = pose_of(like, t, shapes, s, clock)
+            centre, r = pose_of(like, t, shapes, s, clock, clock + 1)
             extent = three_of(like, t, shapes, s * COLUMNS + 12)
             # the cloth's box as the shape sees it
             low = vec3(t.box[0], t.box[1], t.box[2])
@@ -154,9 +174,11 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
             if anywhere(along):
                 if found == 0:
                     for i in range(rank, topo.particles, size):
-                        t.feature_mark[i] = 0
+                        t.feature_mark[i] = unmarked(like)
+                whole = along
                 if rank == 0:
                     t.feature_shapes[topo.feature_colour.shape[0] + found] = s
+                    t.feature_shapes[topo.feature_colour.shape[0] + shapes.count + s] = lanes_without(along)
                 own = set_of(s)
                 found = found + 1
                 for i in range(rank, topo.particles, size):
@@ -168,18 +190,10 @@ def mark_features(t: Any, topo: Any, run: Settings, shapes: Shapes, rank: int, s
                         at_once, _point = stands_between(
                             shapes, s, kind, p, vec3(soon, soon, soon), soon, extent.x, extent.y, extent.z, broad
                         )  # fmt: skip
-                        slack = int(wp.clamp(-lane_max(at_once), 0.0, MAX_SLACK) / SLACK_STEP)
-                        mark = t.feature_mark[i]
-                        sets = (mark >> SETS << SETS) | own
-                        if mark != 0:
-                            slack = wp.min(slack, slack_in(mark))
-                        mark = (mark & 3) | 1
-                        if anywhere(point):
-                            mark = mark | 2
-                        t.feature_mark[i] = mark | slack << 2 | sets
+                        mark_vertex(t, i, minimum(along, whole), point, at_once, own)
     if rank == 0:
         t.feature_shapes[0] = found
-        t.feature_due[EARLIEST] = wp.where(found > 0, 0.0, FAR)
+        t.feature_due[EARLIEST] = full_like(t.notes[SPEED], wp.where(found > 0, 0.0, FAR))
 
 
 @wp.func
@@ -210,10 +224,60 @@ def element_of(number: int, sets: int, named: bool):
 
 
 @wp.func
-def slack_of(t: Any, topo: Any, k: int):
-    """Return the way that anything must go before element k may be touched, in steps, with the sets of those shapes.
+def unmarked(like: float):
+    """The mark of a vertex by which nothing may be touched."""
+    return int(0)
 
-    Below zero for never.
+
+@wp.func
+def unmarked(like: lane):
+    return lane_int()
+
+
+@wp.func
+def marked(mark: int, point: float, at_once: float, own: int):
+    """Return a vertex's mark with that of one more shape, of the set whose bit is ``own``."""
+    slack = int(wp.clamp(-at_once, 0.0, MAX_SLACK) / SLACK_STEP)
+    if mark != 0:
+        slack = wp.min(slack, slack_in(mark))
+    found = (mark & 3) | 1
+    if point > 0.0:
+        found = found | 2
+    return found | slack << 2 | (mark >> SETS << SETS) | own
+
+
+@wp.func
+def mark_vertex(t: Any, i: int, along: float, point: float, at_once: float, own: int):
+    """Mark vertex i where ``along`` is positive, for triangles where ``point`` is too, as `stands_between` says."""
+    t.feature_mark[i] = marked(t.feature_mark[i], point, at_once, own)
+
+
+@wp.func
+def mark_vertex(t: Any, i: int, along: lane, point: lane, at_once: lane, own: int):
+    marks = t.feature_mark[i]
+    lanes = int(LANES)  # a variable, or Warp would unroll the loop
+    for k in range(lanes):
+        if along[k] > 0.0:
+            marks[k] = marked(marks[k], point[k], at_once[k], own)
+    t.feature_mark[i] = marks
+
+
+@wp.func
+def mark_in(mark: int, k: int):
+    """The mark in lane k."""
+    return mark
+
+
+@wp.func
+def mark_in(mark: lane_int, k: int):
+    return mark[k]
+
+
+@wp.func
+def slack_of(t: Any, topo: Any, k: int, world: int):
+    """Return the way that anything must go before element k may be touched in a lane, in steps.
+
+    With the sets of those shapes; below zero for never.
     """
     edges = topo.side.shape[0]
     mark = int(0)
@@ -222,14 +286,14 @@ def slack_of(t: Any, topo: Any, k: int):
     if k < edges:
         e = topo.side[k]
         for c in range(2):
-            at = t.feature_mark[e[c]]
+            at = mark_in(t.feature_mark[e[c]], world)
             mark = mark | (at & 1)
             sets = sets | (at >> SETS << SETS)
             slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
     elif k < edges + topo.face.shape[0]:
         f = topo.face[k - edges]
         for c in range(3):
-            at = t.feature_mark[f[c]]
+            at = mark_in(t.feature_mark[f[c]], world)
             mark = mark | (at & 2)
             sets = sets | (at >> SETS << SETS)
             slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
@@ -237,28 +301,63 @@ def slack_of(t: Any, topo: Any, k: int):
 
 
 @wp.func
+def place_of(t: Any, topo: Any, k: int, sets: int):
+    """List element k, which may touch some sets of shapes; its place in the list."""
+    c = int(0)
+    while k >= topo.feature_colour[c + 1]:
+        c += 1
+    place = topo.feature_colour[c] + wp.atomic_add(t.feature_shapes, 1 + c, 1)
+    t.feature_list[place] = wp.where(names_sets(topo), k | sets, k)
+    return place
+
+
+@wp.func
+def way_of(slack: int):
+    """Return the way in what `slack_of` returns [m]."""
+    return SLACK_STEP * float(slack & ((1 << SETS) - 1))
+
+
+@wp.func
 def note_feature_shape(t: Any, topo: Any, k: int, slack: int):
     """List element k where its slack is not below zero."""
     if slack >= 0:
-        c = int(0)
-        while k >= topo.feature_colour[c + 1]:
-            c += 1
-        place = topo.feature_colour[c] + wp.atomic_add(t.feature_shapes, 1 + c, 1)
-        t.feature_list[place] = wp.where(names_sets(topo), k | (slack >> SETS << SETS), k)
-        t.feature_due[DUE + place] = SLACK_STEP * float(slack & ((1 << SETS) - 1))
+        place = place_of(t, topo, k, slack >> SETS << SETS)
+        t.feature_due[DUE + place] = way_of(slack)
+
+
+@wp.func
+def list_marked(like: float, t: Any, topo: Any, rank: int, size: int):
+    """List the edges and triangles with marked vertices."""
+    for k in range(rank, topo.side.shape[0] + topo.face.shape[0], 4 * size):
+        # four at a time, so that a thread waits for all their marks together
+        a = slack_of(t, topo, k, 0)
+        b = slack_of(t, topo, k + size, 0)
+        c = slack_of(t, topo, k + 2 * size, 0)
+        d = slack_of(t, topo, k + 3 * size, 0)
+        note_feature_shape(t, topo, k, a)
+        note_feature_shape(t, topo, k + size, b)
+        note_feature_shape(t, topo, k + 2 * size, c)
+        note_feature_shape(t, topo, k + 3 * size, d)
+
+
+@wp.func
+def list_marked(like: lane, t: Any, topo: Any, rank: int, size: int):
+    lanes = int(LANES)
+    for k in range(rank, topo.side.shape[0] + topo.face.shape[0], size):
+        due = full_like(like, FAR)
+        sets = int(0)
+        for world in range(lanes):
+            slack = slack_of(t, topo, k, world)
+            if slack >= 0:
+                sets = sets | (slack >> SETS << SETS)
+                due[world] = way_of(slack)
+        if sets != 0:
+            place = place_of(t, topo, k, sets)
+            t.feature_due[DUE + place] = due
 
 
 @wp.func
 def list_features(t: Any, topo: Any, rank: int, size: int):
     """List the edges and triangles with marked vertices, once all are marked."""
     if t.feature_shapes[0] > 0:
-        for k in range(rank, topo.side.shape[0] + topo.face.shape[0], 4 * size):
-            # four at a time, so that a thread waits for all their marks together
-            a = slack_of(t, topo, k)
-            b = slack_of(t, topo, k + size)
-            c = slack_of(t, topo, k + 2 * size)
-            d = slack_of(t, topo, k + 3 * size)
-            note_feature_shape(t, topo, k, a)
-            note_feature_shape(t, topo, k + size, b)
-            note_feature_shape(t, topo, k + 2 * size, c)
-            note_feature_shape(t, topo, k + 3 * size, d)
+        list_marked(t.notes[SPEED], t, topo, rank, size)

@@ -14,11 +14,12 @@ from typing import Any
 
 import warp as wp
 
-from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, SPHERE, distance_solid
+from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, FAR, HULL, SPHERE, distance_solid
 from nuno.contact.particle.feature_lists import DUE, stands_between
 from nuno.contact.particle.feature_push import PATIENCE, SLANT
 from nuno.contact.particle.hull import box_clearance, meets_corners, outermost_corner
 from nuno.contact.particle.hull_ridges import hull_edge_point
+from nuno.numbers.lane_masks import in_lanes
 from nuno.numbers.lanes import (  # noqa: F401
     absolute,
     add,
@@ -26,7 +27,7 @@ from nuno.numbers.lanes import (  # noqa: F401
     choose,
     div,
     full_like,
-    lane_max,
+    lane,
     maximum,
     minimum,
     mul,
@@ -135,16 +136,24 @@ def across_edge(
 
 
 @wp.func
-def due_after(t: Any, entry: int, travelled: float, near: Any):
-    """Let an element sleep until all have gone as far as ``near`` is below zero in every world."""
-    t.feature_due[DUE + entry] = wp.min(t.feature_due[DUE + entry], travelled - lane_max(near))
+def due_after(t: Any, entry: int, travelled: float, near: float, without: int):
+    """Let an element sleep until all have gone as far as ``near`` is below zero, but in the lanes ``without``."""
+    t.feature_due[DUE + entry] = wp.min(t.feature_due[DUE + entry], travelled - near)
+
+
+@wp.func
+def due_after(t: Any, entry: int, travelled: lane, near: lane, without: int):
+    t.feature_due[DUE + entry] = minimum(t.feature_due[DUE + entry], in_lanes(travelled - near, without, FAR))
 
 
 @wp.func
 def edge_point(
-    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: float, i: int, j: int, point_index: int, cell: float
+    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: Any, without: int, i: int, j: int, point_index: int,
+    cell: float,
 ):  # fmt: skip
     """Return an edge's point nearest to a shape: 0 or 1 (``point_index``), for over two edges of a box it has two.
+
+    In the lanes ``without``, bit by bit, nothing is asked.
 
     Returns:
         Whether the shape may touch it there (positive) and whether there is a second point; the point's part of the
@@ -158,8 +167,8 @@ def edge_point(
     way = transposed_mul(h.rotation, start_position(t, j) - start_position(t, i))
     if h.kind == HULL:
         touch = hull_edge_point(h, shapes, s, a, way, point_index, cell)
-        due_after(t, entry, travelled, touch.near)
-        return touch.on, touch.more, touch.at, touch.point, touch.normal, touch.gap
+        due_after(t, entry, travelled, touch.near, without)
+        return in_lanes(touch.on, without, -1.0), touch.more, touch.at, touch.point, touch.normal, touch.gap
     half = vec3(absolute(way.x) * 0.5 + h.reach, absolute(way.y) * 0.5 + h.reach, absolute(way.z) * 0.5 + h.reach)
     on, _point = stands_between(
         shapes, s, h.kind, a + way * 0.5, half, h.reach, h.size.x, h.size.y, h.size.z, h.broad
@@ -181,7 +190,7 @@ def edge_point(
         near = minimum(near, h.reach - minimum(minimum(fa, fb), choose(minimum(-da, db), fa + da * part, fa)))
         # over a face both ends see the same slope, which one may lose within the substep
         on = minimum(minimum(-da, db) + h.reach - h.radius, near)
-    due_after(t, entry, travelled, near)
+    due_after(t, entry, travelled, near, without)
     at = zero
     gap = zero
     point = vec3(zero, zero, zero)
@@ -235,12 +244,13 @@ def edge_point(
         on = minimum(minimum(on, size - SLANT), minimum(at, one - at))
         if point_index > 0 and more == 0:
             on = -one
-    return on, more, at, point, normal, gap
+    return in_lanes(on, without, -1.0), more, at, point, normal, gap
 
 
 @wp.func
 def triangle_point(
-    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: float, i: int, j: int, k: int, cell: float
+    t: Any, h: Any, shapes: Shapes, s: int, entry: int, travelled: Any, without: int, i: int, j: int, k: int,
+    cell: float,
 ):  # fmt: skip
     """Return where a shape's outermost point meets a triangle, as shares of the ways from i to j and to k.
 
@@ -277,7 +287,7 @@ def triangle_point(
         _along, on = stands_between(
             shapes, s, h.kind, a + o, around, size, h.size.x, h.size.y, h.size.z, h.broad
         )  # fmt: skip
-    due_after(t, entry, travelled, on)
+    due_after(t, entry, travelled, on, without)
     if anywhere(on):
         nn = dot(n, n) + 1.0e-20
         if h.kind != HULL:
@@ -294,7 +304,7 @@ def triangle_point(
         point = point + gap * normal
         gap = gap - h.radius
         gap = gap - minimum(gap, zero) * PATIENCE
-    return on, bj, bk, point, normal, gap
+    return in_lanes(on, without, -1.0), bj, bk, point, normal, gap
 
 
 @wp.func

@@ -44,11 +44,11 @@ def measured(h: Any, like: Any, t: Any, run: Settings, shapes: Shapes, s: int):
     clock = int(lane_max(t.notes[CLOCK]))
     h.kind = shapes.kind[s]
     h.slot = shapes.slot[s]
-    centre, rotation = pose_of(like, t, shapes, s, clock - 1)
+    centre, rotation = pose_of(like, t, shapes, s, clock - 1, clock)
     h.centre = centre
     h.rotation = rotation
     if h.slot >= 0:
-        after, turn_after = pose_of(like, t, shapes, s, clock)
+        after, turn_after = pose_of(like, t, shapes, s, clock, clock)
         h.e = after - centre
         h.d = turn_after - rotation
     row = s * COLUMNS

@@ -10,6 +10,7 @@ import warp as wp
 from nuno.contact.particle.distances import FAR
 from nuno.contact.particle.feature_lists import DUE
 from nuno.numbers.crew import barrier
+from nuno.numbers.lanes import lane
 from nuno.numbers.warps import WARP, below_in, claim, size_of_set, sum_of_warp, vote
 
 TALLY = wp.constant(3)
@@ -113,6 +114,11 @@ def queue_active(t: Any, topo: Any, travelled: float, room: int, rank: int, size
                 place = enqueue(t, travelled, z, place, c, k + lane + 3 * WARP, lane)
         barrier(size)
     return active, soon
+
+
+@wp.func
+def queue_active(t: Any, topo: Any, travelled: lane, room: int, rank: int, size: int):
+    return int(0), float(FAR)  # lanes have a thread by itself, which needs no queue
 
 
 @wp.func

@@ -24,16 +24,15 @@ from nuno.contact.particle.distances import (
     way_in,
 )
 from nuno.contact.particle.hull import distance_hull, way_into_hull
-from nuno.contact.particle.kinematic_pose import kinematic_pose, kinematic_position
+from nuno.contact.particle.kinematic_pose import kinematic_pose, stands
 from nuno.numbers.element_access import at
+from nuno.numbers.lane_masks import in_lanes, lanes_without
 from nuno.numbers.lanes import (  # noqa: F401
-    LANES,
     add,
     anywhere,
     choose,
     div,
     full_like,
-    lane,
     lane_max,
     maximum,
     minimum,
@@ -158,8 +157,8 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
     d = r
     if slot >= 0:
         clock = int(lane_max(t.notes[CLOCK]))
-        before, turn_before = kinematic_pose(like, shapes, slot, clock - 1, g, w, origin)
-        centre, r = kinematic_pose(like, shapes, slot, clock, g, w, origin)
+        before, turn_before = kinematic_pose(like, shapes, slot, clock - 1, clock, g, w, origin)
+        centre, r = kinematic_pose(like, shapes, slot, clock, clock, g, w, origin)
         e = centre - before
         d = r - turn_before
     # what comes nearer than this may have passed through within the substep
@@ -192,39 +191,6 @@ def touch_shape(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
                 push_out(t, i, choose(met, deep, gap) - radius, out, u, dot(u, out), mu, leave)
             elif anywhere(radius - gap):
                 push_out(t, i, gap - radius, normal, u, un, mu, leave)
-
-
-@wp.func
-def lanes_without(a: float):
-    """Return the lanes, bit by bit, in which a number is not above zero: none of one number that is."""
-    return 0
-
-
-@wp.func
-def lanes_without(a: lane):
-    found = int(0)
-    lanes = int(LANES)  # a variable, or Warp would unroll the loop
-    for k in range(lanes):
-        if a[k] <= 0.0:
-            found = found | (1 << k)
-    return found
-
-
-@wp.func
-def in_lanes(a: float, lanes: int, other: float):
-    """Return a number, but ``other`` in the lanes given bit by bit."""
-    return a
-
-
-@wp.func
-def in_lanes(a: lane, lanes: int, other: float):
-    result = a
-    if lanes != 0:
-        count = int(LANES)
-        for k in range(count):
-            if (lanes >> k) & 1 != 0:
-                result[k] = other
-    return result
 
 
 @wp.func
@@ -280,9 +246,8 @@ def measure_box(t: Any, n: int, rank: int, size: int):
 
 
 @wp.func
-def along_box(t: Any, shapes: Shapes, row: int, axis: int, centre: Any):
+def along_box(t: Any, n: Any, axis: int, centre: Any):
     """The least of the box's corners along a plane's normal, by one coordinate."""
-    n = per_world(centre, shapes.table, t.group, shapes.stride, t.worlds, row + 5 + 3 * axis)
     return minimum(n * (t.box[axis] - centre), n * (t.box[3 + axis] - centre))
 
 
@@ -295,7 +260,13 @@ def reach_of_frame(t: Any, shapes: Shapes, ahead: float):
     # 1.5 times the present speed, what gravity adds in the time, and 2 cm for what constraints throw
     grow = sqrt(t.notes[SPEED]) * (1.5 * ahead) + (10.0 * ahead * ahead + 0.02) + t.scalars[THICKNESS]
     # and as far as the fastest shape may throw it
-    return grow + shapes.shape_speed[0] * ahead
+    return grow + shape_speed_of(t, shapes) * ahead
+
+
+@wp.func
+def shape_speed_of(t: Any, shapes: Shapes):
+    """The speed of the world's fastest shape [m/s]."""
+    return per_world(t.notes[SPEED], shapes.shape_speed, t.group, wp.min(shapes.pose_stride, 1), t.worlds, 0)
 
 
 @wp.func
@@ -314,21 +285,35 @@ def select_shapes(t: Any, shapes: Shapes, ahead: float, rank: int, size: int):
         cz = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 2) - t.scalars[ORIGIN + 2]
         reach = grow + per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 18)
         slot = shapes.slot[s]
+        still = full_like(like, 1.0)
+        nx = like
+        ny = like
+        nz = like
+        if shapes.kind[s] == PLANE:
+            nx = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 5)
+            ny = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 8)
+            nz = per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 11)
         if slot >= 0:
             # haste covers where it goes from here
             clock = int(lane_max(t.notes[CLOCK]))
-            ax = t.scalars[ORIGIN]
-            ay = t.scalars[ORIGIN + 1]
-            az = t.scalars[ORIGIN + 2]
-            cx, cy, cz = kinematic_position(like, shapes, slot, clock, t.group, t.worlds, ax, ay, az)
+            centre, r = kinematic_pose(like, shapes, slot, clock, clock + 1, t.group, t.worlds, origin_of(t))
+            cx = centre.x
+            cy = centre.y
+            cz = centre.z
+            nx = r.x.z
+            ny = r.y.z
+            nz = r.z.z
+            still = stands(like, shapes, slot, clock + 1, t.group, t.worlds)
         ox = maximum(t.box[0] - cx, cx - t.box[3])
         oy = maximum(t.box[1] - cy, cy - t.box[4])
         oz = maximum(t.box[2] - cz, cz - t.box[5])
         far = maximum(ox, maximum(oy, oz))
-        if shapes.kind[s] == PLANE and slot < 0:
-            # as far as the corner of the box that is the nearest
-            far = along_box(t, shapes, row, 0, cx) + along_box(t, shapes, row, 1, cy) + along_box(t, shapes, row, 2, cz)
-            reach = grow + per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 17)
+        if shapes.kind[s] == PLANE:
+            # where it stands as far as the corner of the box that is the nearest
+            corner = along_box(t, nx, 0, cx) + along_box(t, ny, 1, cy) + along_box(t, nz, 2, cz)
+            near = grow + per_world(like, shapes.table, t.group, shapes.stride, t.worlds, row + 17)
+            far = choose(still, corner, far)
+            reach = choose(still, near, reach)
         if anywhere(reach - far):
             k = wp.atomic_add(t.shape_list, 0, 1)
             t.shape_list[1 + k] = s
