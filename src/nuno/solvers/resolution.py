@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.solvers.cloth_substeps import MAX_SUBSTEPS
-
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.world.simulation import Simulation
@@ -100,6 +98,7 @@ def warn_of_overloads(bodies: list[Body], time: float) -> None:
         found = body.resolution
         if found is None or found.tension is None or body.key in _overloaded:
             continue
+        from nuno.solvers.cloth_substeps import MAX_SUBSTEPS
         from nuno.solvers.line_tension import line_tension
 
         solver: Any = body._dynamics.solver  # type: ignore[union-attr]
