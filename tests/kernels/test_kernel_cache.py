@@ -38,6 +38,19 @@ def is_kernel(node):
     return any(ast.unparse(mark).startswith("wp.kernel") for mark in marks)
 
 
+def test_kernels_are_found_without_any_extra():
+    """`nuno compile` works where no extra is installed: what declares kernels imports none."""
+    code = """
+import sys
+for name in ("gymnasium", "mujoco", "newton", "pinocchio", "matplotlib", "meshcat", "pytetwild", "pxr"):
+    sys.modules[name] = None
+from nuno.kernels.kernel_modules import kernel_modules
+print(len(kernel_modules()))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(done.stdout.split()[-1]) == len(kernel_modules())
+
+
 def test_every_kernel_is_of_a_module_that_is_known():
     """Those that the sources declare, by factories too; and each takes concrete types, or has declared overloads."""
     declared = set()

@@ -9,8 +9,8 @@ import warp as wp
 
 from nuno.bodies.body import Body
 from nuno.camera.camera import Camera
+from nuno.camera.covered_fields import count_covered, look_up_covered
 from nuno.camera.render import render_masks
-from nuno.envs.covered_fields import count_covered, look_up_covered
 from nuno.world.world import World
 
 WIDTH = 0.9

@@ -36,7 +36,7 @@ CUDA_ONLY = tuple(
         "plans.run_blocks", "plans.run_double_blocks", "plans.run_grid", "plans.run_double_grid",
         "plans.run_soft_blocks", "plans.run_soft_few", "plans.run_soft_double_blocks", "plans.run_soft_grid",
         "plans.run_soft_double_grid", "rigid.run_rigid_group", "state.finite",
-        "envs.covered_fields",
+        "camera.covered_fields",
     )
 )  # fmt: skip
 """Beginnings of names: worlds by blocks and by the whole device. The CPU runs some of them, when asked to."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from nuno.envs.covered_fields import count_covered, count_fields, look_up_covered, read_fields
+from nuno.camera.covered_fields import count_covered, count_fields, look_up_covered, read_fields
 
 
 def random_masks():
