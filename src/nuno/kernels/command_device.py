@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
+
+from nuno.kernels.kernel_cache import is_cached
 
 log = logging.getLogger(__name__)
 
@@ -24,8 +25,7 @@ def device_of_command(name: str, kernels: str) -> str:
     if not wp.get_cuda_device_count():
         return "cpu"
     device = wp.get_device("cuda:0")
-    cache = Path(wp.config.kernel_cache_dir or "")
-    if any(path for kind in ("ptx", f"sm{device.arch}.cubin") for path in cache.glob(f"wp_{kernels}_*/*.{kind}")):
+    if is_cached(f"{kernels}_*", "ptx", f"sm{device.arch}.cubin"):
         return name
     log.warning(
         "kernels for %s are not compiled yet, which takes about a minute: the CPU is taken. --device cuda compiles "

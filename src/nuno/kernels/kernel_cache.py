@@ -85,9 +85,16 @@ def take_machine_code(device: str) -> None:
     import warp as wp
 
     if wp.config.cuda_output is None:
-        found = Path(wp.config.kernel_cache_dir or "").glob(f"wp_nuno.*/*.sm{wp.get_device(device).arch}.cubin")
-        if next(found, None) is not None:
+        if is_cached("nuno.*", f"sm{wp.get_device(device).arch}.cubin"):
             wp.config.cuda_output = "cubin"
+
+
+def is_cached(modules: str, *kinds: str) -> bool:
+    """Return True if Warp's cache has files that end in any of some ways, of modules by a pattern of their names."""
+    import warp as wp
+
+    cache = Path(wp.config.kernel_cache_dir or "")
+    return any(path for kind in kinds for path in cache.glob(f"wp_{modules}/*.{kind}"))
 
 
 def _architectures(arch: str | None) -> tuple[int, ...]:
