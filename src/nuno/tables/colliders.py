@@ -72,9 +72,8 @@ class Colliders:
         self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
         self._launches = RecordedLaunches(shapes.pose.device, BLOCK_SIZE)
-        self._batch: tuple[Any, ...] | None = (
-            None  # keys of a path batch's bodies, their slots and rows, middles, radii
-        )
+        # keys of a path batch's bodies, their slots and rows, middles, radii
+        self._batch: tuple[Any, ...] | None = None
 
     @classmethod
     def from_bodies(

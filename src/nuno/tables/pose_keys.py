@@ -11,8 +11,6 @@ BASES = wp.constant(wp.float64(1024.0))
 """Bases of frames are whole parts of a metre by this."""
 SMALL = wp.constant(wp.float64(1.0e-6))
 """[rad] Half an angle below which turns are interpolated number by number."""
-
-
 NEAR = wp.constant(wp.float64(0.98))
 """Cosine of half an angle, 23 degrees."""
 HALFWAY = wp.constant(wp.float64(1.0e-6))
@@ -59,6 +57,13 @@ def turned(q: wp.vec4d, p: wp.vec3d):
     u = wp.vec3d(q[1], q[2], q[3])
     t = wp.cross(u, p) * wp.float64(2.0)
     return p + t * q[0] + wp.cross(u, t)
+
+
+@wp.func
+def write_base(pose: wp.array(dtype=float), frame: int, place: wp.vec3d):
+    """The base of a frame that begins at a place."""
+    for c in range(3):
+        pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
 
 
 @wp.func
@@ -115,6 +120,14 @@ def write_row(pose: wp.array(dtype=float), frame: int, place: wp.vec3d, turn: wp
     pose[at + 11] = float(one - two * (xx + yy))
 
 
+@wp.func
+def write_standing(pose: wp.array(dtype=float), frame: int, moved: wp.float64, place: wp.vec3d, turn: wp.vec4d):
+    """A frame in which a body ``moved`` so much: it stands where that is nothing, and then the row says where."""
+    pose[frame + STANDING] = wp.where(moved > wp.float64(0.0), 0.0, 1.0)
+    if moved == wp.float64(0.0):
+        write_row(pose, frame, place, turn)
+
+
 @wp.kernel(enable_backward=False)
 def write_pose_keys(
     positions: wp.array3d(dtype=wp.vec3d),
@@ -163,8 +176,7 @@ def write_pose_keys(
             place = a + (positions[row, own, last] - a) * part + turned(turn, centre)
             if i == 0:
                 moved = wp.float64(0.0)
-                for c in range(3):
-                    pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
+                write_base(pose, frame, place)
             else:
                 # the short way round between neighbours, which the contacts' kernels blend number by number
                 if wp.dot(turn, turn_before) < wp.float64(0.0):
@@ -173,16 +185,11 @@ def write_pose_keys(
                 way = wp.length(place - before) + angle_between(turn, turn_before) * radii[slot]
                 fastest = wp.max(fastest, way / (between[f, i, 3] - between[f, i - 1, 3]))
             write_key(pose, frame, i, place, turn)
-        pose[frame + STANDING] = wp.where(moved > wp.float64(0.0), 0.0, 1.0)
-        if moved == wp.float64(0.0):
-            write_row(pose, frame, place, turn)
+        write_standing(pose, frame, moved, place, turn)
         frame += FRAME_SIZE
     # the frame that begins at the end stands still, where the last one stands: what moves ends where its keys say
-    for c in range(3):
-        pose[frame + c] = float(wp.rint(place[c] * BASES) / BASES)
+    write_base(pose, frame, place)
     for i in range(3):
         write_key(pose, frame, i, place, turn)
-    pose[frame + STANDING] = wp.where(moved > wp.float64(0.0), 0.0, 1.0)
-    if moved == wp.float64(0.0):
-        write_row(pose, frame, place, turn)
+    write_standing(pose, frame, moved, place, turn)
     wp.atomic_max(shape_speed, w, float(fastest))
