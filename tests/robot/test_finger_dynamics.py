@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from lifter import PEAK, G, cube_in, height, lift, lifter_in
+from swung_cube import SwungCube
 
 import nuno
 from nuno.robot.finger_dynamics import AHEAD
@@ -173,36 +174,11 @@ def test_a_vector_of_all_angles_does_not_loosen_it(scene):
 @pytest.mark.long
 def test_talos_lifts_a_cube_with_its_fingers():
     """Its arm swings 0.2 kg by 0.4 m in 1 s between the tips of its gripper: the cube slides by less than 0.1 mm."""
-    world = nuno.World(device="cpu")
-    world.add(nuno.plane(name="floor"))
-    robot = nuno.SimulatedRobot(nuno.Humanoid("talos"), world, dynamics=True)
-    assert robot.start_grasp("larm") == [False] and robot.stop_grasp("larm") == [True]
-    pose = robot.actual.frame_pose("left_hand")
-    place = pose.to_world([(0.0, 0.0, 0.008)])[0]
-    cube = world.add(nuno.box((0.05,) * 3, name="cube", position=place, quaternion=pose.quaternion))
-    world.attach(cube, nuno.Rigid(mass=0.2, friction=0.8))
-    kept = world.grip(cube, to=cube.position)
-    assert robot.start_grasp("larm") == [True]
-    kept.release()
-    robot.sleep(0.2)
-
-    def local():
-        return robot.actual.frame_pose("left_hand").to_local(cube.position[None])[0]
-
-    before, began = local(), robot.actual.frame_pose("left_hand").position
-    wanted = robot.angle_vector()
-    wanted[robot.actual.joint_index("arm_left_4_joint")] -= 0.8
-    wanted[robot.actual.joint_index("arm_left_2_joint")] += 0.4
-    robot.angle_vector(wanted, 1.0)
-    robot.wait_interpolation()
-    robot.sleep(0.2)
-    assert np.linalg.norm(robot.actual.frame_pose("left_hand").position - began) > 0.4
-    moved = np.abs(local() - before)
+    swung = SwungCube(nuno.World(device="cpu"))
+    moved = swung.swing()
     assert moved[[0, 2]].max() < 1e-4  # along the fingers
     assert moved[1] < 1.1 * 0.2 * G / (
-        2.0 * robot.balance.dynamics.fingers.limits["left_hand"] / AHEAD
+        2.0 * swung.robot.balance.dynamics.fingers.limits["left_hand"] / AHEAD
     )  # across them, as soft as their motors are
-    assert robot.hands["left_hand"].held == (cube,) and robot.state().fallen is None
-    robot.stop_grasp("larm")
-    robot.sleep(0.2)
-    assert np.linalg.norm(local() - before) > 0.05
+    assert swung.is_held()
+    assert swung.let_go() > 0.05
