@@ -41,13 +41,15 @@ def test_a_membrane_keeps_the_stretch_where_shear_cannot_be_met():
 
 
 newton = pytest.mark.slow  # SolverVBD's kernels take minutes to compile where they are not in Warp's cache
+on_devices = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.cuda)])
 
 
 @newton
-def test_all_kinds_fall_alike():
+@on_devices
+def test_all_kinds_fall_alike(device):
     """Free fall by g t^2 / 2 of cloth, soft and rigid bodies; steps of dt fall short or too far by g t dt / 2."""
     pytest.importorskip("newton")
-    world = nuno.World(device="cpu", engine="newton")
+    world = nuno.World(device=device, engine="newton")
     bodies = [
         world.add(nuno.sheet((0.2, 0.2), (3, 3), name="cloth", position=(0, 0, 2))),
         world.add(nuno.soft_box((0.1, 0.1, 0.1), (1, 1, 1), name="soft", position=(1, 0, 2))),
@@ -66,11 +68,12 @@ def test_all_kinds_fall_alike():
 
 
 @newton
-def test_a_box_slides_down_an_incline_as_coulomb_says():
+@on_devices
+def test_a_box_slides_down_an_incline_as_coulomb_says(device):
     """Closed form a = g (sin - mu cos), within 3 %: contacts of finite stiffness, found anew every substep."""
     pytest.importorskip("newton")
     slope, mu = np.radians(30.0), 0.3
-    world = nuno.World(device="cpu", engine="newton")
+    world = nuno.World(device=device, engine="newton")
     world.add(nuno.box((2.0, 0.6, 0.1), name="ramp", friction=mu).rotate(slope, "y"))
     normal, down = np.array([np.sin(slope), 0, np.cos(slope)]), np.array([np.cos(slope), 0, -np.sin(slope)])
     box = world.add(nuno.box((0.1, 0.1, 0.04), position=0.07 * normal - 0.5 * down).rotate(slope, "y"))
@@ -82,10 +85,11 @@ def test_a_box_slides_down_an_incline_as_coulomb_says():
 
 
 @newton
-def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices():
+@on_devices
+def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices(device):
     """A strip of half the stiffness stretches by twice as much, w L^2 / (2 E t); a grip's vertices are on its path."""
     pytest.importorskip("newton")
-    world = nuno.World(device="cpu", engine="newton")
+    world = nuno.World(device=device, engine="newton")
     strip = world.add(nuno.sheet((0.3, 0.05), (6, 1), name="strip", position=(0, 0, 1)).rotate(0.5 * np.pi, "y"))
     futures = world.imagine(2)
     strip = futures.find("strip")
@@ -106,12 +110,13 @@ def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices():
 
 
 @newton
-def test_attaching_and_detaching_carries_the_state_over():
+@on_devices
+def test_attaching_and_detaching_carries_the_state_over(device):
     """A box that is attached while another falls changes nothing of the other; a detached one stays where it is."""
     pytest.importorskip("newton")
 
     def falling(with_other):
-        world = nuno.World(device="cpu", engine="newton")
+        world = nuno.World(device=device, engine="newton")
         ball = world.attach(world.add(nuno.sphere(0.05, position=(0, 0, 2))))
         box = world.add(nuno.box((0.1, 0.1, 0.1), position=(1, 0, 1)))
         world.run(0.1)
@@ -129,6 +134,32 @@ def test_attaching_and_detaching_carries_the_state_over():
     # coordinates have another origin with the box; SolverVBD reads velocities off floats, and the last digit of half a
     # metre, 6e-8 m in a substep of 0.4 ms, is 0.15 mm/s: 720 of them, at random, make 1 mm in 0.3 s
     assert falling(True) == pytest.approx(falling(False), abs=1e-3)
+
+
+@newton
+def test_a_recorded_frame_copies_nothing_from_the_host(monkeypatch):
+    """CUDA replays a recorded copy from where the host's array was; a box once slid 2 mm instead of 424 by that."""
+    pytest.importorskip("newton")
+    from nuno.engines.newton.newton_substeps import NewtonSubsteps
+
+    recorded, found = [], []
+    go, kept = NewtonSubsteps._go, NewtonSubsteps._kept
+
+    def watched(self, *args):
+        recorded.append(True)
+        go(self, *args)
+        recorded.pop()
+
+    def told(self, name, *args):
+        found.append((name, bool(recorded)))
+        return kept(self, name, *args)
+
+    monkeypatch.setattr(NewtonSubsteps, "_go", watched)
+    monkeypatch.setattr(NewtonSubsteps, "_kept", told)
+    world = nuno.World(device="cpu", engine="newton")
+    world.attach(world.add(nuno.sphere(0.05, position=(0, 0, 2))))
+    world.run(0.05)
+    assert {name for name, _ in found} >= {"drag", "body drag"} and not any(during for _, during in found)
 
 
 @newton

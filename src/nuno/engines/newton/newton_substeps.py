@@ -141,7 +141,7 @@ class NewtonSubsteps:
             self.wrenches_on.assign(self.wrenches)
             if hasattr(self.solver, "body_q_prev"):
                 self.solver.body_q_prev.assign(self.poses)  # else what was put elsewhere would seem to have moved
-        self._bring_tables()
+        self._bring_tables(dt)
         key = (count, round(dt, 9))
         if key not in self._graphs:
             self._go(count, dt)  # compiles, and makes what arrays it needs
@@ -164,8 +164,6 @@ class NewtonSubsteps:
 
     def _go(self, count: int, dt: float) -> None:
         state, after, tables = self.now, self.after, self._tables
-        drags = [(1.0 / (1.0 + rates * dt)).astype(np.float32) for rates in self._drags]
-        slow = self._kept("drag", drags[0], float), self._kept("body drag", drags[1], float)
         for substep in range(count):
             if "indices" in tables:
                 wp.launch(
@@ -182,17 +180,20 @@ class NewtonSubsteps:
             if self.model.particle_count:
                 wp.copy(state.particle_f, self.forces_on)
                 wp.launch(kernels.drag_particles, dim=self.model.particle_count,
-                          inputs=[slow[0], state.particle_qd], device=self.device)  # fmt: skip
+                          inputs=[tables["drag"], state.particle_qd], device=self.device)  # fmt: skip
             if self.model.body_count:
                 wp.copy(state.body_f, self.wrenches_on)
                 wp.launch(kernels.drag_bodies, dim=self.model.body_count,
-                          inputs=[slow[1], state.body_qd], device=self.device)  # fmt: skip
+                          inputs=[tables["body drag"], state.body_qd], device=self.device)  # fmt: skip
             if self.pipeline is not None:
                 self.pipeline.collide(state, self.contacts)
             self.solver.step(state, after, self.control, self.contacts, dt)
             state, after = after, state
 
-    def _bring_tables(self) -> None:
+    def _bring_tables(self, dt: float) -> None:
+        # not while a frame is recorded: CUDA's graph would copy from the host's arrays again in each frame, long gone
+        for name, rates in zip(("drag", "body drag"), self._drags, strict=True):
+            self._kept(name, (1.0 / (1.0 + rates * dt)).astype(np.float32), float)
         if self.leads:
             indices = np.concatenate([index for index, _ in self.leads.values()]).astype(np.int32)
             places = np.concatenate([place for _, place in self.leads.values()], axis=1).astype(np.float32)
