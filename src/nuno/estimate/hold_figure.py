@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.estimate.contact_sheet import BOTH, IMAGINED, REAL
+from nuno.estimate.contact_sheet import compared
 from nuno.estimate.hold_views import hold_masks
 from nuno.mesh.sewn import BACK, FRONT
 
@@ -36,7 +36,7 @@ def hold_figure(result: HoldResult) -> Figure:
         columns = grid[row].subgridspec(1, count)
         for rank, k in enumerate(best):
             axes = figure.add_subplot(columns[rank])
-            axes.imshow(_compared(seen.real.mask, masks[rank])[rows_shown, columns_shown], interpolation="nearest")
+            axes.imshow(compared(seen.real.mask, masks[rank])[rows_shown, columns_shown], interpolation="nearest")
             axes.set(xticks=[], yticks=[])
             axes.set_title(f"{rank + 1}: {100.0 * result.probabilities[k]:.0f} %", fontsize=8)
     layers = (FRONT, BACK) if garment.layers == 2 else (FRONT,)
@@ -73,9 +73,3 @@ def _flat(axes: Axes, result: HoldResult, layer: int) -> None:
 def _box(mask: np.ndarray) -> tuple[slice, slice]:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return slice(max(int(columns[0]) - 4, 0), int(columns[-1]) + 5), slice(max(int(rows[0]) - 4, 0), int(rows[-1]) + 5)
-
-
-def _compared(real: np.ndarray, imagined: np.ndarray) -> np.ndarray:
-    image = np.ones((*real.shape, 3))
-    image[real & ~imagined], image[imagined & ~real], image[real & imagined] = REAL, IMAGINED, BOTH
-    return image
