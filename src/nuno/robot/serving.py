@@ -12,7 +12,7 @@ from nuno.validation import number
 
 
 class Serving(ABC):
-    """What a server of a robot is to the program that made it.
+    """A server of a robot, to the program that made it.
 
     Args:
         robot: The robot.
