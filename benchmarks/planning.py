@@ -73,12 +73,15 @@ def carry_out_planned(task: Task, seed: int, thorough: bool = False) -> dict[str
     return {"planning_s": seconds, "plans": plans, "imagined_s": task.imagined, "cost": imagined, "true_cost": true}
 
 
-def trial(name: str, seed: int, device: str, tasks: dict[str, type[Task]], thorough: bool) -> dict[str, Any]:
+def trial(
+    name: str, seed: int, device: str, tasks: dict[str, type[Task]], thorough: bool, samples: int | None
+) -> dict[str, Any]:
     """Both ways of one seed."""
     row: dict[str, Any] = {"task": name, "seed": seed, "device": device}
     begin, cpu = time.perf_counter(), time.process_time()
     for way in ("fixed", "planned"):
-        task = tasks[name](seed, device)
+        task: Any = tasks[name](seed, device)
+        task.samples = samples or task.samples
         try:
             if way == "fixed":
                 carry_out_fixed(task)
@@ -178,6 +181,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--tasks", nargs="+", help="all of these hands' when left out")
     options.add_argument("--hands", default="points", choices=("points", "talos", "dynamic"))
+    options.add_argument("--samples", type=int, help="futures of an iteration; 24, 12 of the pull, 6 of dynamic hands")
     options.add_argument("--rough", action="store_true", help="arms: imagine fast frames once")
     options.add_argument("--seeds", nargs=2, type=int, default=(0, 20), metavar=("FIRST", "END"))
     options.add_argument("--device", default="cpu")
@@ -209,7 +213,7 @@ def main() -> None:
     # seed by seed, so that a run that is cut short has as many of each task
     wanted = [(name, seed) for seed in range(*asked.seeds) for name in names if (name, seed) not in done]
     for name, seed in tqdm(wanted, unit="trial"):
-        rows.append(trial(name, seed, device, tasks, thorough))
+        rows.append(trial(name, seed, device, tasks, thorough, asked.samples))
         if asked.json:
             asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print_table(rows)
