@@ -49,7 +49,10 @@ def begin() -> tuple[nuno.SimulatedRobot, nuno.Body]:
         )
     )  # fmt: skip
     world.attach(towel, nuno.Cloth.preset("towel"))
-    kept = world.grip(towel, [held_vertex(robot, towel)], to=tips)
+    low, high = robot.hands["left_hand"].volume()
+    local = pose.to_local(towel.vertices)
+    between = np.flatnonzero(((local >= low) & (local <= high)).all(axis=1))
+    kept = world.grip(towel, between, to=towel.vertices[between].mean(axis=0))
     if robot.start_grasp("larm") != [True]:
         raise RuntimeError("the fingers hold nothing")
     kept.release()
