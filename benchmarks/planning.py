@@ -14,8 +14,10 @@ robot. What the last plan of a seed cost in imagination stands beside what it co
 fast frames once (``thorough=False``), as hands that are points always do here.
 
 The third imagines futures of 1 s of a sheet of 20 x 20 cells that two hands fold, through ``nuno.plan`` with one
-iteration: rollouts a second, and plans a second, medians. The first plan of a row, which compiles kernels where that
-was not done, stands by itself. On CUDA only ``nuno.plans.run_double_blocks_partly`` takes long to compile.
+iteration: rollouts a second, plans a second, and what of a plan is imagining the batch, setting it on its way,
+simulating and scoring, medians. The first plan of a row, which compiles kernels where that was not done, stands by
+itself. On CUDA ``nuno.plans.run_blocks_many`` (up to 158 rollouts ``run_blocks_shared``) takes long to compile.
+``--thorough`` imagines with doubles, and fast frames twice.
 """
 
 from __future__ import annotations
@@ -29,7 +31,6 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from arm_tasks import ARM_TASKS, DYNAMIC_TASKS
 from planning_tasks import TASKS, Task
 from tqdm import tqdm
 
@@ -72,12 +73,15 @@ def carry_out_planned(task: Task, seed: int, thorough: bool = False) -> dict[str
     return {"planning_s": seconds, "plans": plans, "imagined_s": task.imagined, "cost": imagined, "true_cost": true}
 
 
-def trial(name: str, seed: int, device: str, tasks: dict[str, type[Task]], thorough: bool) -> dict[str, Any]:
+def trial(
+    name: str, seed: int, device: str, tasks: dict[str, type[Task]], thorough: bool, samples: int | None
+) -> dict[str, Any]:
     """Both ways of one seed."""
     row: dict[str, Any] = {"task": name, "seed": seed, "device": device}
     begin, cpu = time.perf_counter(), time.process_time()
     for way in ("fixed", "planned"):
-        task = tasks[name](seed, device)
+        task: Any = tasks[name](seed, device)
+        task.samples = samples or task.samples
         try:
             if way == "fixed":
                 carry_out_fixed(task)
@@ -92,7 +96,7 @@ def trial(name: str, seed: int, device: str, tasks: dict[str, type[Task]], thoro
     return row
 
 
-def measure_rate(rollouts: int, device: str, plans: int, side: float) -> dict[str, Any]:
+def measure_rate(rollouts: int, device: str, plans: int, side: float, thorough: bool) -> dict[str, Any]:
     """Futures of 1 s of a sheet of 20 x 20 cells, whose far corners two hands lay onto its near ones, in one batch."""
     world = nuno.World(device=device)
     world.add(nuno.box((2.0, 2.0, 0.02), name="table", position=(0.0, 0.0, -0.01)))
@@ -101,30 +105,38 @@ def measure_rate(rollouts: int, device: str, plans: int, side: float) -> dict[st
     near, far = np.array([0, 20]), np.array([20 * 21, 21 * 21 - 1])
     goal, begin = (cloth.vertices[k].astype(float).ravel() for k in (near, far))
 
+    instants = []
+
     def act(futures: nuno.World, knots: np.ndarray) -> None:
+        instants.append(time.perf_counter())
         motion = nuno.Knots(begin, knots, 1.0)
         for k, vertex in enumerate(far):
             futures.grip("cloth", np.array([vertex]), to=motion.path(futures.time, slice(3 * k, 3 * k + 3)))
+        instants.append(time.perf_counter())
 
     def cost(futures: nuno.World) -> np.ndarray:
+        instants.append(time.perf_counter())
         return np.linalg.norm(futures.find("cloth").vertices[:, far].reshape(-1, 6) - goal, axis=1)
 
     up = np.tile((0.0, 0.0, 0.4 * side), 2)
     start = np.stack([begin + 0.3 * (goal - begin) + up, begin + 0.7 * (goal - begin) + up, goal + 0.02 * up])
-    took, cpu = [], []
+    took, cpu, parts = [], [], []
     for k in range(plans + 1):
         clock, core = time.perf_counter(), time.process_time()
+        instants[:] = [clock]
         nuno.plan(
             world, act, cost, start=start, spread=0.05 * side, horizon=1.0, samples=rollouts, iterations=1, seed=k,
-            bounds=(-1.0, 1.0), thorough=False,
+            bounds=(-1.0, 1.0), thorough=thorough,
         )  # fmt: skip
+        parts.append(np.diff([*instants, time.perf_counter()]))
         took.append(time.perf_counter() - clock)
         cpu.append(time.process_time() - core)
     best = float(np.median(took[1:]))
     return {
         "rollouts": rollouts, "device": wp.get_device(device).name, "side": side,
         "substeps": cloth.resolution.substeps, "first_s": took[0], "plan_s": best, "rollouts_per_s": rollouts / best,
-        "plans_per_s": 1.0 / best, "cpu_s": float(np.median(cpu[1:])),
+        "plans_per_s": 1.0 / best, "cpu_s": float(np.median(cpu[1:])), "thorough": thorough,
+        "parts_s": np.median(parts[1:], axis=0).tolist(),
     }  # fmt: skip
 
 
@@ -148,13 +160,17 @@ def print_rates(device: str, rollouts: list[int], asked: argparse.Namespace) -> 
     """Measure and print rates, row by row."""
     rows = []
     print(f"{wp.get_device(device).name}, a sheet of {asked.side:g} m with 20 x 20 cells")
-    print("| rollouts of 1 s | substeps | first plan, s | a plan, s | CPU s | rollouts a second | plans a second |")
-    print("|---|---|---|---|---|---|---|", flush=True)
+    print(
+        "| rollouts of 1 s | substeps | first plan, s | a plan, s | of it: imagine, act, simulate, score, ms | CPU s | "
+        "rollouts a second | plans a second |"
+    )
+    print("|---|---|---|---|---|---|---|---|", flush=True)
     for count in rollouts:
-        row = measure_rate(count, device, asked.plans, asked.side)
+        row = measure_rate(count, device, asked.plans, asked.side, asked.thorough)
         rows.append(row)
         print(
-            f"| {count:,} | {row['substeps']} | {row['first_s']:.2f} | {row['plan_s']:.3f} | {row['cpu_s']:.2f} | "
+            f"| {count:,} | {row['substeps']} | {row['first_s']:.2f} | {row['plan_s']:.3f} | "
+            f"{', '.join(f'{1000.0 * part:.0f}' for part in row['parts_s'])} | {row['cpu_s']:.2f} | "
             f"{row['rollouts_per_s']:,.1f} | {row['plans_per_s']:.2f} |", flush=True,
         )  # fmt: skip
         if asked.json:
@@ -165,6 +181,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--tasks", nargs="+", help="all of these hands' when left out")
     options.add_argument("--hands", default="points", choices=("points", "talos", "dynamic"))
+    options.add_argument("--samples", type=int, help="futures of an iteration; 24, 12 of the pull, 6 of dynamic hands")
     options.add_argument("--rough", action="store_true", help="arms: imagine fast frames once")
     options.add_argument("--seeds", nargs=2, type=int, default=(0, 20), metavar=("FIRST", "END"))
     options.add_argument("--device", default="cpu")
@@ -172,6 +189,7 @@ def main() -> None:
     options.add_argument("--rate", action="store_true", help="measure rollouts a second instead")
     options.add_argument("--rollouts", nargs="+", type=int)
     options.add_argument("--plans", type=int, default=5, help="timed plans of a row of --rate")
+    options.add_argument("--thorough", action="store_true", help="--rate: imagine with doubles, fast frames twice")
     options.add_argument("--side", type=float, default=0.6, help="of the sheet of --rate [m]")
     asked = options.parse_args()
     logging.getLogger("nuno").setLevel(logging.ERROR)
@@ -182,7 +200,11 @@ def main() -> None:
         return
     if asked.json and asked.json.exists():
         rows = json.loads(asked.json.read_text(encoding="utf-8"))
-    tasks = {"points": TASKS, "talos": ARM_TASKS, "dynamic": DYNAMIC_TASKS}[asked.hands]
+    tasks = TASKS
+    if asked.hands != "points":
+        from arm_tasks import ARM_TASKS, DYNAMIC_TASKS  # which need a robot's model
+
+        tasks = ARM_TASKS if asked.hands == "talos" else DYNAMIC_TASKS
     names = asked.tasks or list(tasks)
     if unknown := set(names) - set(tasks):
         options.error(f"--tasks must be among {list(tasks)} with these hands, got {sorted(unknown)}")
@@ -191,7 +213,7 @@ def main() -> None:
     # seed by seed, so that a run that is cut short has as many of each task
     wanted = [(name, seed) for seed in range(*asked.seeds) for name in names if (name, seed) not in done]
     for name, seed in tqdm(wanted, unit="trial"):
-        rows.append(trial(name, seed, device, tasks, thorough))
+        rows.append(trial(name, seed, device, tasks, thorough, asked.samples))
         if asked.json:
             asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print_table(rows)

@@ -13,9 +13,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.validation import checked, count, finite_array, flag
+from nuno.validation import checked, count, finite_array, flag, index_array
 
 Value = Any  # a number, or an array (worlds,), (elements,) or (worlds, elements)
 Directed = Any  # a Value for all directions, or a tuple (warp, weft) of two
@@ -82,14 +83,19 @@ class Material:
         return result
 
     @checked
-    def of_world(self, world: int, world_count: int) -> Self:
-        """Return the material of one world of a batch of ``world_count``."""
+    def of_world(self, world: ArrayLike, world_count: int) -> Self:
+        """Return the material of one world of a batch of ``world_count``, or of a batch of some, (k,).
+
+        Raises:
+            InvalidInputError: no whole numbers, or worlds that there are not.
+        """
+        own = index_array("world", world, (), ("k",), low=0, high=world_count)
 
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
                 return tuple(pick(part) for part in value)
             if isinstance(value, np.ndarray) and value.shape[0] == world_count and world_count > 1:
-                return value[world]
+                return value[own]
             return value[0] if isinstance(value, np.ndarray) and value.ndim == 2 else value
 
         return replace(

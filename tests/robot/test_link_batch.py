@@ -26,6 +26,8 @@ def test_shapes_are_where_each_robot_has_them(still_talos):
     together = links.poses_at(np.array(axes), np.array(origins), np.array(angles))
     for k in range(2):
         np.testing.assert_array_equal(together[k], [own[k] for own in alone])
+        some = links.poses_at(np.array(axes), np.array(origins), np.array(angles), np.array([7, 2]))
+        np.testing.assert_array_equal(some[k], together[k][:, [7, 2]])
 
 
 @pytest.mark.long

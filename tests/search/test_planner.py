@@ -136,3 +136,29 @@ def test_a_plan_of_fast_cloth_that_is_imagined_roughly_is_told_once(caplog):
     assert planned(6.0, False, world)[0] == 0
     assert planned(0.2, False)[0] == 0
     assert planned(6.0, True)[0] == 0
+
+
+def test_a_plan_that_is_imagined_roughly_has_floats():
+    """A sheet with substeps by the rule, fewer than 25 a frame: floats in imagination, and doubles with thorough.
+
+    Floats have no more than 24 bits of their own, so what is read of them relative to the origin is a float to the bit.
+    """
+    world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0))
+    sheet = world.add(nuno.sheet((0.1, 0.1), cells=(3, 3), name="towel"))
+    world.attach(sheet)
+    assert sheet.resolution.substeps * 60 < 1500
+    for thorough in (False, True):
+        found = []
+
+        def act(futures, knots):
+            start = futures.find("towel").vertices[:, 0]
+            ways = np.stack([start, start + knots[:, 0] / 3.0], axis=1)
+            futures.grip("towel", [0], to=nuno.Path(futures.time + np.array([0.0, 0.1]), ways))
+
+        def cost(futures, found=found):
+            found.append(futures.find("towel").vertices)
+            return np.zeros(2)
+
+        nuno.plan(world, act, cost, start=[[0.01, 0.0, 0.02]], spread=0.01, horizon=0.1, samples=2, iterations=1,
+                  thorough=thorough)  # fmt: skip
+        assert np.array_equal(found[0], found[0].astype(np.float32)) is not thorough

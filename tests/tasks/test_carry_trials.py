@@ -78,6 +78,24 @@ def test_a_trial_is_what_it_is_alone(plan):
 
 
 @pytest.mark.long
+def test_trials_that_failed_are_dropped_and_the_others_go_on_to_the_bit(plan):
+    """Hands behind the mats' middles lose four of six in the first half second: what comes of all is the same."""
+    walks = np.array([0, 1, 0, 1, 0, 1])
+    offsets = np.array([[-0.15, 0.0], [0.12, 0.0], [-0.15, 0.1], [-0.15, 0.1], [0.1, 0.0], [-0.2, 0.0]])
+    found = []
+    for drops in (False, True):
+        found.append(carry(make_room(plan, "cpu").imagine(6), plan, walks, offsets, drops=drops))
+    whole, dropped = found
+    assert whole.reason == dropped.reason and sum(reason != "" for reason in whole.reason) == 4
+    for name in ("value", "failed_at"):
+        np.testing.assert_array_equal(getattr(dropped, name), getattr(whole, name))
+    left = np.flatnonzero(np.isnan(dropped.middle[-1, :, 0]))
+    assert len(left) == 4 and not np.isnan(whole.failed_at[left]).any()
+    seen = ~np.isnan(dropped.middle)
+    np.testing.assert_array_equal(dropped.middle[seen], whole.middle[seen])
+
+
+@pytest.mark.long
 def test_the_arms_bear_the_weight(plan):
     """Statics: at rest what the arms do to the mat is its weight, within 1 % (as in the tests of contact forces)."""
     futures = make_room(plan, "cpu").imagine(2)

@@ -335,3 +335,29 @@ def test_a_push_moves_in_time_with_its_snapshot():
     world.run(1.0)
     # 1 N on 1 kg for 0.2 s; a push that had ended would leave it at rest
     np.testing.assert_allclose(brick.velocity, (0.2, 0.0, 0.0), atol=1e-5)
+
+
+def test_some_worlds_of_a_batch_go_on_as_in_it():
+    """Two of three worlds with other materials, grips, paths and friction, as a batch: the same bits 0.2 s later."""
+    world = nuno.World(device="cpu", substeps=7)
+    table = world.add(nuno.box((1, 1, 0.02), name="table"))
+    world.add(nuno.sheet((0.3, 0.2), cells=(3, 2), name="towel", position=(0, 0, 0.1)))
+    futures = world.imagine(3)
+    futures.attach("towel", Cloth(bending_rigidity=(1e-5, 2e-5), stretch_stiffness=np.array([500.0, 1000.0, 2000.0])))
+    lift = np.array([[(0, 0, 0), (0, 0, 0.05 * k)] for k in range(3)])
+    futures.move("table", Path([0.0, 0.4], 0.2 * lift))
+    start = futures.find("towel").vertices[:, 0]
+    futures.grip("towel", 0, to=Path([0.0, 0.4], start[:, None] + lift))
+    futures.set_friction("towel", "table", np.array([0.1, 0.5, 0.9]))
+    futures.run(0.2)
+    some = nuno.World(device="cpu")
+    some.restore(futures.save().pick([2, 0]))
+    assert some.world_count == 2
+    for batch in (futures, some):
+        batch.run(0.2)
+    for name in ("vertices", "velocities"):
+        np.testing.assert_array_equal(getattr(some.find("towel"), name), getattr(futures.find("towel"), name)[[2, 0]])
+    np.testing.assert_array_equal(some.find(table.name).position, futures.find(table.name).position[[2, 0]])
+    for wrong in ([1], [0, 3], [0.0, 1.0], 3, True, "all"):
+        with pytest.raises(InvalidInputError):
+            futures.save().pick(wrong)

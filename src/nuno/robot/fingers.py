@@ -138,6 +138,8 @@ class FingerBodies:
         """
         if not self._moved:
             return offsets
+        if angles.ndim > 1 and (angles[:, self._joints] == angles[0, self._joints]).all():
+            angles = angles[0]  # in all worlds alike
         if angles.ndim > 1:
             all_moved = np.repeat(offsets[None], len(angles), axis=0)
             slides = np.stack([finger.slide(angles) for finger in self._moved], axis=-1)

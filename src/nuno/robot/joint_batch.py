@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nuno.robot.simulated_joints import ROUNDING, SimulatedJoints
+from nuno.robot.simulated_joints import SimulatedJoints, limited
+from nuno.robot.trajectory import evaluate
 
 
 class JointBatch:
@@ -28,8 +29,7 @@ class JointBatch:
     def __init__(self, joints: Sequence[SimulatedJoints]) -> None:
         self._joints = tuple(joints)
         first = self._joints[0]
-        self._lower, self._upper = first.limits
-        self._speeds = first.velocity_limits
+        self._limits, self._speeds = first.limits, first.velocity_limits
         n, m = len(self._joints), len(first.positions)
         self.clock, self._next_event, self._busy = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
         self.motion, self.desired = np.zeros((3, n, m)), np.zeros((3, n, m))
@@ -65,12 +65,10 @@ class JointBatch:
         rests = ~self._busy & (self.desired[0] == now[0]).all(axis=1) & ~now[1].any(axis=1)
         if duration <= 0.0 or rests.all():
             return now, self.desired, rests
-        t = (self.clock + duration)[:, None] - self._begin
-        desired = self._polynomials[5].copy()
-        for coefficients in self._polynomials[4::-1]:
-            desired *= t
-            desired += coefficients
-        actual = self._limited(desired, duration)
+        wanted = evaluate(self._polynomials, (self.clock + duration)[:, None] - self._begin)
+        reached = limited(wanted, (now[0], now[1], now[2]), duration, self._speeds, self._limits)
+        desired = np.array(wanted)
+        actual = desired if reached is wanted else np.array(reached)
         if rests.any():
             actual, desired = (
                 np.where(rests[:, None], *pair) for pair in ((now, actual), (self.desired, desired))
@@ -82,18 +80,3 @@ class JointBatch:
         self.clock[who] += duration
         self.motion = np.where(who[:, None], motion, self.motion)
         self.desired = np.where(who[:, None], desired, self.desired)
-
-    def _limited(self, desired: np.ndarray, duration: float) -> np.ndarray:
-        positions, velocities, _ = desired
-        now, speeds_now = self.motion[:2]
-        far = self._speeds * (duration * ROUNDING)
-        change = positions - now
-        held = (
-            (np.abs(change) > far) | (np.abs(velocities) * duration > far)
-            | (positions < self._lower) | (positions > self._upper)
-        )  # fmt: skip
-        if not held.any():
-            return desired
-        reached = np.clip(now + np.clip(change, -far, far), self._lower, self._upper)
-        speed = (reached - now) / duration
-        return np.where(held, np.stack([reached, speed, (speed - speeds_now) / duration]), desired)

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.robot.pinocchio import pin
-from nuno.robot.spatial_arrays import placement_arrays
+from nuno.robot.joint_placements import JointPlacements
+from nuno.shapes.coordinates import Pose
 from nuno.tables.path_batch import KinematicGroup
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.robot.links import Links
     from nuno.world.world import World
+
+
+TOGETHER = 256
+"""Postures whose links are worked out at once: fewer take longer each, and many more no longer fit caches."""
 
 
 class LinkBatch:
@@ -31,9 +35,17 @@ class LinkBatch:
     def __init__(self, links: Links, world: World, bodies: Sequence[Body]) -> None:
         self._links, self._world, self._bodies = links, world, bodies
         self._group = KinematicGroup(tuple(body.key for body in bodies))
-        self._model = links.robot.model
-        self._data = self._model.createData()
-        self._axes, self._origins = placement_arrays(self._data.oMi.tolist())
+        model = links.robot.model
+        self._placements = JointPlacements(model, model.createData())
+        # on which numbers of a configuration it depends where a link is, (links, nq)
+        columns = [np.arange(own.idx_q, own.idx_q + own.nq) for own in model.joints.tolist()[1:]]
+        self._depends = np.zeros((len(bodies), model.nq), dtype=bool)
+        for k, joint in enumerate(links.joints):
+            for above in model.supports[joint].tolist()[1:]:
+                self._depends[k, columns[above - 1]] = True
+        fingers = links.finger_bodies
+        for finger, own in zip(fingers.fingers, fingers.bodies, strict=True):
+            self._depends[own, columns[finger.row + 1][0]] = True
 
     def lead(self, start: float, ends: np.ndarray, configurations: np.ndarray, angles: np.ndarray) -> None:
         """Send the links to where the robots are at the ends of frames, on a path for each world.
@@ -54,25 +66,29 @@ class LinkBatch:
             if number == len(firsts):
                 firsts.append(k)
             which.append(number)
-        configurations, angles = (part.reshape(frames * worlds, -1)[firsts] for part in (configurations, angles))
-        parts = []
-        for k in range(0, len(firsts), worlds):
-            parts.append(self._poses(configurations[k : k + worlds], angles[k : k + worlds]))
-        aims = [np.concatenate(part) for part in zip(*parts, strict=True)]
+        configurations, angles = (part.reshape(frames * worlds, -1) for part in (configurations, angles))
+        if len(firsts) < len(which):
+            configurations, angles = configurations[firsts], angles[firsts]
+        # where links that nothing moves are is worked out once for all
+        moving = (self._depends & (configurations != configurations[0]).any(axis=0)).any(axis=1)
+        still = self._poses(configurations[:1], angles[:1], np.flatnonzero(~moving))
+        moved = self._poses(configurations, angles, np.flatnonzero(moving))
         begins = self._group.arrived(self._bodies, start, (worlds,) if worlds > 1 else ())
         keys = []
-        for begin, aim in zip(begins, aims, strict=True):
-            every = np.empty((count, worlds, frames + 1, aim.shape[-1]))
-            every[:, :, 0] = begin.reshape(count, -1, aim.shape[-1])
-            found = aim if len(firsts) == len(which) else aim[which]
-            every[:, :, 1:] = found.reshape(frames, worlds, count, -1).transpose(2, 1, 0, 3)
+        for begin, *aims in zip(begins, still, moved, strict=True):
+            every = np.empty((count, worlds, frames + 1, begin.shape[-1]))
+            every[:, :, 0] = begin.reshape(count, -1, begin.shape[-1])
+            every[~moving, :, 1:] = aims[0].transpose(1, 0, 2)[:, :, None]
+            found = aims[1] if len(firsts) == len(which) else aims[1][which]
+            every[moving, :, 1:] = found.reshape(frames, worlds, *found.shape[1:]).transpose(2, 1, 0, 3)
             keys.append(every if worlds > 1 else every[:, 0])
         self._group.lead(self._bodies, self._world, np.array([start, *ends]), keys[0], keys[1])
 
-    def _poses(self, configurations: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where the links are in n configurations: (n, links, 3) [m] and (n, links, 4)."""
-        axes, origins = (np.empty((len(angles), *part.shape)) for part in (self._axes, self._origins))
-        for k, q in enumerate(configurations):
-            pin.forwardKinematics(self._model, self._data, q)
-            axes[k], origins[k] = self._axes, self._origins
-        return self._links.poses_at(axes, origins, angles)
+    def _poses(self, configurations: np.ndarray, angles: np.ndarray, links: np.ndarray) -> Pose:
+        """Return where some links are in n configurations: (n, links, 3) [m] and (n, links, 4)."""
+        found = np.empty((len(angles), len(links), 3)), np.empty((len(angles), len(links), 4))
+        for k in range(0, len(angles) if len(links) else 0, TOGETHER):
+            part = slice(k, k + TOGETHER)
+            axes, origins = self._placements.at(configurations[part])
+            found[0][part], found[1][part] = self._links.poses_at(axes, origins, angles[part], links)
+        return found

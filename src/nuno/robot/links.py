@@ -73,7 +73,6 @@ class Links:
         self._turns = np.array([own.quaternion for own in shapes]).reshape(-1, 4)
         # by which the quaternion of its joint is multiplied for that of a shape
         self._turned_by = np.stack([quat.multiply(row, self._turns) for row in np.eye(4)], axis=2)
-        self._turned_by_all = self._turned_by  # the same for each world of a batch, one after the other
         self._placements = robot.data.oMi.tolist()
         self._joint_axes, self._joint_places = placement_arrays(self._placements)
         self._inside = True
@@ -96,40 +95,33 @@ class Links:
         self.robot.update()
         joints, offsets = self._rows, self.finger_bodies.offset(self._offsets, self.robot.angle_vector())
         turns = np.concatenate([pin.SE3ToXYZQUAT(own) for own in self._placements]).reshape(-1, 7)[:, [6, 3, 4, 5]]
-        return self._placed(
-            self._joint_axes[joints], self._joint_places[joints], turns[joints], offsets, self._turned_by
-        )
+        places = _placed(self._joint_axes[joints], self._joint_places[joints], offsets)
+        return places, np.einsum("kij,kj->ki", self._turned_by, turns[joints])
 
-    def poses_at(self, axes: np.ndarray, origins: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def poses_at(
+        self, axes: np.ndarray, origins: np.ndarray, angles: np.ndarray, which: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return where the shapes of robots of this model are whose joints are elsewhere, as ``poses`` does to the bit.
 
         Args:
             axes: (worlds, joints, 3, 3), rotation matrices of Pinocchio's joints.
             origins: (worlds, joints, 3) [m], where they are.
             angles: (worlds, dof) of the joints.
+            which: (n,) int, the shapes that are asked for; None is all.
 
         Returns:
             Positions (worlds, n, 3) [m] and quaternions (worlds, n, 4).
         """
-        worlds, joints = len(axes), self._rows
-        if len(self._turned_by_all) < worlds * len(joints):
-            self._turned_by_all = np.tile(self._turned_by, (worlds, 1, 1))
-        offsets = np.broadcast_to(self.finger_bodies.offset(self._offsets, angles), (worlds, len(joints), 3))
+        which = np.arange(len(self._rows)) if which is None else which
+        shape = len(axes), len(which)
+        carriers, joints = np.unique(self._rows[which], return_inverse=True)
+        offsets = np.broadcast_to(self.finger_bodies.offset(self._offsets, angles)[..., which, :], (*shape, 3))
         # one long list, of matrices that lie column by column as Pinocchio's do: einsum rounds others in another way
-        by_column, own_origins, turns = (
-            part[:, joints].reshape(-1, *part.shape[2:])
-            for part in (np.swapaxes(axes, -1, -2), origins, quaternions_of(axes)[..., [3, 0, 1, 2]])
-        )
-        own_axes = np.swapaxes(np.ascontiguousarray(by_column), -1, -2)
-        turned_by = self._turned_by_all[: len(own_origins)]
-        places, turned = self._placed(own_axes, own_origins, turns, offsets.reshape(-1, 3), turned_by)
-        return places.reshape(worlds, -1, 3), turned.reshape(worlds, -1, 4)
-
-    def _placed(
-        self, axes: np.ndarray, origins: np.ndarray, turns: np.ndarray, offsets: np.ndarray, turned_by: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return where shapes are whose joints are there: (k, 3) [m] and quaternions (k, 4)."""
-        return origins + np.einsum("kij,kj->ki", axes, offsets), np.einsum("kij,kj->ki", turned_by, turns)
+        by_column = axes.swapaxes(-1, -2)[:, self._rows[which]].reshape(-1, 3, 3)
+        turns = quaternions_of(axes[:, carriers])[..., [3, 0, 1, 2]][:, joints]
+        own_origins = origins[:, self._rows[which]].reshape(-1, 3)
+        places = _placed(by_column.swapaxes(-1, -2), own_origins, offsets.reshape(-1, 3))
+        return places.reshape(*shape, 3), np.einsum("kij,...kj->...ki", self._turned_by[which], turns)
 
     def follow(self, seconds: float) -> None:
         """Let the bodies move from where they are to where the robot is now, in ``seconds`` [s] from the world's time.
@@ -183,3 +175,8 @@ class Links:
         missing = [body.name for body in self.bodies if body._world is not self.world]
         if missing:
             raise BodyStateError(f"{len(missing)} links are no longer in the world, the first is {missing[0]!r}")
+
+
+def _placed(axes: np.ndarray, origins: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Return where shapes are (k, 3) [m] whose joints are there."""
+    return origins + np.einsum("kij,kj->ki", axes, offsets)

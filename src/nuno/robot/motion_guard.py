@@ -11,10 +11,9 @@ import numpy as np
 from nuno.errors import InvalidInputError
 from nuno.robot.coal_shapes import LinkHulls
 from nuno.robot.collision import Collision
+from nuno.robot.joint_placements import JointPlacements
 from nuno.robot.link_sweep import Inside, Sweep, first_entry, spare_way
-from nuno.robot.pinocchio import pin
 from nuno.robot.running_walk import RunningWalk
-from nuno.robot.spatial_arrays import placement_arrays
 from nuno.robot.static_shapes import StaticShapes
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ class MotionGuard:
         self._links, self._robot, self._of = links, links.robot, of
         self._world = links.world if world is None else world
         self._made: tuple[LinkHulls, StaticShapes] | None = None
-        self._placements: Any = None
+        self._placements: JointPlacements | None = None
         self._reported: set[tuple[str, str]] = set() if of is None else of._reported
         self._key: Any = None
         self._rests_since = -1  # the commands when nothing was left to do of them
@@ -308,13 +307,9 @@ class MotionGuard:
     def _sweep(self, motion: WantedMotion, clock: np.ndarray, angles: np.ndarray, base: np.ndarray) -> Sweep:
         """Return the links along angles (k, n) and poses of the base (k, 7) at times of the world's clock (k,)."""
         robot, data = motion.robot, motion.robot.scratch
-        if self._placements is None or self._placements[0] is not data:
-            self._placements = (data, *placement_arrays(data.oMi.tolist()))
-        axes, places = (np.empty((len(angles), *part.shape)) for part in self._placements[1:])
-        for k, (own, pose) in enumerate(zip(angles, base, strict=True)):
-            pin.forwardKinematics(robot.model, data, robot.configuration_of(own, pose))
-            axes[k], places[k] = self._placements[1:]
-        return Sweep(self._tools()[0], clock, axes, places)
+        if self._placements is None or self._placements.data is not data:
+            self._placements = JointPlacements(robot.model, data)
+        return Sweep(self._tools()[0], clock, *self._placements.at(robot.configuration_of(angles, base)))
 
     def _first(self, sweep: Sweep) -> Collision | None:
         hulls, shapes = self._tools()

@@ -133,7 +133,7 @@ class SimulatedJoints:
             if controller.advance(time):
                 self._follow(name)
         desired = evaluate(self._polynomials, time - self._begin)
-        actual = self._limited(desired, duration)
+        actual = limited(desired, motion, duration, self.velocity_limits, self.limits)
         if rows is not None and given is not None:
             desired, actual = _with(desired, rows, given), _with(actual, rows, given)
         self._pending = (time, desired, actual)
@@ -210,23 +210,31 @@ class SimulatedJoints:
         self._polynomials[:, :, rows] = with_derivatives(piece.coefficients)
         self._begin[rows] = piece.start
 
-    def _limited(self, desired: Motion, duration: float) -> Motion:
-        positions, velocities, accelerations = desired
-        far = self.velocity_limits * (duration * ROUNDING)
-        change = positions - self.positions
-        lower, upper = self.limits
-        held = (
-            (np.abs(change) > far) | (np.abs(velocities) * duration > far) | (positions < lower) | (positions > upper)
-        )
-        if not held.any():
-            return desired
-        reached = np.clip(self.positions + np.clip(change, -far, far), lower, upper)
-        speed = (reached - self.positions) / duration
-        return (
-            np.where(held, reached, positions),
-            np.where(held, speed, velocities),
-            np.where(held, (speed - self.velocities) / duration, accelerations),
-        )
+
+def limited(desired: Motion, now: Motion, duration: float, speeds: np.ndarray, limits: Any) -> Motion:
+    """Return the motion that joints have ``duration`` [s] later, which are wanted to have another.
+
+    Args:
+        desired: Positions, velocities and accelerations that are wanted, (n,) each, or (copies, n).
+        now: Those of now.
+        duration: [s].
+        speeds: (n,) [rad/s; m/s], the greatest.
+        limits: The lowest and the highest positions, (n,) each.
+    """
+    positions, velocities, accelerations = desired
+    far = speeds * (duration * ROUNDING)
+    change = positions - now[0]
+    lower, upper = limits
+    held = (np.abs(change) > far) | (np.abs(velocities) * duration > far) | (positions < lower) | (positions > upper)
+    if not held.any():
+        return desired
+    reached = np.clip(now[0] + np.clip(change, -far, far), lower, upper)
+    speed = (reached - now[0]) / duration
+    return (
+        np.where(held, reached, positions),
+        np.where(held, speed, velocities),
+        np.where(held, (speed - now[1]) / duration, accelerations),
+    )
 
 
 def _with(motion: Motion, rows: np.ndarray, given: Motion) -> Motion:

@@ -86,12 +86,12 @@ class Knots:
         count = max(1, int(np.ceil(min(self.seconds / span, 1e6) - 1e-9)))
         times = np.linspace(0.0, self.seconds, count + 1)
         try:
-            places = self.at(times)[..., columns]  # type: ignore[index]
+            now, values = (part[..., columns] for part in (self.now, self.values))  # type: ignore[index]
         except (IndexError, TypeError, ValueError):
-            places = times
-        if places.shape[-1] != 3 or places.ndim != self.values.ndim:
+            now = values = times
+        if values.shape[-1] != 3 or values.ndim != self.values.ndim:
             raise InvalidInputError(f"columns must choose 3 of {self.now.shape[-1]} numbers, got {columns!r}")
-        return Path(t0 + times, places)
+        return Path(t0 + times, Knots(now, values, self.seconds).at(times))
 
     @checked
     def later(self, seconds: float, *, shrink: bool = False) -> Knots:

@@ -50,6 +50,10 @@ class DoublePositions:
         """One of the doubles' arrays."""
         return getattr(self._made(), name)
 
+    def begin_at(self, rate: float) -> None:
+        """Let doubles count from so many substeps a second [1/s] on, or from where they did if that is more."""
+        self._rate = max(self._rate, rate)
+
     def bring(self, run: Settings) -> Any:
         """The state with doubles that count from now on, or None where a run has so few substeps that floats do."""
         if self._solver.frame_rate * run.frame < self._rate:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.bodies.body import Body
 from nuno.bodies.make_bodies import plane
-from nuno.errors import InvalidInputError
+from nuno.errors import InvalidInputError, SimulationDiverged
 from nuno.materials import Cloth, Material
 from nuno.shapes import quaternion as quat
 from nuno.shapes.path import Path, minimum_jerk
 from nuno.shapes.shape import Box, Shape
 from nuno.tasks.arm_tracks import FRAME_RATE, ArmTracks
 from nuno.world.world import World
+
+if TYPE_CHECKING:
+    from nuno.tasks.mat_sight import MatSight
 
 CHUNK = 30
 """Frames for which the arms' poses are handed over at once: what one run of the solver takes."""
@@ -31,6 +34,8 @@ LOST = 0.3
 """[s] How long an arm must be without the mat for that to be a failure: longer than a hop of the mat."""
 FALLEN = 0.25
 """[m] How much nearer to the floor the mat's middle is than when it was laid down, for that to be a failure."""
+FEWER = 0.75
+"""Share of the worlds of a batch up to which it is made smaller where the others have failed."""
 CALM = 6.0
 """[1/s] Air drag while the mat is laid down, as if by hand: it is not still bouncing when the walk begins."""
 
@@ -95,7 +100,7 @@ class CarryTrials:
         """Return "value", "failed_at" and "reason" of trials with "arm_distance", "offset_x" and "offset_y"."""
         apart = np.abs(np.asarray(params["arm_distance"])[:, None] - self.plan.distances)
         offsets = np.stack([params["offset_x"], params["offset_y"]], axis=-1)
-        found = carry(world, self.plan, apart.argmin(axis=1), offsets)
+        found = carry(world, self.plan, apart.argmin(axis=1), offsets, drops=True)
         return {"value": found.value, "failed_at": found.failed_at, "reason": np.array(found.reason)}
 
 
@@ -112,7 +117,7 @@ def make_room(plan: CarryPlan, device: str = "auto", substeps: int | None = None
 
 def carry(
     futures: World, plan: CarryPlan, walks: np.ndarray, offsets: np.ndarray,
-    watch: Callable[[Body, float], None] | None = None,
+    watch: Callable[[Body, float], None] | None = None, *, drops: bool = False,
 ) -> CarryOutcome:  # fmt: skip
     """Carry mats, each in a world of its own, all in one batch.
 
@@ -122,13 +127,15 @@ def carry(
         walks: (trials,) int, which of the plan's walks each takes.
         offsets: (trials, 2) [m], from the mat's centre of gravity to the middle between the hands, x and y.
         watch: Called with the mat and the time [s] before the first frame and after each.
+        drops: Whether trials that have failed are left out once they are many. The others go on in a smaller batch,
+            with the same bits; what was not simulated is NaN.
 
     Raises:
-        SimulationDiverged: a state stopped being finite.
+        SimulationDiverged: a state stopped being finite; its ``worlds`` are trials.
     """
     from nuno.tasks.mat_sight import MatSight
 
-    mat = _lay_down(futures, plan, walks, offsets)
+    mat, trials = _lay_down(futures, plan, walks, offsets), np.arange(len(walks))
     sight = MatSight(plan, EVERY, walks, futures.device)
 
     def look(time: float) -> None:
@@ -142,9 +149,36 @@ def carry(
     for first, last in _pieces(begin, plan.frames):
         if first == begin:
             futures.set_material(mat, plan.material)
-        _lead_arms(futures, plan, walks, 2 * first, 2 * last)
-        futures.run((last - first) / FRAME_RATE, progress=False, each_frame=look)
+        if drops and first >= begin:
+            going = _undecided(plan, walks, trials, first, sight)
+            if 2 <= len(going) <= FEWER * len(trials):
+                futures = _of_worlds(futures, np.searchsorted(trials, going))
+                mat, trials = futures.find("mat"), going
+                sight.go_on_with(trials)
+        _lead_arms(futures, plan, walks[trials], 2 * first, 2 * last)
+        try:
+            futures.run((last - first) / FRAME_RATE, progress=False, each_frame=look)
+        except SimulationDiverged as error:
+            error.worlds = tuple(trials[list(error.worlds)].tolist())
+            raise
     return judge(plan, walks, sight.middles(), sight.gaps())
+
+
+def _undecided(
+    plan: CarryPlan, walks: np.ndarray, trials: np.ndarray, frame: int, sight: MatSight
+) -> np.ndarray:  # fmt: skip
+    """Return which trials have not failed, or so lately that a loss of contact which began before may count yet."""
+    gaps = sight.gaps()[: frame // EVERY + 1]
+    failed_at = judge(plan, walks, sight.middles()[: frame + 1], gaps).failed_at[trials]
+    now = frame / FRAME_RATE - plan.settle
+    return np.asarray(trials[~(failed_at < now - LOST - EVERY / FRAME_RATE)])
+
+
+def _of_worlds(batch: World, worlds: np.ndarray) -> World:
+    """Return a batch of some worlds (k,) of another."""
+    fewer = World(device=batch.device)
+    fewer.restore(batch.save().pick(worlds))
+    return fewer
 
 
 def judge(plan: CarryPlan, walks: np.ndarray, middle: np.ndarray, gaps: np.ndarray) -> CarryOutcome:
@@ -153,10 +187,10 @@ def judge(plan: CarryPlan, walks: np.ndarray, middle: np.ndarray, gaps: np.ndarr
     Args:
         plan: What the trials have in common.
         walks: (trials,) int.
-        middle: (frames, trials, 3) [m], the mean of the mat's vertices.
+        middle: (frames, trials, 3) [m], the mean of the mat's vertices, up to the start of the walk at least.
         gaps: (readings, trials, 2) [m], to the left and the right arm, every ``EVERY`` frames.
     """
-    base = plan.base[walks][:, ::2].transpose(1, 0, 2)
+    base = plan.base[walks][:, ::2].transpose(1, 0, 2)[: len(middle)]
     start = round(plan.settle * FRAME_RATE)
     apart = middle - base
     deviation = np.linalg.norm(apart[start:] - apart[start], axis=-1)

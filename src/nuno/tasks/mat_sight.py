@@ -21,7 +21,12 @@ INSIDE = wp.constant(0.0)
 
 
 @wp.kernel(enable_backward=False, module="nuno.tasks.mat_sight")
-def see_middle(positions: wp.array2d(dtype=wp.vec3), frame: int, middle_out: wp.array2d(dtype=wp.vec3)):
+def see_middle(
+    positions: wp.array2d(dtype=wp.vec3),
+    trial_of: wp.array(dtype=int),
+    frame: int,
+    middle_out: wp.array2d(dtype=wp.vec3),
+):
     """The mean of each world's vertices."""
     world = wp.tid()
     total = wp.vec3(0.0, 0.0, 0.0)
@@ -30,7 +35,7 @@ def see_middle(positions: wp.array2d(dtype=wp.vec3), frame: int, middle_out: wp.
     first = positions[world, 0]
     for i in range(n):
         total = total + (positions[world, i] - first)
-    middle_out[frame, world] = first + total / float(n)
+    middle_out[frame, trial_of[world]] = first + total / float(n)
 
 
 @wp.kernel(enable_backward=False, module="nuno.tasks.mat_sight")
@@ -44,6 +49,7 @@ def see_gaps(
     planes: wp.array(dtype=wp.vec4),
     sides: wp.array(dtype=int),
     walk_of: wp.array(dtype=int),
+    trial_of: wp.array(dtype=int),
     key: int,
     frame: int,
     # out
@@ -54,7 +60,8 @@ def see_gaps(
     side = sides[s]
     if side < 0:
         return
-    walk = walk_of[world]
+    trial = trial_of[world]
+    walk = walk_of[trial]
     place = places[walk, key, s]
     back = wp.quat_inverse(turns[walk, key, s])
     nearest = float(FAR)
@@ -67,7 +74,7 @@ def see_gaps(
             if gap >= nearest:
                 break
         nearest = wp.min(nearest, gap)
-    wp.atomic_min(gap_out, frame, world, side, nearest)  # the least does not depend on who comes first
+    wp.atomic_min(gap_out, frame, trial, side, nearest)  # the least does not depend on who comes first
 
 
 class MatSight:
@@ -76,12 +83,12 @@ class MatSight:
     Args:
         tracks: Of the arms.
         every: Gaps are read every so many frames.
-        walk_of: (worlds,) int, the walk of each world.
+        walk_of: (trials,) int, the walk of each; at first each has a world.
         device: Where the mat is simulated.
     """
 
     def __init__(self, tracks: ArmTracks, every: int, walk_of: np.ndarray, device: str) -> None:
-        worlds, frames = len(walk_of), tracks.frames
+        trials, frames = len(walk_of), tracks.frames
         self.every, self._device = every, device
         places, turns = (array.transpose(0, 2, 1, 3) for array in (tracks.positions, tracks.quaternions))
         planes = [in_separating_order(_planes(part)) for part in tracks.parts]
@@ -94,25 +101,31 @@ class MatSight:
             wp.array(tracks.sides.astype(np.int32), dtype=int, device=device),
             wp.array(walk_of.astype(np.int32), dtype=int, device=device),
         )
-        self._middle = wp.zeros((frames + 1, worlds), dtype=wp.vec3, device=device)
-        self._gap = wp.full((frames // every + 1, worlds, 2), FAR, dtype=float, device=device)
+        self._middle = wp.full((frames + 1, trials), wp.vec3(wp.NAN, wp.NAN, wp.NAN), dtype=wp.vec3, device=device)
+        self._gap = wp.full((frames // every + 1, trials, 2), FAR, dtype=float, device=device)
+        self.go_on_with(np.arange(trials))
+
+    def go_on_with(self, trials: np.ndarray) -> None:
+        """Have only these trials (worlds,) from now on, one in each world."""
+        self._trial_of: Any = wp.array(trials.astype(np.int32), dtype=int, device=self._device)
 
     def see(self, positions: wp.array, frame: int) -> None:
         """Read the mat's vertices (worlds, n) of vec3 at the end of a frame, the 0th being the start."""
         worlds = positions.shape[0]
-        wp.launch(see_middle, dim=worlds, inputs=[positions, frame], outputs=[self._middle], device=self._device)
+        seen = [positions, self._trial_of, frame]
+        wp.launch(see_middle, dim=worlds, inputs=seen, outputs=[self._middle], device=self._device)
         if frame % self.every == 0:
             wp.launch(
                 see_gaps, dim=(worlds, len(self._shapes[-2])), outputs=[self._gap], device=self._device,
-                inputs=[positions, *self._shapes, 2 * frame, frame // self.every],
+                inputs=[positions, *self._shapes, self._trial_of, 2 * frame, frame // self.every],
             )  # fmt: skip
 
     def middles(self) -> np.ndarray:
-        """Return the mean of the vertices, (frames + 1, worlds, 3) float64 [m]."""
+        """Return the mean of the vertices, (frames + 1, trials, 3) float64 [m], NaN where nobody saw it."""
         return self._middle.numpy().astype(float)
 
     def gaps(self) -> np.ndarray:
-        """Return the gaps to the left and the right arm, (readings, worlds, 2) float64 [m]."""
+        """Return the gaps to the left and the right arm, (readings, trials, 2) float64 [m]."""
         return self._gap.numpy().astype(float)
 
 

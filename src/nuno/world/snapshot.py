@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nuno.bodies.dynamics import Push, State
 from nuno.errors import InvalidInputError
@@ -21,7 +22,7 @@ from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path, path_as_it_is
 from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import of_world
-from nuno.validation import checked, number
+from nuno.validation import checked, index_array, number
 from nuno.world.rigid_layout import RigidLayout
 
 if TYPE_CHECKING:
@@ -121,21 +122,35 @@ class Snapshot:
         return self._mapped(repeated, lambda value, _: value, lambda material: material, lambda path: path, world_count)
 
     @checked
-    def pick(self, world: int) -> Snapshot:
-        """Return one world of a batch."""
-        if self.world_count == 1:
-            return self
+    def pick(self, world: ArrayLike) -> Snapshot:
+        """Return one world of a batch, or a batch of several, (k,).
 
-        def one(array: Any) -> Any:
-            return None if array is None else array[world : world + 1]
+        Raises:
+            InvalidInputError: no whole numbers, fewer than two of several, or worlds that there are not.
+        """
+        if np.ndim(world) == 0:  # what one world has, has no axis of worlds
+            own: Any = check_world_index(world, self.world_count, "world")
+            rows: Any = slice(own, own + 1)
+            if self.world_count == 1:
+                return self
+        else:
+            own = rows = index_array("world", world, ("k",), low=0, high=self.world_count)
+            if len(own) < 2:
+                raise InvalidInputError("a batch has two worlds or more; pick(k) is a single one")
+
+        def batched(array: Any) -> Any:
+            return None if array is None else array[rows]
 
         def chosen(value: Any, axes: int) -> Any:
-            return value[world] if value is not None and np.ndim(value) > axes else value
+            return value[own] if value is not None and np.ndim(value) > axes else value
 
-        def of_one(path: Path | None) -> Path | None:
-            return None if path is None else of_world(path, world)
+        def path(of_all: Path | None) -> Path | None:
+            return None if of_all is None else of_world(of_all, own)
 
-        return self._mapped(one, chosen, lambda material: material.of_world(world, self.world_count), of_one, 1)
+        def of_worlds(material: Material) -> Material:
+            return material.of_world(own, self.world_count)
+
+        return self._mapped(batched, chosen, of_worlds, path, np.size(own))
 
     def _mapped(self, batched: Any, single: Any, material: Any, path: Any, world_count: int) -> Snapshot:
         """Map arrays that have a world axis, values that may (beside ``axes`` others), materials and paths."""

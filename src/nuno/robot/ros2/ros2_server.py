@@ -8,10 +8,10 @@ import time
 from typing import Any
 
 from nuno.robot.interface import RobotInterface
-from nuno.robot.reported_joints import TICK
 from nuno.robot.ros2.dds_bridge import DdsBridge
 from nuno.robot.ros2.definitions import DEFINITIONS
 from nuno.robot.ros2.follow_action import FollowAction
+from nuno.robot.serving import Serving
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.broadcast import Broadcast
 from nuno.robot.wire.commands import Commands
@@ -46,7 +46,7 @@ class TopicClient:
         logger.warning("%s: %s", self.name, text)
 
 
-class Ros2Server:
+class Ros2Server(Serving):
     """A participant in a ROS 2 graph: programs of ROS 2 on the same domain see the robot's topics and actions.
 
     It needs no installation of ROS: CycloneDDS comes with pip. As with ``RobotServer`` the robot belongs to a thread of
@@ -75,23 +75,14 @@ class Ros2Server:
     ) -> None:  # fmt: skip
         rate = real_time_factor
         self._factor = rate if rate == float("inf") else number("real_time_factor", rate, above=0.0)
-        own = 1.0 / robot.world.frame_rate if hasattr(robot, "world") else TICK
-        self.tick = own if tick is None else number("tick", tick, above=0.0)
         interval = number("image_rate", image_rate, above=0.0)
-        self.robot, self.lock = robot, threading.RLock()
-        self.error: Exception | None = None
+        super().__init__(robot, tick)
         self._bridge = DdsBridge(domain)
         chosen = names or Names()
         controllers = [client.controller for client in robot.controller_actions]
         self._broadcast = Broadcast(robot, self._bridge, chosen, controllers, interval)
         self._commands = Commands(robot, self._broadcast, chosen, controllers, {})
         self._begin(chosen)
-
-    def __enter__(self) -> Ros2Server:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<Ros2Server of {self.robot.robot.name!r} in the domain {self.domain}>"
@@ -101,26 +92,10 @@ class Ros2Server:
         """The domain that it is in."""
         return self._bridge.domain
 
-    @property
-    def alive(self) -> bool:
-        """Return True if it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
-        return self._thread.is_alive()
-
     def close(self) -> None:
         """Stop what others have asked for and leave the graph; a second time does nothing."""
         self._closing.set()
         self._thread.join()
-
-    def join(self, timeout: float | None = None) -> bool:
-        """Wait until it has ended, up to ``timeout`` [s]; returns whether it has.
-
-        Raises:
-            Exception: what the simulation failed with.
-        """
-        self._thread.join(timeout)
-        if self.error is not None:
-            raise self.error
-        return not self._thread.is_alive()
 
     def _begin(self, names: Names) -> None:
         topics = {topic: kind for topic, kind in self._broadcast.topics.items() if kind != ros.STATUS}

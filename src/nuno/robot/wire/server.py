@@ -14,7 +14,7 @@ import numpy as np
 
 from nuno.errors import InvalidInputError, MessageError
 from nuno.robot.interface import RobotInterface
-from nuno.robot.reported_joints import TICK
+from nuno.robot.serving import Serving
 from nuno.robot.wire import messages as ros
 from nuno.robot.wire.bridge import Bridge
 from nuno.robot.wire.bridge_client import Client
@@ -52,7 +52,7 @@ RealTimeFactor = float | None
 """Simulated over real time; infinite where nothing waits."""
 
 
-class RobotServer:
+class RobotServer(Serving):
     """A server of the rosbridge protocol, to which any number of programs may connect, in Python or not.
 
     From when it is made, the robot belongs to a thread of the server, which does one thing after another: what clients
@@ -94,20 +94,11 @@ class RobotServer:
         self._factor: float | None = real_time_factor
         if real_time_factor is not None and not (isinstance(real_time_factor, float) and np.isposinf(real_time_factor)):
             self._factor = number("real_time_factor", real_time_factor, above=0.0)
-        own = 1.0 / robot.world.frame_rate if hasattr(robot, "world") else TICK
-        self.tick = own if tick is None else number("tick", tick, above=0.0)
-        self.robot, self.lock = robot, threading.RLock()
-        self.error: Exception | None = None
+        super().__init__(robot, tick)
         self._waiting: list[tuple[Client, Message, float]] = []
         alive = number("alive", alive, above=0.0)
         self._bridge = Bridge(self._deal, self._left, host, port, max_message, alive, origins)
         self._begin(names or Names(), number("image_rate", image_rate, above=0.0))
-
-    def __enter__(self) -> RobotServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<RobotServer of {self.robot.robot.name!r} at {self.url}>"
@@ -123,28 +114,12 @@ class RobotServer:
         host = self._bridge.host
         return f"ws://[{host}]:{self.port}" if ":" in host else f"ws://{host}:{self.port}"
 
-    @property
-    def alive(self) -> bool:
-        """Return True if it serves: until ``close``, or until the simulation failed, which ``error`` then tells."""
-        return self._thread.is_alive()
-
     def close(self) -> None:
         """Stop what clients have asked for, disconnect them and end; a second time does nothing."""
         if self._thread.is_alive():
             with suppress(RuntimeError):  # it has ended meanwhile
                 self._loop.call_soon_threadsafe(self._closing.set)
         self._thread.join()
-
-    def join(self, timeout: float | None = None) -> bool:
-        """Wait until it has ended, up to ``timeout`` [s]; returns whether it has.
-
-        Raises:
-            Exception: what the simulation failed with.
-        """
-        self._thread.join(timeout)
-        if self.error is not None:
-            raise self.error
-        return not self._thread.is_alive()
 
     def _begin(self, names: Names, image_rate: float) -> None:
         controllers = [client.controller for client in self.robot.controller_actions]
