@@ -164,12 +164,15 @@ class Ahead:
 
 
 def alike(stages: Sequence[Discretisation]) -> tuple[Discretisation, ...]:
-    """The first stage, and where it looks at the best candidates those after it with the same mesh and step."""
+    """The first stage, and where it looks at the best candidates those after it with the same mesh and step.
+
+    Those whose hands' ways hang on what comes out before are left for later.
+    """
     first = stages[0]
     if first.best is None:
         return (first,)
-    same = (first.cells, first.substeps)
-    return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps) == same))
+    same = (first.cells, first.substeps, first.any_way)
+    return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps, s.any_way) == same))
 
 
 def imagine_together(
