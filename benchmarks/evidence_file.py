@@ -66,7 +66,7 @@ class Evidence:
 
     @cached_property
     def prior(self) -> np.ndarray:
-        """(2, 36) float, logarithms of the prior of the lift, of a hand that went straight and one that went up first."""
+        """(2, 36) float, logarithms of the prior of the lift, of hands that went straight and up first."""
         rectangle: Any = _Corners(np.asarray(self.row["rectangle"]))
         grid = np.stack(np.meshgrid(np.arange(6), np.arange(6), indexing="ij"), axis=-1).reshape(-1, 2)
         return log_priors_of_ways(rectangle, grid / 5.0, self.row["hand"], SIDEWAYS)

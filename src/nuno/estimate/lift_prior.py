@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SIDEWAYS = 0.5
 """Of the way up: half of all hands are taken to go no farther sideways."""
 UP_FIRST = 0.2
-"""Of hands go up first and sideways then, not straight. Fitted to nothing, as little as the next (0.1 to 0.5 rank about as well)."""
+"""Of hands go up first and sideways then, not straight: a guess, as the next is. 0.1 to 0.5 rank about as well."""
 FARTHER = 2.0
 """Times as far sideways goes half of these hands: who turns sideways in the air means to."""
 LOWEST = 0.2

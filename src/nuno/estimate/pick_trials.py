@@ -113,7 +113,8 @@ def try_picks(
         if ranked is not None and discretisation.best is not None and not looks_at_all:
             chosen = ranked.plausible(discretisation.best)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
-        futures: Futures | None = None if ahead is None or looks_at_all else ahead.part(meshes[k:], chosen)
+        stages_ahead = meshes[k : k + 1] if looks_at_all else meshes[k:]
+        futures: Futures | None = None if ahead is None else ahead.part(stages_ahead, chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)
         stages.end("imagine")

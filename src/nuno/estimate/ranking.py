@@ -9,8 +9,8 @@ independent patches of cloth with normal errors of unknown size (`nuno.estimate.
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
 (docs/reports/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
 (`nuno.estimate.learned`). How far sideways the hand would have gone from a candidate is its prior
-(`nuno.estimate.lift_prior`), by which its evidence is multiplied. Where the hand may have gone straight or up first, the
-mean over the guesses of each way counts by the way's own prior: so it does not matter of which there are more.
+(`nuno.estimate.lift_prior`), by which its evidence is multiplied. Where the hand may have gone straight or up first,
+the mean over the guesses of each way counts by the way's own prior: so it does not matter of which there are more.
 """
 
 from __future__ import annotations
