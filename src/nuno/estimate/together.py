@@ -4,8 +4,8 @@ A GPU takes hardly longer for 400 coarse cloths than for 100, which leave most o
 not sure, those after it with the same mesh and step are imagined together, of all candidates of the first of them, for
 each looks at the best of what the one before looked at. A stage then takes from the batch what it would have imagined
 itself, to the bit: a world is the same in any batch, and the batch is kept at every moment at which a stage may find
-that one of its cloths is at rest (`nuno.estimate.coming_to_rest`). So the device need not wait either while that is asked. What no stage asks for was in vain,
-and what a stage asks for beyond it is imagined anew.
+that one of its cloths is at rest (`nuno.estimate.coming_to_rest`). So the device need not wait either while that is
+asked. What no stage asks for was in vain, and what a stage asks for beyond it is imagined anew.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ class Part(Futures):
         """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
         import warp as wp
 
-        device, every = self.moments[0].positions.device, None
+        device: Any = self.moments[0].positions.device
+        every: Any = None
 
         def rows(array: wp.array, which: np.ndarray) -> Any:
             chosen: Any = wp.array(which.astype(np.int32), dtype=int, device=device)
