@@ -121,11 +121,12 @@ def begin_picks(
     hand_path: np.ndarray | None = None,
     numbers: np.ndarray | None = None,
     elapsed: float = 0.0,
+    state: dict[str, np.ndarray] | None = None,
 ) -> Futures:
     """Begin `imagine_picks`: all before any time passes; the arguments are the same, but for two.
 
     With ``numbers`` (n,) int it is begun with these of its worlds alone, in their order, and with ``elapsed`` [s] as if
-    so much of the hand's time had passed before.
+    so much of the hand's time had passed before, by which the cloths had come to the ``state`` (n, ...).
     """
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
     if isinstance(rectangle, ClothOutline):
@@ -172,6 +173,8 @@ def begin_picks(
         begin = points.positions(start, np.asarray(body.faces))
         where = _one_each(points, numbers % k)
     ways = paths_of_hands(begin, hand, hypotheses, lift_seconds, hand_std, hand_path)
+    if state is not None:
+        dynamics_of(body).load_worlds(np.arange(len(numbers)), state)
     futures.grip(body, where, to=Path(ways.times - elapsed, ways.positions[numbers], None, "linear"))
     return Futures(futures, body, world, k, discretisation)
 
@@ -246,9 +249,8 @@ def _settle(futures: Futures, begin: Callable[..., Futures], elapsed: float, may
         if batch is not futures:
             dynamics_of(futures.body).load_worlds(before[~stay], {name: of[~stay] for name, of in state.items()})
         if not over:
-            batch = begin(numbers=resting.going, elapsed=elapsed + settled)
-            every = np.arange(len(resting.going))
-            dynamics_of(batch.body).load_worlds(every, {name: of[stay] for name, of in state.items()})
+            on = {name: of[stay] for name, of in state.items()}
+            batch = begin(numbers=resting.going, elapsed=elapsed + settled, state=on)
 
 
 def rest_speed(body: Body) -> float:
