@@ -1,4 +1,4 @@
-"""How imagined cloths come to rest in the hand: those that have leave the batch, so that the others take less time.
+"""Imagined cloths that come to rest in the hand: those that have leave the batch, so that the others take less time.
 
 Some hang still half a second after the lift, some swing for two and a half. A CPU goes through a batch by groups of
 `nuno.numbers.lanes.LANES` worlds. So as soon as the cloths that still move make up fewer groups, they go on by
@@ -21,7 +21,7 @@ REST_SPEED = 0.03
 
 
 class ComingToRest:
-    """Which of a batch's worlds still move, look by look.
+    """Worlds of a batch that still move, look by look.
 
     Args:
         count: How many worlds there are.
@@ -57,7 +57,7 @@ class ComingToRest:
 
 
 def groups(worlds: int) -> int:
-    """How many groups of lanes a number of worlds takes."""
+    """The number of groups of lanes that some worlds take."""
     return -(-worlds // LANES)
 
 

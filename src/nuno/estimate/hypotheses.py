@@ -64,7 +64,7 @@ class Discretisation:
     all_if_poor: bool = False
     any_way: bool = False
 
-    def led(self, share: float) -> Discretisation:
+    def with_up_first(self, share: float) -> Discretisation:
         """The same with a ``share`` of the guesses, 0 to 1, going up first, evenly spread; those that do still do."""
         k = np.arange(len(self.hypotheses) + 1)
         ups = np.diff(np.floor(k * share + 0.5)) > 0.0
@@ -126,7 +126,7 @@ _MISTAKES = tuple(
     for sign in (-1.0, 1.0)
 )
 
-_FINE = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
+_WEAVES = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
 _LATER = SHEARING[::3] + _MISTAKES
 
 DISCRETISATIONS = (
@@ -148,7 +148,7 @@ DISCRETISATIONS = (
         ),
         best=6, any_way=True,
     ),
-    Discretisation(25, 20, (_FINE[0], _FINE[6], _FINE[2], _FINE[8]), best=4, any_way=True),
+    Discretisation(25, 20, (_WEAVES[0], _WEAVES[6], _WEAVES[2], _WEAVES[8]), best=4, any_way=True),
     Discretisation(20, 14, _LATER, best=3, any_way=True),
 )  # fmt: skip
 """Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).

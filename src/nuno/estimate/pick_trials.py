@@ -100,13 +100,15 @@ def try_picks(
     outline: Outline | None = None
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
     meshes = list(settings.discretisations)
-    way_is_known = settings.hand_path is not None
+    path_given = settings.hand_path is not None
     # an outline's triangles take several times as long as a rectangle's grid
-    may_look_at_all = settings.with_evidence and not way_is_known and not isinstance(rectangle, ClothOutline)
+    may_look_at_all = settings.with_evidence and not path_given and not isinstance(rectangle, ClothOutline)
     for k in with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"):
-        if meshes[k].any_way and ranked is not None and not way_is_known:
+        if meshes[k].any_way and ranked is not None and not path_given:
             # once for all that follow, so that a device may imagine them together
-            meshes[k:] = [replace(m.led(ranked.up_first), any_way=False) if m.any_way else m for m in meshes[k:]]
+            meshes[k:] = [
+                replace(m.with_up_first(ranked.up_first), any_way=False) if m.any_way else m for m in meshes[k:]
+            ]
         discretisation = meshes[k]
         chosen = np.arange(len(uv))
         looks_at_all = discretisation.all_if_poor and may_look_at_all and _fits_poorly(comparisons, ranked)
