@@ -123,7 +123,7 @@ def begin_picks(
     elapsed: float = 0.0,
     state: dict[str, np.ndarray] | None = None,
 ) -> Futures:
-    """Begin `imagine_picks`: all before any time passes; the arguments are the same, but for two.
+    """Begin `imagine_picks`: all before any time passes; the arguments are the same, but for three.
 
     With ``numbers`` (n,) int it is begun with these of its worlds alone, in their order, and with ``elapsed`` [s] as if
     so much of the hand's time had passed before, by which the cloths had come to the ``state`` (n, ...).
