@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nuno.camera.camera import Camera
-from nuno.estimate.lift_prior import SIDEWAYS, log_prior_of_lift
+from nuno.estimate.lift_prior import SIDEWAYS, log_priors_of_ways
 from nuno.estimate.ranking import Comparison
 
 COUNT = 36
@@ -48,7 +48,11 @@ class Evidence:
     @cached_property
     def comparisons(self) -> list[Comparison]:
         """Of all stages; mistakes of the hand are weighed in them, as in the estimate that they are of."""
-        return [self.comparison(f"stage{k}") for k in range(len(self.row["mistakes"]))]
+        ways: list[Any] = self.row.get("up_first") or [None] * len(self.row["mistakes"])
+        return [
+            replace(self.comparison(f"stage{k}"), up_first=None if way is None else np.array(way))
+            for k, way in enumerate(ways)
+        ]
 
     def comparison(self, name: str) -> Comparison:
         """A comparison as it was dumped."""
@@ -62,10 +66,10 @@ class Evidence:
 
     @cached_property
     def prior(self) -> np.ndarray:
-        """(36,) float, logarithms of the prior of the lift."""
+        """(2, 36) float, logarithms of the prior of the lift, of hands that went straight and up first."""
         rectangle: Any = _Corners(np.asarray(self.row["rectangle"]))
         grid = np.stack(np.meshgrid(np.arange(6), np.arange(6), indexing="ij"), axis=-1).reshape(-1, 2)
-        return log_prior_of_lift(rectangle, grid / 5.0, self.row["hand"], SIDEWAYS)
+        return log_priors_of_ways(rectangle, grid / 5.0, self.row["hand"], SIDEWAYS)
 
     @property
     def camera(self) -> Camera:

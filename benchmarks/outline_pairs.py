@@ -25,7 +25,8 @@ from outline_pictures import boxes_of, compare, masks, on_device, pictures, with
 from nuno.camera.camera import Camera
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
-from nuno.estimate.futures import LIFT_SECONDS, REST_SPEED, rest_speed, solver_of, table_world
+from nuno.estimate.coming_to_rest import REST_SPEED
+from nuno.estimate.futures import LIFT_SECONDS, rest_speed, solver_of, table_world
 from nuno.estimate.hypotheses import FIRM, LOOSE, SHEARING, Hypothesis, cell_counts, hypotheses_with
 from nuno.estimate.learned import WIDTH, described
 from nuno.estimate.outline_net import SIZE

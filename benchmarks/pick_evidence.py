@@ -97,6 +97,7 @@ def judged(
         "table_height": arguments["table_height"], "seconds": seconds, "stages": result.seconds,
         "scores": result.scores.tolist(),
         "mistakes": [[h.mistake for h in batch.discretisation.hypotheses] for batch in trials.batches],
+        "up_first": [[h.up_first for h in batch.discretisation.hypotheses] for batch in trials.batches],
     }  # fmt: skip
     arrays = {f"stage{k}": packed(c) for k, c in enumerate(trials.comparisons)}
     for name, mask in (("before", result.mask_before), ("after", result.mask_after)):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nuno.camera.rectangle import ClothRectangle
-from nuno.estimate.lift_prior import LOWEST, TOUCH, log_prior_of_lift, log_prior_of_start
+from nuno.estimate.lift_prior import FARTHER, LOWEST, TOUCH, log_prior_of_lift, log_prior_of_start, log_priors_of_ways
 
 TOP = 0.72  # [m]
 
@@ -66,3 +66,16 @@ def test_where_a_path_begins_tells_the_point():
     high = log_prior_of_start(rectangle(), uv, (0.0, 0.0, TOP + 0.4), 0.0)
     # hypot(0.2, TOUCH) is 0.2 to 0.13 %
     np.testing.assert_allclose(high, log_prior_of_lift(rectangle(), uv, (0.0, 0.0, TOP + 0.4), 0.5), rtol=3e-3)
+
+
+def test_who_goes_up_first_goes_farther_sideways():
+    """The same density, wider: at 0 as much lower as its area is larger."""
+    hand = (0.0, 0.0, TOP + 0.4)
+    straight, up_first = log_priors_of_ways(rectangle(), [(0.0, 0.0), (1.0, 0.0)], hand, 0.5)
+    np.testing.assert_array_equal(straight, log_prior_of_lift(rectangle(), [(0.0, 0.0), (1.0, 0.0)], hand, 0.5))
+    assert up_first[0] == pytest.approx(-2.0 * np.log(FARTHER))
+    # 0.6 m sideways of a lift of 0.4 m is 3 s of the one and 3 / FARTHER of the other
+    assert up_first[1] - straight[1] == pytest.approx(
+        2.0 * np.log(10.0 / (1.0 + (3.0 / FARTHER) ** 2)) - 2.0 * np.log(FARTHER)
+    )
+    np.testing.assert_array_equal(log_priors_of_ways(rectangle(), [(0.0, 0.0)], hand, None), np.zeros((2, 1)))

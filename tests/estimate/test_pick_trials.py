@@ -12,6 +12,7 @@ from test_pick_settings import settings
 from nuno.camera.rectangle import ClothRectangle
 from nuno.estimate import pick_trials
 from nuno.estimate.hypotheses import Discretisation, Hypothesis
+from nuno.estimate.lift_prior import UP_FIRST
 from nuno.estimate.ranking import Comparison
 from nuno.kernels.compile_watch import Stages
 
@@ -20,21 +21,26 @@ RECTANGLE = ClothRectangle(CORNERS, 0.6, 0.4, np.zeros(3), 0.0, 0.0)
 STAGES = (
     Discretisation(20, 14, (Hypothesis(1e-4), Hypothesis(1e-3))),
     Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, all_if_poor=True),
-    Discretisation(20, 14, (Hypothesis(1e-5),), best=3),
+    Discretisation(20, 14, (Hypothesis(1e-5), *(Hypothesis(k * 1e-5) for k in range(2, 11))), best=3, any_way=True),
 )
+ups: list[int] = []
+"""How many guesses of each stage went up first in what was looked at last."""
 
 
 def looked_at(monkeypatch: pytest.MonkeyPatch, chamfer: float, **changes: Any) -> list[int]:
     """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
     numbers: list[int] = []
+    ups.clear()
 
     def compare(futures: Any, chosen: np.ndarray, seen: Any, given: Any) -> Comparison:
         numbers.append(len(chosen))
+        up_first = np.array([guess.up_first for guess in futures.discretisation.hypotheses])
+        ups.append(int(up_first.sum()))
         shape = (len(given.turns), len(futures.discretisation.hypotheses), len(chosen))
         far = np.where(np.isin(chosen, (0, 1)), chamfer, 40.0)
         return Comparison(
             chosen, given.turns, np.broadcast_to(far, shape), np.full(shape, 0.9), np.full(shape, 0.9),
-            np.ones(shape[1:], dtype=bool),
+            np.ones(shape[1:], dtype=bool), up_first=up_first,
         )  # fmt: skip
 
     def imagine(candidates: np.ndarray, discretisation: Discretisation, **_: Any) -> Any:
@@ -59,3 +65,12 @@ def test_a_known_way_of_the_hand_is_no_guess(monkeypatch):
     way = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)])
     assert looked_at(monkeypatch, 6.0, hand_path=way)[1] < 6
     assert looked_at(monkeypatch, 6.0, score="iou")[1] == 3
+
+
+def test_later_guesses_go_the_likelier_way(monkeypatch):
+    """Both ways fit alike, so up first is as likely as before: two of ten guesses; none where the way is known."""
+    looked_at(monkeypatch, 1.5)
+    assert ups == [0, 2, round(10 * UP_FIRST)]
+    way = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)])
+    looked_at(monkeypatch, 1.5, hand_path=way)
+    assert ups == [0, 2, 0]

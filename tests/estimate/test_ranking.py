@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nuno.estimate.lift_prior import UP_FIRST
 from nuno.estimate.ranking import Comparison, Ranked, confidence, probabilities, rank, tempered
 
 
@@ -37,6 +38,26 @@ def test_a_prior_multiplies_the_evidence_alone():
     for score in ("chamfer", "iou", "eq1"):
         one, other = rank(comparisons, score, 3, prior), rank(comparisons, score, 3)
         np.testing.assert_array_equal(one.scores, other.scores)
+
+
+def test_each_way_of_the_hand_counts_by_its_own_prior():
+    """The mean of each way's guesses, however many there are; a candidate of one way alone has that one's."""
+    # likelihoods 1 / (1 + chamfer)^5: straight 1/32 thrice, up first 1 once; the second candidate is seen straight only
+    straight = looked_at([0, 1], [[1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
+    up_first = replace(looked_at([0], [[0.0]]), up_first=np.ones(1, dtype=bool))
+    priors = np.log([[1.0, 0.5], [0.25, 1.0]])
+    found = rank([straight, up_first], "evidence", 2, priors)
+    both = (1.0 - UP_FIRST) * 2.0**-5 + UP_FIRST * 0.25
+    np.testing.assert_allclose(np.exp(found.scores), (both, 0.5 * 2.0**-5), rtol=1e-12)
+    assert found.up_first == pytest.approx(UP_FIRST * 0.25 / both, rel=1e-12)
+    more = rank([straight, straight, up_first], "evidence", 2, priors)
+    np.testing.assert_allclose(more.scores, found.scores, rtol=1e-12)
+    # the best guess of all is left out of its own way, if that has others
+    two = replace(looked_at([0], [[0.0], [1.0]]), up_first=np.ones(2, dtype=bool))
+    without = rank([straight, two], "evidence", 2, priors, without_best=True)
+    left = (1.0 - UP_FIRST) * 2.0**-5 + UP_FIRST * 0.25 * 2.0**-5
+    np.testing.assert_allclose(np.exp(without.scores), (left, 0.5 * 2.0**-5), rtol=1e-12)
+    assert rank([straight], "evidence", 2, priors).up_first == 0.0
 
 
 def test_probabilities_are_shares_of_the_evidence():

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from scipy.optimize import least_squares
 
 from nuno.camera.border_lines import Line, SideLines, lines_near
 from nuno.camera.camera import Camera
+from nuno.camera.gauss_newton import least_squares
 from nuno.camera.table import Table
 
 WIDTH = 640
@@ -187,8 +187,8 @@ def _fit(chosen: Chosen, names: Sequence[str], camera: Camera, table: Table) -> 
     def all_of(scaled: np.ndarray) -> np.ndarray:
         return np.concatenate([_residuals(deviations * scaled, chosen, camera, table), scaled])
 
-    found = least_squares(all_of, np.zeros(9), x_scale=1.0, max_nfev=20)
-    return float(2.0 * found.cost), deviations * found.x
+    scaled, cost = least_squares(all_of, np.zeros(9))
+    return cost, deviations * scaled
 
 
 def _likely(sides: Sequence[tuple[int, SideLines]], camera: Camera, table: Table) -> list[Chosen]:

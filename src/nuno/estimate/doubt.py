@@ -104,7 +104,7 @@ def doubted(
         comparisons: As `nuno.estimate.ranking.rank` takes them, like the next three.
         score: What ranks.
         count: Number of candidates.
-        log_prior_of_candidates: (count,) float, or None.
+        log_prior_of_candidates: (count,) or (2, count) float, or None.
         warnings: Of how the images and the cloth are odd; none while more guesses may follow, for none of them would
             mend that.
     """
@@ -118,7 +118,7 @@ def doubted(
     share = share_of_doubt(found, warnings)
     if share > 0.0:
         logs = np.logaddexp(np.log1p(-share) + logs, np.log(share) + _log_shares(ranked.scores / BREADTH))
-    return replace(ranked, likely=np.exp(logs))
+    return replace(ranked, likely=np.exp(logs), up_first=0.5 * (ranked.up_first + without.up_first))
 
 
 def _log_shares(scores: np.ndarray) -> np.ndarray:

@@ -12,10 +12,11 @@ import numpy as np
 
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.estimate.case import PickCase
+from nuno.estimate.coming_to_rest import SETTLE_SECONDS
 from nuno.estimate.fold_case import FoldCase
 from nuno.estimate.fold_result import FoldResult
 from nuno.estimate.footage import FoldFootage, Footage
-from nuno.estimate.futures import LIFT_SECONDS, SETTLE_SECONDS, is_turned
+from nuno.estimate.futures import LIFT_SECONDS, is_turned
 from nuno.estimate.hand_sight import disc
 from nuno.estimate.pick_result import PickResult
 from nuno.estimate.seeing import HAND_MARGIN

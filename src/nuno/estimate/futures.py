@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +16,12 @@ from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
 from nuno.engines.world_view import dynamics_of
+from nuno.estimate.coming_to_rest import LOOK_SECONDS, SETTLE_SECONDS, ComingToRest, mean_speeds, slow_part
 from nuno.estimate.hypotheses import Discretisation, cell_counts
 from nuno.estimate.lift_path import paths_of_hands
 from nuno.estimate.outline_body import grips_on, outline_body
 from nuno.materials import Cloth
+from nuno.shapes.path import Path
 from nuno.shapes.surface import SurfacePoints
 from nuno.world.world import World
 
@@ -28,12 +32,6 @@ if TYPE_CHECKING:
 
 LIFT_SECONDS = 1.5
 """[s] How long the hand's motion takes where it is not known."""
-SETTLE_SECONDS = 2.5
-"""[s] At most so long the cloth may take to come to rest in the hand."""
-LOOK_SECONDS = 0.25
-"""[s] After so long each it is asked whether it has."""
-REST_SPEED = 0.03
-"""[m/s] Below this root mean square speed a cloth counts as at rest: under 1 mm between two looks at it."""
 DRAWN_THICKNESS = 0.002
 """[m] A cloth is seen about as thick as it is, which is less than the distance that contact keeps."""
 BODY_NAME = "cloth"
@@ -121,20 +119,28 @@ def begin_picks(
     engine: str = "nuno",
     hand_std: float = 0.0,
     hand_path: np.ndarray | None = None,
+    numbers: np.ndarray | None = None,
+    elapsed: float = 0.0,
+    state: dict[str, np.ndarray] | None = None,
 ) -> Futures:
-    """Begin `imagine_picks`: all before any time passes; the arguments are the same."""
+    """Begin `imagine_picks`: all before any time passes; the arguments are the same, but for three.
+
+    With ``numbers`` (n,) int it is begun with these of its worlds alone, in their order, and with ``elapsed`` [s] as if
+    so much of the hand's time had passed before, by which the cloths had come to the ``state`` (n, ...).
+    """
     cells = cell_counts(rectangle.long_m, rectangle.short_m, discretisation.cells, grid)
     if isinstance(rectangle, ClothOutline):
         cells = (discretisation.cells, 1)
     substeps = discretisation.substeps if engine == "nuno" else None  # they are those of Nuno's solver
     world, cloth = table_world(rectangle, table, cells, device=device, substeps=substeps)
     k, hypotheses = len(candidates), discretisation.hypotheses
-    count = k * len(hypotheses)
+    if numbers is None:
+        numbers = np.arange(k * len(hypotheses))
 
     def each(name: str) -> np.ndarray:
-        return np.repeat([getattr(h, name) for h in hypotheses], k)
+        return np.array([getattr(h, name) for h in hypotheses])[numbers // k]
 
-    futures = world.imagine(count, engine=engine)
+    futures = world.imagine(len(numbers), engine=engine)
     body = futures.find(cloth.name)
     for static in ("table", "floor"):
         if any(b.name == static for b in futures.bodies):
@@ -146,7 +152,7 @@ def begin_picks(
             area_density=each("area_density"), bending_rigidity=each("bending_rigidity"),
             stretch_stiffness=each("stretch_stiffness"), shear_stiffness=each("shear_stiffness"),
             friction=each("friction"), air_drag=each("air_drag"),
-            thickness=np.repeat([h.thickness or 2.0 * rest_height for h in hypotheses], k),
+            thickness=np.array([h.thickness or 2.0 * rest_height for h in hypotheses])[numbers // k],
         ),
     )  # fmt: skip
     uv = np.array(candidates, dtype=float)
@@ -157,22 +163,25 @@ def begin_picks(
     where: np.ndarray | SurfacePoints
     if isinstance(rectangle, ClothOutline):
         points, begin = grips_on(rectangle, np.asarray(candidates, dtype=float), cloth)
-        where = _each_hypothesis(points, len(hypotheses))
+        where = _one_each(points, numbers % k)
     elif np.abs(at - np.round(at)).max() < 1e-6:
         vertex = np.round(at[:, 1]).astype(int) * (cells[0] + 1) + np.round(at[:, 0]).astype(int)
-        where = np.tile(vertex, len(hypotheses))[:, None]
+        where = vertex[numbers % k, None]
         begin = start[vertex]
     else:
         points = cloth.at(uv[:, 0], uv[:, 1])
         begin = points.positions(start, np.asarray(body.faces))
-        where = _each_hypothesis(points, len(hypotheses))
-    futures.grip(body, where, to=paths_of_hands(begin, hand, hypotheses, lift_seconds, hand_std, hand_path))
+        where = _one_each(points, numbers % k)
+    ways = paths_of_hands(begin, hand, hypotheses, lift_seconds, hand_std, hand_path)
+    if state is not None:
+        dynamics_of(body).load_worlds(np.arange(len(numbers)), state)
+    futures.grip(body, where, to=Path(ways.times - elapsed, ways.positions[numbers], None, "linear"))
     return Futures(futures, body, world, k, discretisation)
 
 
-def _each_hypothesis(points: SurfacePoints, count: int) -> SurfacePoints:
-    """Return k points as one for each world, of ``count`` hypotheses one after the other."""
-    return SurfacePoints(np.tile(points.faces, count), np.tile(points.barycentric, (count, 1))).per_world()
+def _one_each(points: SurfacePoints, which: np.ndarray) -> SurfacePoints:
+    """Return for each world one of k points, ``which`` (worlds,)."""
+    return SurfacePoints(points.faces[which], points.barycentric[which]).per_world()
 
 
 def imagine_picks(
@@ -206,33 +215,52 @@ def imagine_picks(
         hand_std: Standard deviation of where the hand is [m], by which hypotheses may be off.
         hand_path: (k, 3) float, where the hand went [m], at even times; None: as each hypothesis says.
     """
-    futures = begin_picks(
-        rectangle, candidates, grid, discretisation, table=table, hand=hand, rest_height=rest_height, device=device,
-        lift_seconds=lift_seconds, engine=engine, hand_std=hand_std, hand_path=hand_path,
+    begin = partial(
+        begin_picks, rectangle, candidates, grid, discretisation, table=table, hand=hand, rest_height=rest_height,
+        device=device, lift_seconds=lift_seconds, engine=engine, hand_std=hand_std, hand_path=hand_path,
     )  # fmt: skip
+    futures = begin()
     futures.world.run(lift_seconds, progress=False)
-    settled = 0.0
-    while settled < SETTLE_SECONDS:
-        futures.world.run(LOOK_SECONDS, progress=False)
-        settled += LOOK_SECONDS
-        if rest_speed(futures.body) < REST_SPEED:
-            break
+    _settle(futures, begin, lift_seconds, device == "cpu" and engine == "nuno")
     return futures
+
+
+def _settle(futures: Futures, begin: Callable[..., Futures], elapsed: float, may_leave: bool) -> None:
+    """Let cloths come to rest; see `nuno.estimate.coming_to_rest`.
+
+    Args:
+        futures: The cloths, lifted.
+        begin: Begins the worlds of some ``numbers``.
+        elapsed: Since they were begun [s].
+        may_leave: Whether those at rest leave the batch.
+    """
+    batch, settled = futures, 0.0
+    resting = ComingToRest(futures.world.world_count)
+    over = False
+    while not over:
+        batch.world.run(LOOK_SECONDS, progress=False)
+        settled += LOOK_SECONDS
+        over = resting.look(_speeds(batch.body)) or settled >= SETTLE_SECONDS
+        before = resting.going
+        stay = np.zeros(len(before), dtype=bool) if over else resting.leave() if may_leave else None
+        if stay is None:
+            continue
+        state = dynamics_of(batch.body).state()
+        if batch is not futures:
+            dynamics_of(futures.body).load_worlds(before[~stay], {name: of[~stay] for name, of in state.items()})
+        if not over:
+            on = {name: of[stay] for name, of in state.items()}
+            batch = begin(numbers=resting.going, elapsed=elapsed + settled, state=on)
 
 
 def rest_speed(body: Body) -> float:
     """The 90th percentile over the worlds of a cloth's root mean square speed [m/s]."""
+    return slow_part(_speeds(body))
+
+
+def _speeds(body: Body) -> np.ndarray:
+    """(worlds,) float, a cloth's root mean square speeds [m/s]."""
     dynamics = dynamics_of(body)
     if isinstance(dynamics, ParticleDynamics):
-        return slow_part(mean_speeds(*solver_of(body).velocities_apart()))
-    return slow_part(mean_speeds(*np.moveaxis(dynamics.velocities(body), -1, 0)))
-
-
-def mean_speeds(vx: np.ndarray, vy: np.ndarray, vz: np.ndarray) -> np.ndarray:
-    """(worlds,) float, root mean square speeds [m/s] of velocities (worlds, n) each."""
-    return np.asarray(np.sqrt((vx * vx + vy * vy + vz * vz).mean(axis=-1)))
-
-
-def slow_part(speeds: np.ndarray) -> float:
-    """The 90th percentile of speeds (worlds,) [m/s]."""
-    return float(np.percentile(speeds, 90))
+        return mean_speeds(*solver_of(body).velocities_apart())
+    return mean_speeds(*np.moveaxis(dynamics.velocities(body), -1, 0))

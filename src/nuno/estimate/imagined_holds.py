@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.garment import Garment
 from nuno.errors import EstimationError, InvalidInputError
-from nuno.estimate.futures import LOOK_SECONDS, REST_SPEED, rest_speed
+from nuno.estimate.coming_to_rest import LOOK_SECONDS, REST_SPEED
+from nuno.estimate.futures import rest_speed
 from nuno.materials import Cloth
 from nuno.mesh.sewn import BACK
 from nuno.validation import check_fields, checked, count, instance, number

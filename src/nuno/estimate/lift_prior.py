@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 SIDEWAYS = 0.5
 """Of the way up: half of all hands are taken to go no farther sideways."""
+UP_FIRST = 0.2
+"""Of hands go up first and sideways then, not straight: a guess, as the next is. 0.1 to 0.5 rank about as well."""
+FARTHER = 2.0
+"""Times as far sideways goes half of these hands: who turns sideways in the air means to."""
 LOWEST = 0.2
 """[m] A hand that is not as high counts as if it were: who drags a cloth over the table does not lift it."""
 HAND_STD = 0.01
@@ -57,6 +61,23 @@ def log_prior_of_lift(rectangle: ClothRectangle, uv: ArrayLike, hand: ArrayLike,
     away = np.linalg.norm(hand[:2] - begin[:, :2], axis=1)
     up = np.maximum(hand[2] - begin[:, 2], LOWEST)
     return np.asarray(-2.0 * np.log1p((away / (sideways * up)) ** 2))
+
+
+def log_priors_of_ways(rectangle: ClothRectangle, uv: ArrayLike, hand: ArrayLike, sideways: float | None) -> np.ndarray:
+    """(2, k) float, as `log_prior_of_lift` of hands that went straight, and of those that went up first.
+
+    Args:
+        rectangle: The cloth before.
+        uv: (k, 2) float, the candidates as fractions of the sides from corner C00.
+        hand: (3,) where the picked point is now [m].
+        sideways: Of those that went straight; None: all candidates are alike, however the hand went.
+    """
+    if sideways is None:
+        return np.zeros((2, len(np.asarray(uv))))
+    straight = log_prior_of_lift(rectangle, uv, hand, sideways)
+    # a density that is as much wider is lower everywhere, by the square of that
+    up_first = log_prior_of_lift(rectangle, uv, hand, FARTHER * sideways) - 2.0 * np.log(FARTHER)
+    return np.stack([straight, up_first])
 
 
 def _places(rectangle: ClothRectangle, uv: ArrayLike) -> np.ndarray:

@@ -16,7 +16,7 @@ from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
 from nuno.estimate.hypotheses import Discretisation
 from nuno.estimate.learned import Outline, correction, outline_of
-from nuno.estimate.lift_prior import log_prior_of_lift, log_prior_of_start
+from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import Comparison, Ranked
@@ -99,16 +99,24 @@ def try_picks(
     ranked: Ranked | None = None
     outline: Outline | None = None
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
-    meshes = settings.discretisations
+    meshes = list(settings.discretisations)
+    path_given = settings.hand_path is not None
     # an outline's triangles take several times as long as a rectangle's grid
-    may_look_at_all = settings.with_evidence and settings.hand_path is None and not isinstance(rectangle, ClothOutline)
-    for k, discretisation in enumerate(with_bar(meshes, "imagining", settings.progress, "mesh")):
+    may_look_at_all = settings.with_evidence and not path_given and not isinstance(rectangle, ClothOutline)
+    for k in with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"):
+        if meshes[k].any_way and ranked is not None and not path_given:
+            # once for all that follow, so that a device may imagine them together
+            meshes[k:] = [
+                replace(m.with_up_first(ranked.up_first), any_way=False) if m.any_way else m for m in meshes[k:]
+            ]
+        discretisation = meshes[k]
         chosen = np.arange(len(uv))
         looks_at_all = discretisation.all_if_poor and may_look_at_all and _fits_poorly(comparisons, ranked)
         if ranked is not None and discretisation.best is not None and not looks_at_all:
             chosen = ranked.plausible(discretisation.best)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
-        futures: Futures | None = None if ahead is None or looks_at_all else ahead.part(meshes[k:], chosen)
+        stages_ahead = meshes[k : k + 1] if looks_at_all else meshes[k:]
+        futures: Futures | None = None if ahead is None else ahead.part(stages_ahead, chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)
         stages.end("imagine")
@@ -153,13 +161,11 @@ def _weighed(comparison: Comparison, discretisation: Discretisation) -> Comparis
     return replace(comparison, correction=added + np.log(np.where(mistakes, GROSS_SHARE, 1.0))[:, None])
 
 
-def _prior(settings: PickSettings, rectangle: ClothRectangle) -> np.ndarray | None:
-    """Logarithms of how likely each candidate is before the image after is seen; None is alike."""
+def _prior(settings: PickSettings, rectangle: ClothRectangle) -> np.ndarray:
+    """Logarithms of how likely each candidate is before the image after is seen, where need be by the hand's way."""
     if settings.hand_path is not None:
         return log_prior_of_start(rectangle, settings.uv, settings.hand_path[0], settings.hand_std)
-    if settings.sideways is None:
-        return None
-    return log_prior_of_lift(rectangle, settings.uv, settings.hand, settings.sideways)
+    return log_priors_of_ways(rectangle, settings.uv, settings.hand, settings.sideways)
 
 
 def compare(futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings) -> Comparison:
@@ -172,4 +178,5 @@ def compare(futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSett
         chosen, settings.poses.turns, values["chamfer"] / IMAGE_SCALE, values["iou"], values["eq1"], futures.finite,
         None if seen.pattern is None else values["pattern"], shifts=settings.poses.shifts,
         log_priors=settings.poses.log_priors,
+        up_first=np.array([guess.up_first for guess in futures.discretisation.hypotheses]),
     )  # fmt: skip

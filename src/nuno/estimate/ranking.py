@@ -9,7 +9,8 @@ independent patches of cloth with normal errors of unknown size (`nuno.estimate.
 only masks, and for a cloth without a pattern. The weights and the mean were chosen on cases made for choosing
 (docs/reports/accuracy.md). What a network has learned of silhouettes corrects the likelihood of every guess
 (`nuno.estimate.learned`). How far sideways the hand would have gone from a candidate is its prior
-(`nuno.estimate.lift_prior`), by which its evidence is multiplied.
+(`nuno.estimate.lift_prior`), by which its evidence is multiplied. Where the hand may have gone straight or up first,
+the mean over the guesses of each way counts by the way's own prior: so it does not matter of which there are more.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nuno.estimate.lift_prior import UP_FIRST
 from nuno.estimate.rotations import log_prior
 
 RANKINGS = ("evidence", "silhouette", "chamfer", "iou", "eq1")
@@ -54,6 +56,7 @@ class Comparison:
         shifts: (turns, 3) float, how far the futures were moved after each turn [m]; None is not at all.
         log_priors: (turns,) float, logarithms of the priors of turns and shifts, which add up to 1; None is
             `nuno.estimate.rotations.log_prior` of the turns.
+        up_first: (guesses,) bool, of which the hand went up first; None is of none.
     """
 
     candidates: np.ndarray
@@ -66,6 +69,7 @@ class Comparison:
     correction: np.ndarray | None = None
     shifts: np.ndarray | None = None
     log_priors: np.ndarray | None = None
+    up_first: np.ndarray | None = None
 
     def error(self, score: str) -> np.ndarray:
         """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
@@ -97,12 +101,15 @@ class Ranked:
         eq1: (k,) float, the paper's similarity, without a turn: the best guess of each mesh, averaged over meshes.
         likely: (k,) float, how likely each candidate is as far as the evidence may be trusted (`nuno.estimate.doubt`);
             None: as the scores say.
+        up_first: How likely it is that the hand went up first, of the candidates of which both ways were looked at; 0
+            where none was.
     """
 
     name: str
     scores: np.ndarray
     eq1: np.ndarray
     likely: np.ndarray | None = None
+    up_first: float = 0.0
 
     @property
     def order(self) -> np.ndarray:
@@ -142,50 +149,73 @@ def rank(
     """Combine the comparisons of all meshes.
 
     The evidence of a candidate is the mean likelihood over all guesses that looked at it, times its prior where there
-    is one. The other scores take the best guess of each mesh and average over the meshes that looked at the candidate.
+    is one; of two ways of the hand, the sum of this by both. The other scores take the best guess of each mesh and
+    average over the meshes that looked at the candidate.
 
     Args:
         comparisons: One for each mesh.
         score: One of `RANKINGS`.
         count: Number of candidates.
         log_prior_of_candidates: (count,) float, how likely each is before any image is seen
-            (`nuno.estimate.lift_prior`), up to a constant; None is alike. Evidence alone asks for it.
+            (`nuno.estimate.lift_prior`), up to a constant; None is alike. Or (2, count), of hands that went straight
+            and of those that went up first, whose guesses are then told from each other. Evidence alone asks for it.
         without_best: Leave every candidate's best guess out of its evidence, if it has others: what a single guess
             says may be chance.
     """
-    looked, similar = np.zeros(count), np.zeros(count)
-    total, guesses = np.zeros(count), np.zeros(count)
-    errors, best = np.zeros(count), np.zeros(count)
-    # scaled by the best of all, for exp would underflow far from it
-    kind = score if score in EVIDENCE else "evidence"
-    offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(kind) for c in comparisons)), default=0.0)
-    offset = offset if np.isfinite(offset) else 0.0
+    looked, similar, errors = np.zeros(count), np.zeros(count), np.zeros(count)
     for comparison in comparisons:
         at = comparison.candidates
         looked[at] += 1
         similar[at] += 1.0 - np.minimum(comparison.error("eq1").min(axis=(0, 1)), 1.0)
-        guesses[at] += len(comparison.finite)
-        likelihood = np.exp(offset - comparison.error(kind)).sum(axis=0)
-        total[at] += likelihood.sum(axis=0)
-        best[at] = np.maximum(best[at], likelihood.max(axis=0))
         errors[at] += comparison.error(score).min(axis=(0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
+        eq1, mean = similar / looked, errors / looked
         if score in EVIDENCE:
             looks = score == "evidence" and any(c.pattern is not None for c in comparisons)
             name = "log_evidence_with_pattern" if looks else "log_evidence"
-            if without_best:
-                several = guesses > 1
-                # no less than rounding leaves of a sum without its largest part
-                total = np.where(several, np.maximum(total - best, 1e-12 * best), total)
-                guesses = guesses - several
-            scores = np.log(total / guesses) - offset
-            if log_prior_of_candidates is not None:
-                scores = scores + log_prior_of_candidates
-            return Ranked(name, scores, similar / looked)
-        mean = errors / looked
+            scores, up_first = _evidence(comparisons, score, log_prior_of_candidates, count, without_best)
+            return Ranked(name, scores, eq1, up_first=up_first)
         if score == "chamfer":
-            return Ranked("negative_chamfer_px", -mean, similar / looked)
-        return Ranked(score, 1.0 - mean, similar / looked)
+            return Ranked("negative_chamfer_px", -mean, eq1)
+        return Ranked(score, 1.0 - mean, eq1)
+
+
+def _evidence(
+    comparisons: Sequence[Comparison], score: str, log_priors: np.ndarray | None, count: int, without_best: bool
+) -> tuple[np.ndarray, float]:
+    """Logarithms of the candidates' evidence (count,), and how likely it is that the hand went up first."""
+    priors = np.zeros((1, count)) if log_priors is None else np.atleast_2d(log_priors)
+    shares = np.ones(1) if len(priors) == 1 else np.array((1.0 - UP_FIRST, UP_FIRST))
+    total, guesses, best = (np.zeros(priors.shape) for _ in range(3))
+    # scaled by the best of all, for exp would underflow far from it
+    offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(score) for c in comparisons)), default=0.0)
+    offset = offset if np.isfinite(offset) else 0.0
+    for comparison in comparisons:
+        likelihood = np.exp(offset - comparison.error(score)).sum(axis=0)
+        up_first = np.zeros(len(likelihood), dtype=bool) if comparison.up_first is None else comparison.up_first
+        for way in range(len(priors)):
+            of = likelihood if len(priors) == 1 else likelihood[up_first == bool(way)]
+            at = comparison.candidates
+            total[way, at] += of.sum(axis=0)
+            guesses[way, at] += len(of)
+            best[way, at] = np.maximum(best[way, at], of.max(axis=0, initial=0.0))
+    weights = priors + np.log(shares)[:, None]
+    if without_best:
+        highest = np.where(guesses > 0, np.log(best / guesses) + weights, -np.inf)
+        way, every = np.argmax(highest, axis=0), np.arange(count)
+        of, several = best[way, every], guesses[way, every] > 1
+        # no less than rounding leaves of a sum without its largest part
+        left = np.maximum(total[way, every] - of, 1e-12 * of)
+        total[way, every] = np.where(several, left, total[way, every])
+        guesses[way, every] -= several
+    known = guesses > 0
+    logs = np.where(known, np.log(total / guesses) - offset + weights, -np.inf)
+    scores = np.logaddexp.reduce(logs, axis=0) - np.log((known * shares[:, None]).sum(axis=0))
+    both = known.all(axis=0) & np.isfinite(scores)
+    if len(priors) == 1 or not both.any():
+        return scores, 0.0
+    of_ways = np.logaddexp.reduce(logs[:, both], axis=1)
+    return scores, float(np.exp(of_ways[1] - np.logaddexp(*of_ways)))
 
 
 def probabilities(name: str, scores: np.ndarray) -> np.ndarray | None:

@@ -4,8 +4,8 @@ A GPU takes hardly longer for 400 coarse cloths than for 100, which leave most o
 not sure, those after it with the same mesh and step are imagined together, of all candidates of the first of them, for
 each looks at the best of what the one before looked at. A stage then takes from the batch what it would have imagined
 itself, to the bit: a world is the same in any batch, and the batch is kept at every moment at which a stage may find
-that its cloths are at rest. So the device need not wait either while that is asked. What no stage asks for was in vain,
-and what a stage asks for beyond it is imagined anew.
+that one of its cloths is at rest (`nuno.estimate.coming_to_rest`). So the device need not wait either while that is
+asked. What no stage asks for was in vain, and what a stage asks for beyond it is imagined anew.
 """
 
 from __future__ import annotations
@@ -18,17 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.errors import SimulationDiverged
-from nuno.estimate.futures import (
-    LIFT_SECONDS,
-    LOOK_SECONDS,
-    REST_SPEED,
-    SETTLE_SECONDS,
-    Futures,
-    begin_picks,
-    mean_speeds,
-    slow_part,
-    solver_of,
-)
+from nuno.estimate.coming_to_rest import LOOK_SECONDS, REST_SPEED, SETTLE_SECONDS, ComingToRest, mean_speeds
+from nuno.estimate.futures import LIFT_SECONDS, Futures, begin_picks, solver_of
 from nuno.estimate.hypotheses import Discretisation
 
 if TYPE_CHECKING:
@@ -69,12 +60,14 @@ class Part(Futures):
 
     Attributes:
         batch: The whole batch.
-        moment: When the part was at rest, or as late as it may be.
+        moments: When the batch was looked at.
+        at: (hypotheses * candidates,) int, at which of these each future left, at rest, or as late as it may be.
         places: (hypotheses * candidates,) int, where the futures are in the batch.
     """
 
     batch: Futures
-    moment: Moment
+    moments: tuple[Moment, ...]
+    at: np.ndarray
     places: np.ndarray
 
     @property
@@ -87,15 +80,25 @@ class Part(Futures):
         """(hypotheses * candidates, n) of vec3, the cloths' vertices on the device [m]."""
         import warp as wp
 
-        found = self.moment.positions
-        places: Any = wp.array(self.places.astype(np.int32), dtype=int, device=found.device)
+        device: Any = self.moments[0].positions.device
         every: Any = None
-        return wp.indexedarray(found, [places, every]).contiguous()
+
+        def rows(array: wp.array, which: np.ndarray) -> Any:
+            chosen: Any = wp.array(which.astype(np.int32), dtype=int, device=device)
+            return wp.indexedarray(array, [chosen, every])
+
+        shape = (len(self.places), self.moments[0].positions.shape[1])
+        found: wp.array = wp.empty(shape, dtype=wp.vec3, device=device)
+        for number in np.unique(self.at):
+            of = np.flatnonzero(self.at == number)
+            wp.copy(rows(found, of), rows(self.moments[number].positions, self.places[of]).contiguous())
+        return found
 
     def whole(self, world: int) -> tuple[Futures, int]:
-        """The batch, brought back to the part's moment, and where future number ``world`` is in it."""
-        self.moment.solver.put_back(self.moment.state)
-        self.world._time = self.moment.time
+        """The batch, brought back to when future number ``world`` left, and where that is in it."""
+        moment = self.moments[self.at[world]]
+        moment.solver.put_back(moment.state)
+        self.world._time = moment.time
         return self.batch, int(self.places[world])
 
 
@@ -124,11 +127,25 @@ class Together:
         hypotheses = first + np.arange(len(stage.hypotheses))
         columns = np.array([int(np.nonzero(self.candidates == c)[0][0]) for c in chosen])
         places = (hypotheses[:, None] * len(self.candidates) + columns).ravel()
-        # as `nuno.estimate.futures.imagine_picks` asks it
-        rests = (m for m in self.moments if slow_part(m.speeds[places]) < REST_SPEED)
-        moment = next(rests, self.moments[-1])
-        batch = self.batch
-        return Part(batch.world, batch.body, batch.origin, len(chosen), stage, batch, moment, places)
+        batch, moments = self.batch, self.moments
+        return Part(
+            batch.world, batch.body, batch.origin, len(chosen), stage, batch, moments, moments_of_rest(moments, places),
+            places,
+        )  # fmt: skip
+
+
+def moments_of_rest(moments: Sequence[Moment], places: np.ndarray) -> np.ndarray:
+    """(k,) int, at which of the ``moments`` worlds ``places`` (k,) leave, as `imagine_picks` would let them."""
+    resting = ComingToRest(len(places))
+    at = np.full(len(places), len(moments) - 1)
+    for number, moment in enumerate(moments):
+        before = resting.going
+        if resting.look(moment.speeds[places[before]]):
+            at[before] = number
+            break
+        if (stay := resting.leave()) is not None:
+            at[before[~stay]] = number
+    return at
 
 
 def has_room(device: str) -> bool:
@@ -164,12 +181,15 @@ class Ahead:
 
 
 def alike(stages: Sequence[Discretisation]) -> tuple[Discretisation, ...]:
-    """The first stage, and where it looks at the best candidates those after it with the same mesh and step."""
+    """The first stage, and where it looks at the best candidates those after it with the same mesh and step.
+
+    Those whose hands' ways hang on what comes out before are left for later.
+    """
     first = stages[0]
     if first.best is None:
         return (first,)
-    same = (first.cells, first.substeps)
-    return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps) == same))
+    same = (first.cells, first.substeps, first.any_way)
+    return (first, *(s for s in stages[1:] if s.best is not None and (s.cells, s.substeps, s.any_way) == same))
 
 
 def imagine_together(

@@ -1,4 +1,4 @@
-"""States of some worlds of a batch, written over what those worlds have; all others keep every bit."""
+"""States of some worlds of a batch of particles, written over what those have; all others keep every bit."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.rigid.rigid_arrays import REPORTED
-from nuno.rigid.saved_contacts import load_listing, save_listing
 from nuno.solvers.particle_solver import ParticleSolver
-from nuno.solvers.rigid_solver import RigidSolver
 from nuno.state.cloth_state import FASTEST, LOADS, NOTES, ORIGIN
 
 
@@ -76,39 +73,3 @@ def put_rows(solver: ParticleSolver, array: wp.array, worlds: np.ndarray, values
     last = solver.world_count - 1
     if last in worlds:  # lanes beyond the last world repeat it
         table[-1, :, last % lanes + 1 :] = table[-1, :, last % lanes, None]
-
-
-class RigidRows:
-    """A rigid solver's reports of the last frame and listing of pairs, kept while some worlds are set anew.
-
-    Args:
-        solver: The solver.
-        worlds: (k,) int, the worlds that are set.
-    """
-
-    def __init__(self, solver: RigidSolver, worlds: np.ndarray) -> None:
-        self._solver, self._worlds = solver, worlds
-        solver._load_contacts()
-        self._listing = save_listing(solver)
-        self._reported = {name: solver._entries(name).copy() for name in REPORTED}
-
-    def settle(self, listing: Mapping[str, np.ndarray] | None, rows: np.ndarray) -> None:
-        """Give back what was kept; the worlds that were set take rows of a saved ``listing``, None to list anew."""
-        solver, worlds = self._solver, self._worlds
-        solver._load_contacts()
-        merged = save_listing(solver)
-        for name, values in merged.items():
-            kept = self._listing[name]
-            values[:, : kept.shape[1]] = kept
-            if listing is not None:
-                known = min(values.shape[1], listing[name].shape[1])
-                values[worlds, :known] = listing[name][rows, :known]
-        if listing is None:
-            merged["notes"][worlds] = -1.0
-        load_listing(solver, merged)
-        for name, values in self._reported.items():
-            values[worlds] = 0
-            now = solver._entries(name).copy()
-            now[:, : values.shape[1], : values.shape[2]] = values
-            array = getattr(solver.manifolds, name)
-            array.assign(now.reshape(array.numpy().shape))

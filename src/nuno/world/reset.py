@@ -87,7 +87,7 @@ def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> N
     moved = _set_statics(world, statics)
     scene, rigid = world._rigid, None
     if scene is not None and snapshot.rigid is not None:
-        from nuno.solvers.some_worlds import RigidRows
+        from nuno.solvers.rigid_rows import RigidRows
 
         rigid = RigidRows(scene.solver, worlds)
         origin = at.merged(scene.solver.origin, snapshot.rigid.origin, 1)

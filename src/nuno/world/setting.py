@@ -129,7 +129,7 @@ class Setting(Reading):
         """Return what keeps the listing of pairs of other worlds, None where there is nothing rigid."""
         if self._rigid is None:
             return None
-        from nuno.solvers.some_worlds import RigidRows
+        from nuno.solvers.rigid_rows import RigidRows
 
         self._bring_rigid()
         return RigidRows(self._rigid.solver, worlds)
