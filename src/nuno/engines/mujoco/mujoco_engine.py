@@ -30,7 +30,7 @@ STEP = 0.0021
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
 LACKING = {
-    "restitution beside deformables", "sliding welds", "compliant joints",
+    "sliding welds", "compliant joints",
     "limited welds and joints", "drives of ball joints", "cuda",
 }  # fmt: skip
 
@@ -277,7 +277,7 @@ class MujocoEngine(Engine):
 
 def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
     """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
-    if not moving and not targets and sums is None:
+    if not moving and not targets and not scene.bounces and sums is None:
         batch.step(nstep=count)
         return
     for k in range(count):
@@ -285,9 +285,11 @@ def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: A
             lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
         scene.holds.write(targets, batch, k, step)
         scene.joints.lead(batch)
+        scene.bounces.prepare(step)
         batch.step()
         if sums is not None:
             sums.add(step)
+    scene.bounces.settle(step)
 
 
 def _go_again(batch: Any, state: np.ndarray, go: Callable[[Any], None], sums: Any) -> None:

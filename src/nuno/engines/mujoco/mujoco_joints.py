@@ -8,8 +8,7 @@ MuJoCo cuts off an actuator's force before the substep, not at its end: a strong
 to and fro. Such a motor is a clutch too, which gives way as its gains do: with the stiffness k, the damping d, substeps
 h and the limit F, min(k (x - x_next) - d v_next, F) is a friction of at most F that has the coefficient c = k h + d
 against the velocity k (x - x_now) / c. MuJoCo's friction f obeys (v_next - v) / h + b v = -R f, where ``discrete``
-takes b at the velocity of the substep's end: f is the motor's for R = b / c and a large b. The other integrators take
-it at the start, and b = 1 / h makes the two terms one.
+takes b at the velocity of the substep's end: f is the motor's for R = b / c and a large b.
 """
 
 from __future__ import annotations
@@ -104,7 +103,7 @@ class Joints:
         self._made = 0
         self.states: Any = None
         self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
-        self._step, self._steepness = 0.0, STEEPNESS
+        self._step = 0.0
         self._carried: dict[Joint, np.ndarray] = {}
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         self._is_driven = False  # whether the numbers of the drives are those that the batch has
@@ -190,8 +189,6 @@ class Joints:
         self.number = np.array([model.joint(own.name).id for own in joined], dtype=int)
         self.qpos, self.dof = model.jnt_qposadr[self.number], model.jnt_dofadr[self.number]
         self._is_driven, self.states = False, None
-        is_discrete = model.opt.integrator == mujoco_package().mjtIntegrator.mjINT_DISCRETE
-        self._steepness = STEEPNESS if is_discrete else 1.0
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         if not joined:
             return
@@ -305,13 +302,13 @@ class Joints:
         pull = own["stiffness"] * own["position"] + damping * own["velocity"]
         self._gains = own["stiffness"], pull, np.where(self._gives, coefficient, 1.0)
         inverse = np.stack([batch.get_model(k).tendon_invweight0[self._clutch] for k in range(len(keeps))])
-        share = step * coefficient * inverse / self._steepness
+        share = step * coefficient * inverse / STEEPNESS
         impedance = np.clip(share / (1.0 + share), 1e-4, STIFF[0])  # R is (1 - d) / d of the inverse inertia
         batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps | self._gives, most, 0.0)
         solimp = batch.expand("tendon_solimp_fri")
         solimp[:, self._clutch] = STIFF
         solimp[:, self._clutch, :2] = np.where(self._gives, impedance, STIFF[0])[..., None]
-        gives = np.stack([np.full_like(impedance, -1e-9), -self._steepness * impedance / step], axis=-1)
+        gives = np.stack([np.full_like(impedance, -1e-9), -STEEPNESS * impedance / step], axis=-1)
         solref = np.where(self._gives[..., None], gives, (CLOSING * step, 1.0))
         batch.expand("tendon_solref_fri")[:, self._clutch] = solref
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.mujoco.mujoco_bounces import Bounces
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
@@ -23,7 +24,6 @@ from nuno.engines.mujoco.mujoco_touch import (
     CONTACT,
     IMPEDANCE,
     TouchingPair,
-    restitution_of,
     set_masks,
     set_pairs,
     write_friction,
@@ -90,6 +90,7 @@ class MujocoScene:
         batch: The batch of as many simulations as there are worlds.
         holds: The grips, and what is held as grips are, as equality constraints.
         joints: The hinges and sliders.
+        bounces: The pairs that bounce.
         sums: What joints bear and contacts give over a frame; None of cloth and soft bodies that were not asked about.
         compilations: How often the model was compiled.
         shortened: Whether a substep was of another length than the model's.
@@ -105,6 +106,7 @@ class MujocoScene:
         self.placed: dict[str, Placed]
         self.holds: Holds
         self.joints: Joints
+        self.bounces: Bounces
         self.model: Any = None
         self.batch: Any = None
         self.sums: Sums | None = None
@@ -166,10 +168,7 @@ class MujocoScene:
             if own.role == "rigid":
                 _share_mass(dynamics_of(body), _shares(own))
         self.spec.option.timestep, self.shortened = substep, False
-        # a contact that bounces needs one that takes its damper as it is, and a flex needs the other
-        bounces = any(restitution_of(world, body).any() for body in world.bodies)
-        kinds = self._mujoco.mjtIntegrator
-        self.spec.option.integrator = kinds.mjINT_IMPLICITFAST if bounces else kinds.mjINT_DISCRETE
+        self.spec.option.integrator = self._mujoco.mjtIntegrator.mjINT_DISCRETE
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
@@ -183,7 +182,10 @@ class MujocoScene:
         self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
-        write_pairs(self.model, self.batch, self._pairs, substep)
+        write_pairs(self.model, self.batch, self._pairs)
+        movable = {own.id for own in self.placed.values() if own.role == "rigid"}
+        bouncing = [(pair.name, pair.restitution) for pair in self._pairs]
+        self.bounces = Bounces(self.model, self.batch, bouncing, movable, (CONTACT, IMPEDANCE))
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
         self.sums = Sums(self, world.world_count) if kept else None
@@ -191,7 +193,6 @@ class MujocoScene:
     def set_step(self, step: float) -> None:
         """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
         self.batch.expand("opt.timestep")[:] = step
-        write_pairs(self.model, self.batch, self._pairs, step)
         self.joints.set_step(step)
         self.shortened = True
 
