@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_kinematics import Kinematics, velocity_of
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 
 STIFF = 1e10
@@ -53,14 +54,15 @@ class Bounces:
         batch: The batch.
         pairs: Names and restitutions (worlds,) of the explicit pairs.
         movable: Numbers of the bodies of those that are dynamic.
+        kinematics: Of the batch.
         calm: ``solref`` and ``solimp`` of a contact that does not bounce.
     """
 
     def __init__(
         self, model: Any, batch: Any, pairs: Sequence[tuple[str, np.ndarray]], movable: set[int],
-        calm: tuple[Sequence[float], Sequence[float]],
+        kinematics: Kinematics, calm: tuple[Sequence[float], Sequence[float]],
     ) -> None:  # fmt: skip
-        self._batch, self._calm = batch, calm
+        self._batch, self._kinematics, self._calm = batch, kinematics, calm
         self._pairs = []
         for name, restitution in pairs:
             if not restitution.any():
@@ -70,8 +72,6 @@ class Bounces:
             bodies = int(model.geom_bodyid[geoms[0]]), int(model.geom_bodyid[geoms[1]])
             falls = bodies[0] in movable, bodies[1] in movable
             self._pairs.append(BouncingPair(number, geoms, bodies, restitution, falls))
-        self._models: list[Any] = []
-        self._data: Any = None
         self._bounced: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
@@ -81,20 +81,9 @@ class Bounces:
         """Let the pairs that would meet within the next substep, of ``step`` [s], bounce in it, and no others."""
         if not self._pairs:
             return
-        mujoco, batch = mujoco_package(), self._batch
-        worlds = len(batch.bind("qpos"))
-        if not self._models:
-            self._models = [batch.get_model(world) for world in range(worlds)]
-            self._data = mujoco.MjData(self._models[0])
         self.settle(step)
-        data = self._data
-        for world, model in enumerate(self._models):
-            for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
-                getattr(data, name)[:] = batch.bind(name)[world]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_comVel(model, data)
-            gravity = batch.expand("opt.gravity")[world]
+        for world, model, data in self._kinematics.of_worlds():
+            gravity = self._batch.expand("opt.gravity")[world]
             for pair in self._pairs:
                 if pair.restitution[world] > 0.0:
                     margin = _margin(pair, float(pair.restitution[world]), model, data, gravity, step)
@@ -122,23 +111,18 @@ class Bounces:
 
 def _margin(pair: BouncingPair, e: float, model: Any, data: Any, gravity: np.ndarray, step: float) -> float | None:
     """Return to which distance [m] of each other a bounce takes two geoms in a substep; None where they do not meet."""
-    mujoco, ends = mujoco_package(), np.zeros(6)
-    motions = []
-    for body in pair.bodies:
-        motion = np.zeros(6)
-        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, motion, 0)
-        motions.append((motion[:3], motion[3:], data.xpos[body]))
+    motions, ends = [(*velocity_of(model, data, body), data.xpos[body]) for body in pair.bodies], np.zeros(6)
     reach = [
         np.linalg.norm(velocity)
         + np.linalg.norm(spin) * (np.linalg.norm(data.geom_xpos[geom] - place) + model.geom_rbound[geom])
-        for (spin, velocity, place), geom in zip(motions, pair.geoms, strict=True)
+        for (velocity, spin, place), geom in zip(motions, pair.geoms, strict=True)
     ]
     most = step * float(sum(reach)) + 1e-6
     # a plane has no radius
     radii, apart = model.geom_rbound[list(pair.geoms)], np.ptp(data.geom_xpos[list(pair.geoms)], axis=0)
     if radii.all() and np.linalg.norm(apart) > radii.sum() + most:
         return None
-    distance = mujoco.mj_geomDistance(model, data, *pair.geoms, most, ends)
+    distance = mujoco_package().mj_geomDistance(model, data, *pair.geoms, most, ends)
     if distance >= most:
         return None
     points = ends.reshape(2, 3)
@@ -148,7 +132,7 @@ def _margin(pair: BouncingPair, e: float, model: Any, data: Any, gravity: np.nda
         normal = data.geom_xpos[pair.geoms[1]] - data.geom_xpos[pair.geoms[0]]
         normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
     first, second = (
-        velocity + np.cross(spin, point - place) for (spin, velocity, place), point in zip(motions, points, strict=True)
+        velocity + np.cross(spin, point - place) for (velocity, spin, place), point in zip(motions, points, strict=True)
     )
     speed = float(normal @ (second - first))
     falls = [float(normal @ gravity) if moves else 0.0 for moves in pair.falls]

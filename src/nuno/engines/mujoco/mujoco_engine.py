@@ -13,7 +13,7 @@ from nuno.bodies.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
-from nuno.engines.mujoco.mujoco_grips import push, send
+from nuno.engines.mujoco.mujoco_leaders import push, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_touch import touch_classes
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
@@ -29,17 +29,13 @@ STEP = 0.0021
 """[s] The longest substep where none are asked for: MuJoCo's default is 2 ms, a frame of 1/60 s has 8 of 2.08 ms."""
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
-LACKING = {
-    "sliding welds", "compliant joints",
-    "limited welds and joints", "drives of ball joints", "cuda",
-}  # fmt: skip
 
 
 class MujocoEngine(Engine):
     """MuJoCo 4: flexes with the ``discrete`` integrator, on the CPU; see docs/engines.md."""
 
     name = "mujoco"
-    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - LACKING
+    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - {"cuda"}
 
     def __init__(self, world: Simulation) -> None:
         super().__init__(world)
@@ -117,7 +113,9 @@ class MujocoEngine(Engine):
         batch = scene.batch
         count = max(1, math.ceil((end - start) / self.substep - 1e-6))
         step = (end - start) / count
-        if not math.isclose(step, self.substep, rel_tol=1e-9) or scene.shortened:
+        if math.isclose(step, self.substep, rel_tol=1e-9):
+            step = self.substep  # to the bit what the model was compiled with, also after one that was cut short
+        if step != self.substep or scene.shortened:
             scene.set_step(step)
         times = start + step * np.arange(count + 1)
         paths = {
@@ -205,6 +203,8 @@ class MujocoEngine(Engine):
             if np.shape(values.get("warmstart"))[1:] == dofs.shape:  # a joint that is new has other coordinates
                 warm[:, dofs] = values["warmstart"]
         scene.joints.write(batch, moved)
+        scene.balls.write()
+        scene.bushings.begin()
 
     def _read(self) -> None:
         """Read all states out of the batch."""
@@ -249,7 +249,11 @@ class MujocoEngine(Engine):
         return wrench_of(self, grip)
 
     def effort(self, joint: Any) -> np.ndarray:
-        """Return what a joint's drives did, in the mean over the last frame."""
+        """Return what a joint's drives did, in the mean over the last frame; a ball's cone, in the present state."""
+        if not is_of_tree(joint):
+            from nuno.engines.mujoco.mujoco_forces import effort_of
+
+            return effort_of(self, joint)
         return self.joint_loads([joint])[1][:, 0]
 
     def joint_loads(self, joints: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -277,7 +281,8 @@ class MujocoEngine(Engine):
 
 def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
     """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
-    if not moving and not targets and not scene.bounces and sums is None:
+    changes = moving or targets or scene.bounces or scene.bushings.changes or scene.balls.changes
+    if not changes and sums is None:
         batch.step(nstep=count)
         return
     for k in range(count):
@@ -285,11 +290,14 @@ def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: A
             lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
         scene.holds.write(targets, batch, k, step)
         scene.joints.lead(batch)
+        scene.bushings.follow(step)
+        scene.balls.follow()
         scene.bounces.prepare(step)
         batch.step()
         if sums is not None:
             sums.add(step)
     scene.bounces.settle(step)
+    scene.bushings.end(step)
 
 
 def _go_again(batch: Any, state: np.ndarray, go: Callable[[Any], None], sums: Any) -> None:

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited
+from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_tree import (
     JointStates,
@@ -27,6 +29,7 @@ from nuno.engines.mujoco.mujoco_tree import (
     inertias,
     rest_pose,
 )
+from nuno.engines.world_view import dynamics_of
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
@@ -60,6 +63,8 @@ class Jointed:
         name: Of MuJoCo's joint, site, actuator and sensors.
         helper: The helper, or None: a copy of the body, which takes a share of its mass.
         clutch: Whether it has one.
+        weld: Whether the body is welded to the helper.
+        bushing: By which else the helper holds it.
     """
 
     joint: Joint
@@ -67,6 +72,8 @@ class Jointed:
     name: str
     helper: Any = None
     clutch: bool = False
+    weld: bool = False
+    bushing: Bushing | None = None
 
 
 def hang(made: Any, name: str, joint: Joint) -> None:
@@ -89,14 +96,15 @@ class Joints:
 
     Args:
         world: The world.
+        bushings: Its bushings.
 
     Attributes:
         states: Their coordinates from the bodies' states, and back.
         qpos, dof, number: Addresses (n,) of their coordinates and velocities in the model, and their numbers there.
     """
 
-    def __init__(self, world: Simulation) -> None:
-        self._world = world
+    def __init__(self, world: Simulation, bushings: Bushings) -> None:
+        self._world, self._bushings = world, bushings
         self._joined: list[Jointed] = []
         self._elements: list[Any] = []
         self._spec: Any = None
@@ -145,15 +153,28 @@ class Joints:
         joined = placed[joint.body.key]
         parent = self._spec.worldbody if joint.target is None else placed[joint.target.key].bodies[0]
         helper = parent.add_body(name=f"j{self._made}")
-        joined.helpers.append(helper)
         hang(helper, helper.name, joint)
+        self._elements.append(helper)
+        if is_limited(joint.spec):
+            joined.thin.append(helper)
+            return Jointed(joint, -1, helper.name, helper, bushing=self._add_bushing(joint, joined.bodies[0], helper))
+        joined.helpers.append(helper)
         mujoco = mujoco_package()
         weld = self._spec.add_equality(
             name=helper.name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=helper.name,
             name2=joined.bodies[0].name, solimp=STIFF,
         )  # fmt: skip
-        self._elements += [helper, weld]
-        return Jointed(joint, -1, helper.name, helper)
+        self._elements.append(weld)
+        return Jointed(joint, -1, helper.name, helper, weld=True)
+
+    def _add_bushing(self, joint: Joint, body: Any, helper: Any) -> Bushing:
+        """Let a limited force hold a body at the helper that its joint has."""
+        spec, turn = joint.spec, np.tile(quat.IDENTITY, (self._world.world_count, 1))
+        dynamics = dynamics_of(joint.body)
+        frames = spec.place, turn, spec.place, turn
+        return self._bushings.add(
+            self._spec, (body, helper), frames, spec, float(dynamics.mass[0]), self._step, dynamics, other_moves=False
+        )
 
     def _add_drive(self, own: Jointed) -> None:
         mujoco, spec, name = mujoco_package(), self._spec, own.name
@@ -222,7 +243,7 @@ class Joints:
     def weld(self, model: Any, batch: Any, step: float) -> None:
         """Write of each helper that it is where the body is, after MuJoCo's constants are set, which would undo it."""
         for own in self._joined:
-            if own.helper is None:
+            if not own.weld:
                 continue
             row, place = model.equality(own.name).id, own.joint.spec.place
             batch.expand("eq_solref")[:, row] = CLOSING * step, 1.0
@@ -317,8 +338,8 @@ class Joints:
         if self._joined:
             self.states.set_bodies(batch.bind("qpos")[:, self.qpos], batch.bind("qvel")[:, self.dof], moved)
 
-    def loads(self, batch: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return what the last substep's joints bore and did.
+    def loads(self, batch: Any, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the joints bore and did in the last substep, of ``step`` [s].
 
         Force [N] and torque [N m] of each body on the other, (worlds, n, 6), along the world's axes and about the
         joint; and the part of it along the free direction that drives do to the body [N m; N], (worlds, n).
@@ -326,6 +347,10 @@ class Joints:
         given = batch.bind("sensordata")[:, self._sensor].reshape(self._world.world_count, -1, 2, 3)
         frames = batch.bind("site_xmat")[:, self._site].reshape(*given.shape[:2], 3, 3)
         on_body = np.einsum("wnxy,wnky->wnkx", frames, given)
+        self._bushings.note(step)
+        for n, own in enumerate(self._joined):
+            if own.bushing is not None:  # which MuJoCo's sensors do not see
+                on_body[:, n] += own.bushing.last.reshape(-1, 2, 6)[..., :3]
         axis = batch.bind("xaxis")[:, self.number]
         which = np.where(self.states.slides, 0, 1)
         along = np.einsum("wnx,wnx->wn", on_body[:, np.arange(len(which)), which], axis)

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_ball
 from nuno.engines.mujoco.mujoco_bounces import Bounces
+from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
-from nuno.engines.mujoco.mujoco_loose import THIN
+from nuno.engines.mujoco.mujoco_kinematics import Kinematics
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
@@ -29,8 +31,8 @@ from nuno.engines.mujoco.mujoco_touch import (
     write_friction,
     write_pairs,
 )
-from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
-from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
+from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, is_of_tree, plan_tree
+from nuno.engines.world_view import attached, bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
     from nuno.joints.joint import Joint
     from nuno.world.simulation import Simulation
 
+THIN = 0.02
+"""Share of its body's mass that the helper of a joint has that is loose or a ball."""
 HEAVY = 1e6
 """[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
 LEADING = 0.5 * HEAVY
@@ -57,7 +61,7 @@ class Placed:
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
         helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
-        thin: Helpers of loose holds, each with a fiftieth of its mass.
+        thin: Helpers of joints that are loose or balls, each with a fiftieth of its mass.
         carries: Whether bodies hang on it by joints.
         depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
@@ -90,6 +94,7 @@ class MujocoScene:
         batch: The batch of as many simulations as there are worlds.
         holds: The grips, and what is held as grips are, as equality constraints.
         joints: The hinges and sliders.
+        bushings, balls: The bushings, and the ball joints with drives.
         bounces: The pairs that bounce.
         sums: What joints bear and contacts give over a frame; None of cloth and soft bodies that were not asked about.
         compilations: How often the model was compiled.
@@ -106,6 +111,8 @@ class MujocoScene:
         self.placed: dict[str, Placed]
         self.holds: Holds
         self.joints: Joints
+        self.bushings: Bushings
+        self.balls: Balls
         self.bounces: Bounces
         self.model: Any = None
         self.batch: Any = None
@@ -125,7 +132,8 @@ class MujocoScene:
         # bodies that a joint joins touch each other where the world says so, not where MuJoCo would
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
         self.spec, self.placed = spec, {}
-        self.holds, self.joints = Holds(self._world), Joints(self._world)
+        self.bushings, self.balls = Bushings(), Balls()
+        self.holds, self.joints = Holds(self._world, self.bushings, self.balls), Joints(self._world, self.bushings)
         self._settings = (self._world.gravity, self._world.world_count)
 
     def bring(self, substep: float) -> None:
@@ -147,8 +155,8 @@ class MujocoScene:
         if self._settings != (world.gravity, world.world_count) or any(self.placed[k].role == "flex" for k in dropped):
             self._begin()
         else:
-            self.holds.clear()
-            self.joints.clear()
+            for part in (self.bushings, self.holds, self.balls, self.joints):  # what refers to others goes first
+                part.clear()
             for key in sorted(dropped, key=lambda key: -self.placed[key].depth):  # a body's children go with it
                 self._delete(key)
         for depth, key, body in found:
@@ -156,13 +164,13 @@ class MujocoScene:
                 _, role, signature = wanted[key]
                 self.placed[key] = self._place(body, role, signature, tree.get(key))
                 self.placed[key].depth = depth
-        carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
+        carriers = {joint.target.key for joint in _helped(world) if joint.target is not None}
         for key, own in self.placed.items():
             own.carries, own.helpers, own.thin = key in carriers, [], []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
         self._pairs = set_pairs(self.spec, world, bodies)
-        self.holds.add(self.spec, self.placed)
+        self.holds.add(self.spec, self.placed, substep)
         self.joints.add(self.spec, self.placed, tree, substep)
         for body, own in bodies:
             if own.role == "rigid":
@@ -184,10 +192,13 @@ class MujocoScene:
         write_friction(self.model, self.batch, bodies)
         write_pairs(self.model, self.batch, self._pairs)
         movable = {own.id for own in self.placed.values() if own.role == "rigid"}
+        kinematics = Kinematics(self.batch)
         bouncing = [(pair.name, pair.restitution) for pair in self._pairs]
-        self.bounces = Bounces(self.model, self.batch, bouncing, movable, (CONTACT, IMPEDANCE))
+        self.bounces = Bounces(self.model, self.batch, bouncing, movable, kinematics, (CONTACT, IMPEDANCE))
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
+        self.bushings.find(self.model, self.batch, kinematics)
+        self.balls.find(self.model, self.batch, kinematics, substep)
         self.sums = Sums(self, world.world_count) if kept else None
 
     def set_step(self, step: float) -> None:
@@ -313,6 +324,12 @@ def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
         made.fullinertia = [
             inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
         ]  # fmt: skip
+
+
+def _helped(world: Simulation) -> list[Joint]:
+    """Return the joints whose body, or a helper of it, hangs on the other body."""
+    grips = [grip for dynamics in attached(world) for grip in dynamics.grips]
+    return [grip for grip in grips if is_of_tree(grip) or is_driven_ball(grip.spec)]
 
 
 def flex_id(model: Any, name: str) -> int:

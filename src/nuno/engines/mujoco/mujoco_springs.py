@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_bushing import is_limited
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.joints.grip import GripSpec
 from nuno.joints.tie import TieSpec
@@ -27,7 +28,7 @@ STRONGEST = 1e9
 def is_spring(spec: Any) -> bool:
     """Return True if a grip's points are drawn by springs: it gives way, or its force is limited."""
     if isinstance(spec, TieSpec):
-        return spec.places is None and spec.compliance > 0.0
+        return spec.places is None and (spec.compliance > 0.0 or is_limited(spec))
     return isinstance(spec, GripSpec) and (spec.compliance > 0.0 or spec.max_force is not None)
 
 
@@ -55,12 +56,13 @@ def find_springs(own: Held, placed: dict[str, Any], model: Any, batch: Any) -> N
     spec, mine = own.grip.spec, placed[own.grip.body.key]
     assert own.point is not None and own.rest is not None
     own.rows = np.array([model.actuator(name).id for name in own.names], dtype=int).reshape(-1, 3)
-    most = max((len(terms) for terms in own.terms), default=1)
-    own.corners, own.weights = np.zeros((len(own.terms), most), dtype=int), np.zeros((len(own.terms), most))
-    for k, terms in enumerate(own.terms):
-        for n, (corner, weight) in enumerate(terms):
-            own.corners[k, n], own.weights[k, n] = corner, weight
-    own.qpos, own.dof = mine.qpos[own.corners], mine.dof[own.corners]
+    own.weights, vertices = _table(own.terms)
+    own.qpos, own.dof = mine.qpos[vertices], mine.dof[vertices]
+    if isinstance(spec, TieSpec):
+        assert own.grip.target is not None
+        theirs, vertices = _table(own.others)
+        own.weights = np.concatenate([own.weights, theirs], axis=1)
+        own.qpos = np.concatenate([own.qpos, placed[own.grip.target.key].qpos[vertices]], axis=1)
     stiffness = stiffness_of(spec)
     law, limits = batch.expand("actuator_biasprm"), batch.expand("actuator_forcerange")
     law[:, own.rows], limits[:, own.rows] = 0.0, (0.0, 0.0)
@@ -80,8 +82,22 @@ def draw(own: Held, batch: Any, goals: np.ndarray) -> None:
     which = own.point[world, point]
     rows, goal = own.rows[which], goals[world, point] - own.rest[which]
     batch.expand("actuator_biasprm")[world[:, None], rows, 0] = stiffness * goal
-    if spec.max_force is None:
-        return
+    if spec.max_force is not None:
+        _limit(own, batch, world, goal)
+
+
+def limit_tie(own: Held, batch: Any) -> None:
+    """Let the springs of a tie of two cloths or soft bodies bear its limit along the way between its sides."""
+    assert own.point is not None and own.rest is not None
+    world, point = np.nonzero(own.point >= 0)
+    _limit(own, batch, world, -own.rest[own.point[world, point]])
+
+
+def _limit(own: Held, batch: Any, world: np.ndarray, goal: np.ndarray) -> None:
+    """Write the limits of springs in ``world`` (n,), which draw their sums of coordinates to ``goal`` (n, 3) [m]."""
+    assert own.point is not None
+    spec, stiffness = own.grip.spec, stiffness_of(own.grip.spec)
+    which = own.point[own.point >= 0]
     places = batch.bind("qpos")[world[:, None, None], own.qpos[which][..., None] + np.arange(3)]
     way = goal - np.einsum("pc,pcx->px", own.weights[which], places)
     length = np.linalg.norm(way, axis=1, keepdims=True)
@@ -89,7 +105,17 @@ def draw(own: Held, batch: Any, goals: np.ndarray) -> None:
     # at its limit it draws along the way to the goal; below, no coordinate is beyond it
     share = np.divide(np.abs(way), length, out=np.ones_like(way), where=stiffness * length >= limit)
     most = limit * np.maximum(share, 1e-6)
-    batch.expand("actuator_forcerange")[world[:, None], rows] = np.stack([-most, most], axis=-1)
+    batch.expand("actuator_forcerange")[world[:, None], own.rows[which]] = np.stack([-most, most], axis=-1)
+
+
+def _table(terms: list[list[tuple[int, float]]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights and vertices (points, most) of sums of vertices, 0 for none."""
+    most = max((len(own) for own in terms), default=1)
+    weights, vertices = np.zeros((len(terms), most)), np.zeros((len(terms), most), dtype=int)
+    for k, own in enumerate(terms):
+        for n, (vertex, weight) in enumerate(own):
+            weights[k, n], vertices[k, n] = weight, vertex
+    return weights, vertices
 
 
 def drawn_with(own: Held, data: Any, world: int) -> np.ndarray:
@@ -98,5 +124,6 @@ def drawn_with(own: Held, data: Any, world: int) -> np.ndarray:
     given = np.zeros(len(data.qvel))
     for point in np.unique(own.point[world][own.point[world] >= 0]):
         force = data.actuator_force[own.rows[point]]
-        np.add.at(given, own.dof[point][:, None] + np.arange(3), own.weights[point][:, None] * force)
+        weights = own.weights[point, : own.dof.shape[1], None]
+        np.add.at(given, own.dof[point][:, None] + np.arange(3), weights * force)
     return given

@@ -41,7 +41,7 @@ class Sums:
         """Add what happened in the last substep, of ``step`` [s]."""
         self._duration += step
         if self._joints:
-            borne, along = self._of_joints.loads(self._batch)
+            borne, along = self._of_joints.loads(self._batch, step)
             self._borne += step * borne
             self._along += step * along
         if self._data is None:
