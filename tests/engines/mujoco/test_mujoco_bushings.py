@@ -116,8 +116,8 @@ def test_a_limited_grip_holds_what_it_can_bear_and_lets_fall_what_it_cannot(shar
     np.testing.assert_allclose(grip.wrench[0], (0.0, 0.0, -min(share, 1.0) * G), rtol=1e-6, atol=1e-9)
 
 
-def test_a_limit_is_of_the_size_of_force_and_torque_and_what_was_torn_off_comes_back():
-    """A 2 N grip takes 1 kg aslant with 2 m/s2; a torque of 0.036 N m less 0.01 spins it up; it is back without it."""
+def test_a_limit_is_of_the_size_of_force_and_torque():
+    """A 2 N grip takes 1 kg aslant with 2 m/s2; a torque of 0.036 N m less 0.01 spins it up."""
     world = world_of(gravity=(0.0, 0.0, 0.0))
     block = block_in(world, drag=0.0)
     away = np.array((5.0, 4.0, 2.0))
@@ -136,9 +136,22 @@ def test_a_limit_is_of_the_size_of_force_and_torque_and_what_was_torn_off_comes_
     spun = (1.0 - 0.01 / size) * torque / (0.01 / 6.0)
     np.testing.assert_allclose(block.angular_velocity, spun * (0.2 - STEP), rtol=1e-3, atol=1e-9)
     np.testing.assert_allclose(grip.wrench[1], 0.01 / size * torque, rtol=1e-4, atol=1e-9)
-    world.set_velocity(block, (0.0, 0.0, 0.0))
-    world.run(2.0)
-    assert abs(block.quaternion[0]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_what_was_torn_off_comes_back_as_in_nuno():
+    """By 0.8 m, and back with 1 m/s and 5 m/s2 at most: within the 8 mm of the first substep, which bore all."""
+    ways = {}
+    for engine in ("nuno", "mujoco"):
+        world = nuno.World(device="cpu", engine=engine, gravity=(0.0, 0.0, 0.0))
+        block = block_in(world, drag=0.0)
+        world.grip(block, to=block.position, max_force=5.0)
+        world.push(block, (10.0, 0.0, 0.0), duration=0.4)
+        ways[engine] = []
+        for _ in range(6):
+            world.run(0.2)
+            ways[engine].append(block.position[0])
+    np.testing.assert_allclose(ways["mujoco"], ways["nuno"], atol=10.0 * STEP * 0.4 * 1.5)
+    assert max(ways["nuno"]) > 0.7 and ways["nuno"][-1] < 0.2
 
 
 def test_a_limited_weld_between_two_bodies_goes_as_in_nuno():

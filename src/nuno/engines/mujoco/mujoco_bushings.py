@@ -125,7 +125,7 @@ class Bushings:
             limits[:, own.number] = np.stack([-most, most], axis=-1)
 
     def begin(self) -> None:
-        """Take over, before a frame, what the last substep of the frame before it was, as the bodies' states have it."""
+        """Take over, before a frame, what the last substep was, as the bodies' states have it."""
         for own, values, k, count in self._kept():
             kept, shape = values.get(KEPT), (len(own.worlds), count, KEPT_NUMBERS)
             own.last = kept[:, k].copy() if kept is not None and kept.shape == shape else np.zeros((shape[0], shape[2]))
