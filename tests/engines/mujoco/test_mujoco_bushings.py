@@ -147,7 +147,7 @@ def test_what_was_torn_off_comes_back_as_in_nuno():
         world.grip(block, to=block.position, max_force=5.0)
         world.push(block, (10.0, 0.0, 0.0), duration=0.4)
         ways[engine] = []
-        for _ in range(6):
+        for _ in range(8):
             world.run(0.2)
             ways[engine].append(block.position[0])
     np.testing.assert_allclose(ways["mujoco"], ways["nuno"], atol=10.0 * STEP * 0.4 * 1.5)
