@@ -99,8 +99,8 @@ class Bushing:
 
     @property
     def changes(self) -> bool:
-        """Whether it has numbers that are written before each substep."""
-        return self.limit is not None or self.free is not None
+        """Whether it is followed from substep to substep: its law changes, or its force is not read off where it is."""
+        return self.limit is not None or self.free is not None or not self.gives
 
 
 def limited(

@@ -203,6 +203,7 @@ class MujocoEngine(Engine):
             if np.shape(values.get("warmstart"))[1:] == dofs.shape:  # a joint that is new has other coordinates
                 warm[:, dofs] = values["warmstart"]
         scene.joints.write(batch, moved)
+        scene.holds.place(batch)
         scene.balls.write()
         scene.bushings.begin()
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
 from nuno.engines.mujoco.mujoco_balls import Ball, Balls, is_driven_ball
+from nuno.engines.mujoco.mujoco_blends import Blend, add_blend, find_blend, place_blend
 from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited, is_loose
 from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_leaders import LEADER, send
@@ -55,6 +56,7 @@ class Held:
         terms, others: Of one by springs, of each distinct point its own vertices with their weights, and of a tie the
             other body's, whose weights are below 0.
         weights, qpos, dof: Of the same, arrays (points, most), and where they are in the model.
+        blends: Of a tie of points inside faces to a rigid body, these points.
         bushings: Of a loose one, its bushings.
         ball: Of a ball joint with drives, that.
     """
@@ -71,6 +73,7 @@ class Held:
     weights: Any = None
     qpos: Any = None
     dof: Any = None
+    blends: list[Blend] = field(default_factory=list)
     bushings: list[Bushing] = field(default_factory=list)
     ball: Ball | None = None
 
@@ -134,7 +137,9 @@ class Holds:
         mine = placed[own.grip.body.key]
         corners, weights = corners_of(spec)
         other_corners, other_weights = getattr(spec, "other_corners", None), getattr(spec, "other_weights", None)
-        rigid, loose = isinstance(spec, TieSpec) and spec.places is not None, is_loose(spec)
+        rigid = isinstance(spec, TieSpec) and spec.places is not None
+        # a stiff equality with a light point would give way
+        loose = is_loose(spec) or (rigid and bool(((weights > 0.0).sum(axis=-1) > 1).any()))
         target: Any = placed[own.grip.target.key] if own.grip.target is not None else None
         known: dict[Any, int] = {}
         rest: list[np.ndarray] = []
@@ -156,7 +161,7 @@ class Holds:
                     place = place + sum(w * target.mesh.rest[c] for c, w in others)
                 rest.append(np.asarray(place))
                 if loose:
-                    self._add_bushing(own, (mine.bodies[terms[0][0]], target.bodies[0]), other=spec.places[:, k])
+                    self._add_bushing(own, (self._point(own, mine, terms), target.bodies[0]), other=spec.places[:, k])
                 elif rigid:
                     self._equality(own, "CONNECT", mine.bodies[terms[0][0]].name, target.bodies[0].name, "BODY")
                 else:
@@ -165,6 +170,16 @@ class Holds:
         for k, made in enumerate(own.bushings):
             made.worlds = (own.point == k).any(axis=1)
         own.rest = np.array(rest).reshape(-1, 3)
+
+    def _point(self, own: Held, mine: Any, terms: list[tuple[int, float]]) -> Any:
+        """Return the body of a vertex in the spec, or of a blend of some, which is added."""
+        if len(terms) == 1:
+            return mine.bodies[terms[0][0]]
+        self._made += 1
+        blend = add_blend(self._spec, f"p{self._made}", mine, terms)
+        self._elements += blend.elements
+        own.blends.append(blend)
+        return blend.body
 
     def _add_coordinates(self, own: Held, mine: Any, terms: Any, target: Any, others: Any) -> None:
         """Add an equality, or a spring, of each coordinate of a point of a flex."""
@@ -258,6 +273,8 @@ class Holds:
             own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
             batch.expand("eq_solref")[:, own.rows] = (CLOSING * step, 1.0)
             spec = own.grip.spec
+            for blend in own.blends:
+                find_blend(blend, placed[own.grip.body.key], model, batch, step)
             if own.leader is not None:
                 body = model.body(own.leader.name).id
                 own.address = int(model.jnt_qposadr[model.body_jntadr[body]]), int(model.body_dofadr[body])
@@ -294,6 +311,12 @@ class Holds:
                     else:
                         data[world, rows[point], :5] = 0.0
                         data[world, rows[point], 0] = -own.rest[point]
+
+    def place(self, batch: Any) -> None:
+        """Set what is not a body of the world to where it belongs, once those are written."""
+        for own in self._held:
+            for blend in own.blends:
+                place_blend(blend, batch)
 
     def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
         """Return where each driven grip leads at ``times`` (k + 1,) [s] from ``start`` to ``end``."""
