@@ -29,7 +29,7 @@ NARROWEST = 1e-3
 """[rad] Of a cone; the tendon has no direction where the axis does not lean."""
 FAR = 10.0
 """[m] The tendon's length where there is no cone."""
-LEAST = 1e-3
+SMALLEST = 1e-3
 """Of friction, the share of each axis at least."""
 
 
@@ -38,7 +38,7 @@ def drive_of(spec: JointSpec, name: str) -> np.ndarray:
     return np.asarray(spec.drives[:, DRIVES.index(name)])
 
 
-def is_driven_ball(spec: Any) -> bool:
+def is_driven_spherical(spec: Any) -> bool:
     """Return True if a joint is a ball with a spring, friction or a cone in any world."""
     if not isinstance(spec, JointSpec) or spec.kind != "ball":
         return False
@@ -47,7 +47,7 @@ def is_driven_ball(spec: Any) -> bool:
 
 
 @dataclass(eq=False)
-class Ball:
+class SphericalJoint:
     """A driven ball joint.
 
     Attributes:
@@ -72,7 +72,7 @@ class Balls:
 
     def __init__(self) -> None:
         self._made = 0
-        self._all: list[Ball] = []
+        self._all: list[SphericalJoint] = []
         self._elements: list[Any] = []
         self._spec: Any = None
         self._batch: Any = None
@@ -84,7 +84,7 @@ class Balls:
 
     @property
     def changes(self) -> bool:
-        """Whether any has friction, whose limits are written before each substep."""
+        """Return True if any has friction, whose limits are written before each substep."""
         return self._slips
 
     # The spec
@@ -95,7 +95,7 @@ class Balls:
             self._spec.delete(element)
         self._all, self._elements = [], []
 
-    def add(self, spec: Any, joint: Any, body: Any, other: Any) -> Ball:
+    def add(self, spec: Any, joint: Any, body: Any, other: Any) -> SphericalJoint:
         """Add the helper and the cone of a joint to a spec, between a body and another in it."""
         mujoco = mujoco_package()
         self._made, self._spec = self._made + 1, spec
@@ -110,7 +110,7 @@ class Balls:
         cone.wrap_site(name)
         cone.wrap_site(tip.name)
         self._elements += [helper, tip, cone]
-        made = Ball(joint, helper, (body.name, other.name))
+        made = SphericalJoint(joint, helper, (body.name, other.name))
         self._all.append(made)
         return made
 
@@ -165,7 +165,7 @@ class Balls:
             spin = np.abs(qvel[:, own.dof])
             size = np.linalg.norm(spin, axis=1, keepdims=True)
             share = np.divide(spin, size, out=np.ones_like(spin), where=size > 1e-12)
-            loss[:, own.dof] = friction * np.maximum(share, LEAST)
+            loss[:, own.dof] = friction * np.maximum(share, SMALLEST)
 
     def effort(self, joint: Any, data: Any) -> float:
         """Return the torque [N m] that keeps a ball's axis in its cone, of data whose forces are known."""

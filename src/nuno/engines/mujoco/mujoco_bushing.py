@@ -37,7 +37,7 @@ def is_loose(spec: Any) -> bool:
 
 @dataclass(eq=False)
 class Linear:
-    """What a bushing is made of in a substep, of places or of turns.
+    """A bushing in a substep, of places or of turns.
 
     Attributes:
         jacobian: (3, nv), of how fast the frames go apart along `axes` by the velocities of all coordinates.
@@ -99,7 +99,7 @@ class Bushing:
 
     @property
     def changes(self) -> bool:
-        """Whether it is followed from substep to substep: its law changes, or its force is not read off where it is."""
+        """Return True if it is followed from substep to substep: its law changes, or places do not tell its force."""
         return self.limit is not None or self.free is not None or not self.gives
 
 

@@ -20,7 +20,7 @@ from nuno.engines.mujoco.mujoco_kinematics import Kinematics
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.shapes import quaternion as quat
 
-STIFFEST, STIFFEST_TURN = 1e6, 1e5
+STIFFEST, STIFFEST_ROTATION = 1e6, 1e5
 """[N/m], [N m/rad] At least, of what does not give way below its limit."""
 STIFFNESS = 20.0
 """Times the held mass over the square of a substep, of the same: a body's weight moves it by g h^2 / 20 = 2 um."""
@@ -45,7 +45,7 @@ class Bushings:
 
     @property
     def changes(self) -> bool:
-        """Whether any has numbers that are written before each substep."""
+        """Return True if any is followed from substep to substep."""
         return any(own.changes for own in self._all)
 
     # The spec
@@ -76,7 +76,7 @@ class Bushings:
         mujoco = mujoco_package()
         self._made, self._spec = self._made + 1, spec
         gives = of.compliance > 0.0
-        stiff = (max(STIFFEST, STIFFNESS * mass / step**2), STIFFEST_TURN)
+        stiff = (max(STIFFEST, STIFFNESS * mass / step**2), STIFFEST_ROTATION)
         stiffness = np.full(2, 1.0 / of.compliance) if gives else np.array(stiff)
         own = Bushing(
             f"s{self._made}", (bodies[0].name, bodies[1].name), tuple(frames), turns, stiffness,  # type: ignore[arg-type]

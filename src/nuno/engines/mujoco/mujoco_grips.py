@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
-from nuno.engines.mujoco.mujoco_balls import Ball, Balls, is_driven_ball
+from nuno.engines.mujoco.mujoco_balls import Balls, SphericalJoint, is_driven_spherical
 from nuno.engines.mujoco.mujoco_blends import Blend, add_blend, find_blend, place_blend
 from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited, is_loose
 from nuno.engines.mujoco.mujoco_bushings import Bushings
@@ -75,7 +75,7 @@ class Held:
     dof: Any = None
     blends: list[Blend] = field(default_factory=list)
     bushings: list[Bushing] = field(default_factory=list)
-    ball: Ball | None = None
+    ball: SphericalJoint | None = None
 
 
 class Holds:
@@ -227,7 +227,7 @@ class Holds:
         grip, joined = own.grip, placed[own.grip.body.key]
         spec, mine = grip.spec, joined.bodies[0]
         other = self._spec.worldbody if grip.target is None else placed[grip.target.key].bodies[0]
-        if is_driven_ball(spec):
+        if is_driven_spherical(spec):
             own.ball = self._balls.add(self._spec, grip, mine, other)
             joined.thin.append(own.ball.helper)
             if is_loose(spec):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
-from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_ball
+from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_spherical
 from nuno.engines.mujoco.mujoco_bounces import Bounces
 from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
@@ -329,7 +329,7 @@ def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
 def _helped(world: Simulation) -> list[Joint]:
     """Return the joints whose body, or a helper of it, hangs on the other body."""
     grips = [grip for dynamics in attached(world) for grip in dynamics.grips]
-    return [grip for grip in grips if is_of_tree(grip) or is_driven_ball(grip.spec)]
+    return [grip for grip in grips if is_of_tree(grip) or is_driven_spherical(grip.spec)]
 
 
 def flex_id(model: Any, name: str) -> int:
