@@ -89,6 +89,17 @@ def test_a_corner_of_a_box_bounces_by_the_law_of_impact(e):
     assert abs(box.angular_velocity[1]) == pytest.approx(impulse * arm / moment, rel=1e-3)
 
 
+def test_what_touches_a_floor_already_bounces_off_it_and_not_aside():
+    """A ball that lies exactly on the floor, 1 m from its origin, and is given 1 m/s down: half of that up, 0.1 %."""
+    world = nuno.World(device="cpu", engine="mujoco", gravity=(0.0, 0.0, 0.0))
+    world.add(nuno.plane(name="floor"))
+    ball = world.add(nuno.sphere(0.05, name="ball", position=(1.0, 0.0, 0.05)))
+    world.attach(ball, nuno.Rigid(restitution=0.5))
+    world.set_velocity(ball, (0.0, 0.0, -1.0))
+    world.run(0.02)
+    np.testing.assert_allclose(ball.velocity, (0.0, 0.0, 0.5), atol=1e-3)
+
+
 def test_it_bounces_beside_cloth_in_a_batch_restored_and_back_in_nuno():
     """To the same bits alone, in a batch of three and from a snapshot; to e^2 of its height; Nuno's world goes on."""
     world = nuno.World(device="cpu")

@@ -28,6 +28,10 @@ SLOW = 2.0
 """Substeps of free fall whose velocity is no impact: what rests gains that of one."""
 
 
+Motions = dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Of bodies by their numbers the velocity [m/s] of their frame's origin, the spin [rad/s], and where that is [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class BouncingPair:
     """Two geoms of which at least one bounces.
@@ -72,6 +76,8 @@ class Bounces:
             bodies = int(model.geom_bodyid[geoms[0]]), int(model.geom_bodyid[geoms[1]])
             falls = bodies[0] in movable, bodies[1] in movable
             self._pairs.append(BouncingPair(number, geoms, bodies, restitution, falls))
+        self._geoms = np.array([pair.geoms for pair in self._pairs], dtype=int).reshape(-1, 2)
+        self._bodies = {body for pair in self._pairs for body in pair.bodies}
         self._bounced: list[tuple[int, int]] = []
 
     def __len__(self) -> int:
@@ -83,13 +89,32 @@ class Bounces:
             return
         self.settle(step)
         for world, model, data in self._kinematics.of_worlds():
+            motions = {body: (*velocity_of(model, data, body), data.xpos[body]) for body in self._bodies}
+            near, reach = self._near(model, data, motions, step)
             gravity = self._batch.expand("opt.gravity")[world]
-            for pair in self._pairs:
+            for k in near:
+                pair = self._pairs[k]
                 if pair.restitution[world] > 0.0:
-                    margin = _margin(pair, float(pair.restitution[world]), model, data, gravity, step)
+                    margin = _margin(
+                        pair, float(pair.restitution[world]), model, data, motions, reach[k], gravity, step
+                    )
                     if margin is not None:
                         self._write(world, pair.number, margin, step)
                         self._bounced.append((world, pair.number))
+
+    def _near(self, model: Any, data: Any, motions: Motions, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the pairs (k,) that may meet in a substep, and how far [m] all pairs come to each other at most."""
+        speeds = np.zeros(model.ngeom)
+        for geom in np.unique(self._geoms):
+            velocity, spin, place = motions[int(model.geom_bodyid[geom])]
+            arm = np.linalg.norm(data.geom_xpos[geom] - place) + model.geom_rbound[geom]
+            speeds[geom] = np.linalg.norm(velocity) + np.linalg.norm(spin) * arm
+        first, second = self._geoms.T
+        reach = step * (speeds[first] + speeds[second]) + 1e-6
+        radii = model.geom_rbound[self._geoms]
+        apart = np.linalg.norm(data.geom_xpos[first] - data.geom_xpos[second], axis=1)
+        # a plane has no radius
+        return np.flatnonzero((radii == 0.0).any(axis=1) | (apart < radii.sum(axis=1) + reach)), reach
 
     def settle(self, step: float) -> None:
         """Let no pair bounce any more."""
@@ -109,30 +134,19 @@ class Bounces:
         batch.expand("pair_solreffriction")[world, number] = (-1e-9, -STICKING / step) if bounces else 0.0
 
 
-def _margin(pair: BouncingPair, e: float, model: Any, data: Any, gravity: np.ndarray, step: float) -> float | None:
+def _margin(
+    pair: BouncingPair, e: float, model: Any, data: Any, motions: Motions, most: float, gravity: np.ndarray, step: float
+) -> float | None:  # fmt: skip
     """Return to which distance [m] of each other a bounce takes two geoms in a substep; None where they do not meet."""
-    motions, ends = [(*velocity_of(model, data, body), data.xpos[body]) for body in pair.bodies], np.zeros(6)
-    reach = [
-        np.linalg.norm(velocity)
-        + np.linalg.norm(spin) * (np.linalg.norm(data.geom_xpos[geom] - place) + model.geom_rbound[geom])
-        for (velocity, spin, place), geom in zip(motions, pair.geoms, strict=True)
-    ]
-    most = step * float(sum(reach)) + 1e-6
-    # a plane has no radius
-    radii, apart = model.geom_rbound[list(pair.geoms)], np.ptp(data.geom_xpos[list(pair.geoms)], axis=0)
-    if radii.all() and np.linalg.norm(apart) > radii.sum() + most:
-        return None
+    ends = np.zeros(6)
     distance = mujoco_package().mj_geomDistance(model, data, *pair.geoms, most, ends)
     if distance >= most:
         return None
     points = ends.reshape(2, 3)
-    if abs(distance) > 1e-9:
-        normal = (points[1] - points[0]) / distance
-    else:  # they touch in one point, whose normal is not told
-        normal = data.geom_xpos[pair.geoms[1]] - data.geom_xpos[pair.geoms[0]]
-        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+    normal = _normal(pair.geoms, model, data, points, distance)
     first, second = (
-        velocity + np.cross(spin, point - place) for (velocity, spin, place), point in zip(motions, points, strict=True)
+        velocity + np.cross(spin, point - place)
+        for (velocity, spin, place), point in zip((motions[body] for body in pair.bodies), points, strict=True)
     )
     speed = float(normal @ (second - first))
     falls = [float(normal @ gravity) if moves else 0.0 for moves in pair.falls]
@@ -145,3 +159,15 @@ def _margin(pair: BouncingPair, e: float, model: Any, data: Any, gravity: np.nda
     # where it would not come up to where it is now, it stays there and falls again
     leaves = float(np.sqrt(max(0.0, (0.5 * pull * step) ** 2 + 2.0 * energy))) - 0.5 * pull * step
     return distance + step * max(leaves, 0.0)
+
+
+def _normal(geoms: tuple[int, int], model: Any, data: Any, points: np.ndarray, distance: float) -> np.ndarray:
+    """Return the direction from one geom to another, by the nearest points (2, 3) [m] and how far they are apart."""
+    if abs(distance) > 1e-9:
+        return np.asarray((points[1] - points[0]) / distance)
+    # they touch in one point, whose normal is not told
+    for geom, sign in zip(geoms, (1.0, -1.0), strict=True):
+        if model.geom_type[geom] == mujoco_package().mjtGeom.mjGEOM_PLANE:
+            return sign * data.geom_xmat[geom].reshape(3, 3)[:, 2]
+    between = data.geom_xpos[geoms[1]] - data.geom_xpos[geoms[0]]
+    return np.asarray(between / max(float(np.linalg.norm(between)), 1e-12))
