@@ -14,15 +14,12 @@ import numpy as np
 
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics, velocity_of
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import rest_pose
 from nuno.joints.joint import JointSpec
 from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
 
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of friction and cones."""
-CLOSING = 2.0
-"""Their time constant, in substeps."""
 LEVER = 1.0
 """[m] L."""
 NARROWEST = 1e-3

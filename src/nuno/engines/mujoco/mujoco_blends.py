@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 
 LIGHT = 1e-3
 """Share of a vertex' mass that a blend has besides."""
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of its equalities."""
-CLOSING = 2.0
-"""Their time constant, in substeps."""
 
 
 @dataclass(eq=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, State
-from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.array_dynamics import make_arrays, state_at_rest
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.mujoco.mujoco_leaders import push, send
@@ -18,7 +18,7 @@ from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_touch import touch_classes
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
-from nuno.materials import Material, Rigid
+from nuno.materials import Material
 from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
@@ -57,20 +57,12 @@ class MujocoEngine(Engine):
 
     def attach(self, body: Body, material: Any) -> Dynamics:
         """Return dynamics for a static body in the shape that it has now, at rest."""
-        worlds = self.world.world_count
-        if isinstance(material, Rigid):
-            place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
-            still = np.zeros((worlds, 3))
-            values = {"place": place, "turn": turn, "velocity": still, "spin": still}
-            return ArrayRigid(body, material, material.friction, self.world, values)
-        vertices = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
-        values = {"positions": vertices, "velocities": np.zeros(vertices.shape)}
-        return ArrayParticles(body, material, material.friction, self.world, values)
+        state = state_at_rest(body, material, self.world.world_count)
+        return self.make(body, material, state, material.friction)
 
     def make(self, body: Body, material: Material, state: State, friction: Any, neutral: bool = False) -> Dynamics:
         """Return dynamics for a body in a state."""
-        kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
-        return kind(body, material, friction, self.world, state)
+        return make_arrays(body, material, state, friction, self.world)
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""

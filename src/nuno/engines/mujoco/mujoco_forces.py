@@ -9,6 +9,7 @@ import numpy as np
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_scene import THIN
 from nuno.engines.mujoco.mujoco_springs import drawn_with
+from nuno.engines.mujoco.mujoco_sums import owners_of
 from nuno.engines.world_view import bodies_by_key, dynamics_of
 from nuno.joints.grip import Grip
 from nuno.joints.joint import JointSpec
@@ -114,14 +115,13 @@ def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[An
     """Return a dynamic body's contacts: rows of point, normal towards it, force on it, other's name, world."""
     mujoco = mujoco_package()
     found: list[tuple[Any, ...]] = []
+    owned = list(engine.scene.placed)
     for world, (model, data) in enumerate(forwarded(engine)):
-        owners = _owners(engine, model)
+        geoms, flexes = owners_of(engine.scene, owned)
         for k in range(data.ncon):
             contact = data.contact[k]
-            keys = [
-                owners["geom"].get(int(geom)) if geom >= 0 else owners["flex"].get(int(flex))
-                for geom, flex in zip(contact.geom, contact.flex, strict=True)
-            ]
+            owners = np.where(contact.geom >= 0, geoms[contact.geom], flexes[contact.flex])
+            keys = [owned[owner] if owner >= 0 else None for owner in owners]
             if body.key not in keys or (keys[0] == keys[1] and not itself):
                 continue
             own = np.zeros(6)
@@ -137,16 +137,4 @@ def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[An
             found.append((contact.pos.copy(), sign * axes[0], sign * force, name, world))
             if keys[0] == keys[1]:
                 found.append((contact.pos.copy(), -axes[0], -force, name, world))
-    return found
-
-
-def _owners(engine: MujocoEngine, model: Any) -> dict[str, dict[int, str]]:
-    """Return the keys of the bodies that own each geom and each flex of a model."""
-    mujoco = mujoco_package()
-    kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "flex": mujoco.mjtObj.mjOBJ_FLEX}
-    found: dict[str, dict[int, str]] = {"geom": {}, "flex": {}}
-    for key, own in engine.scene.placed.items():
-        for kind, elements in (("geom", own.geoms), ("flex", own.flexes)):
-            for element in elements:
-                found[kind][int(mujoco.mj_name2id(model, kinds[kind], element.name))] = key
     return found

@@ -24,6 +24,7 @@ from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_leaders import LEADER, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring, limit_tie
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.joints.grip import Grip, GripSpec
@@ -34,11 +35,6 @@ from nuno.shapes.coordinates import apply, compose
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
-
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of all equalities."""
-CLOSING = 2.0
-"""Time constant of all equalities, in substeps."""
 
 
 @dataclass(eq=False)

@@ -21,6 +21,7 @@ import numpy as np
 from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited
 from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import (
     JointStates,
     axis_of,
@@ -37,10 +38,6 @@ from nuno.shapes import quaternion as quat
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of dry friction, stops and the welds of helpers."""
-CLOSING = 2.0
-"""Their time constant, in substeps."""
 FAR = 1e10
 """[rad, m] Where the stops are of what has none."""
 STRONGEST = 1e9

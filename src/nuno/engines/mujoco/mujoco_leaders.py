@@ -9,7 +9,7 @@ import numpy as np
 from nuno.shapes import quaternion as quat
 
 LEADER = 1e6
-"""[kg] and [kg m2] Of the body that leads a rigid one along a path."""
+"""[kg] and [kg m2] Of a body on a path, and of what leads a rigid one: what touches it does not move it in a step."""
 
 
 def push(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:

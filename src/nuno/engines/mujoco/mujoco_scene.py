@@ -20,6 +20,7 @@ from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics
+from nuno.engines.mujoco.mujoco_leaders import LEADER
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
@@ -42,9 +43,7 @@ if TYPE_CHECKING:
 
 THIN = 0.02
 """Share of its body's mass that the helper of a joint has that is loose or a ball."""
-HEAVY = 1e6
-"""[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
-LEADING = 0.5 * HEAVY
+LEADING = 0.5 * LEADER
 """[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
 
 
@@ -236,7 +235,7 @@ class MujocoScene:
             else:
                 parts = parts_of(body, moves=False)
                 if role == "moving":
-                    made.mass, made.inertia, made.explicitinertial, made.gravcomp = HEAVY, [HEAVY] * 3, True, 1.0
+                    made.mass, made.inertia, made.explicitinertial, made.gravcomp = LEADER, [LEADER] * 3, True, 1.0
                     made.add_freejoint(name=name)
                 else:
                     made.mocap = True
