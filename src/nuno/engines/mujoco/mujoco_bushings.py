@@ -178,8 +178,9 @@ class Bushings:
         axes, held = quat.to_matrix(frame), np.ones(3)
         if own.free is not None:
             axes, held = basis_of(own.free), np.array((0.0, 1.0, 1.0))
-            at = at + ((point - at) @ own.free) * own.free
-            self._slide(own, world, quat.inverse(turned), at - other, axes)
+            along = np.zeros(4)
+            mujoco.mju_mat2Quat(along, axes.ravel())
+            self._batch.expand("site_quat")[world, own.other_site] = quat.multiply(quat.inverse(turned), along)
         moves, turns = (np.zeros((2, 3, model.nv)) for _ in range(2))
         for k, (number, place) in enumerate(((body, point), (to, at))):
             mujoco.mj_jac(model, data, moves[k], turns[k], place, number)
@@ -199,13 +200,6 @@ class Bushings:
             inverse = basis.T @ inverse_mass(own, kind, (body, to), model, data, (point, at)) @ basis
             self._bear(own, world, kind, part, apart, inverse, step)
             own.linear[world].append(part)
-
-    def _slide(self, own: Bushing, world: int, back: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
-        """Let the other frame be where the body is on its line, with its first axis along it; ``back`` turns there."""
-        turn = np.zeros(4)
-        mujoco_package().mju_mat2Quat(turn, axes.ravel())
-        self._batch.expand("site_pos")[world, own.other_site] = quat.rotate(back, place)
-        self._batch.expand("site_quat")[world, own.other_site] = quat.multiply(back, turn)
 
     def _bear(
         self, own: Bushing, world: int, kind: int, part: Linear, apart: np.ndarray, inverse: np.ndarray, step: float
