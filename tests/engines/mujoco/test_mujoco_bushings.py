@@ -203,7 +203,7 @@ def test_a_limited_hinge_swings_with_its_friction_as_in_nuno():
 
 
 def test_a_sliding_weld_slides_along_the_world_s_direction():
-    """It falls freely beside what holds it; of two free bodies momentum stays to 1e-9, energy to 0.1 %, as in Nuno's."""
+    """It falls freely beside what holds it; of two free bodies momentum stays, and energy to 0.1 %, as in Nuno's."""
     world = world_of()
     holder, block = block_in(world, "holder"), block_in(world, place=(0.3, 0.0, 1.0), drag=0.0)
     world.grip(holder, to=holder.position)

@@ -74,6 +74,7 @@ class Bushing:
         other_moves: Whether the other one is moved by what holds the body.
         last: (worlds, 12), of the last substep the force [N], how fast the frames went apart [m/s], the torque [N m]
             and how fast they turned [rad/s], in the world's axes; zeros are nothing known.
+        first: `last` of the frame before.
         linear: Of each world what the substep is made of, of places and of turns.
         site, other_site, turn_site, number: The numbers of its sites and actuators in the model.
     """
@@ -91,6 +92,7 @@ class Bushing:
     dynamics: Any
     other_moves: bool
     last: np.ndarray = field(default_factory=lambda: np.zeros((0, KEPT_NUMBERS)))
+    first: np.ndarray = field(default_factory=lambda: np.zeros((0, KEPT_NUMBERS)))
     linear: dict[int, list[Linear]] = field(default_factory=dict)
     site: int = -1
     other_site: int = -1

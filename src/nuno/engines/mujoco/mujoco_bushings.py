@@ -129,6 +129,12 @@ class Bushings:
         for own, values, k, count in self._kept():
             kept, shape = values.get(KEPT), (len(own.worlds), count, KEPT_NUMBERS)
             own.last = kept[:, k].copy() if kept is not None and kept.shape == shape else np.zeros((shape[0], shape[2]))
+            own.first = own.last.copy()
+
+    def restart(self) -> None:
+        """Go back to the start of the frame."""
+        for own in self._all:
+            own.last, own.linear = own.first.copy(), {}
 
     def end(self, step: float) -> None:
         """Note, after a frame, what its last substep was, in the bodies' states."""

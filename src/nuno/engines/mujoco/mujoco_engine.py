@@ -198,6 +198,7 @@ class MujocoEngine(Engine):
         scene.holds.place(batch)
         scene.balls.write()
         scene.bushings.begin()
+        scene.holds.begin()
 
     def _read(self) -> None:
         """Read all states out of the batch."""
@@ -278,6 +279,8 @@ def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: A
     if not changes and sums is None:
         batch.step(nstep=count)
         return
+    scene.bushings.restart()
+    scene.holds.restart()
     for k in range(count):
         for lead, address, (place, turn) in moving:
             lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
@@ -291,6 +294,7 @@ def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: A
             sums.add(step)
     scene.bounces.settle(step)
     scene.bushings.end(step)
+    scene.holds.end(batch)
 
 
 def _go_again(batch: Any, state: np.ndarray, go: Callable[[Any], None], sums: Any) -> None:

@@ -11,19 +11,21 @@ see `nuno.engines.mujoco.mujoco_bushings`. Hinges and sliders are joints of MuJo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
-from nuno.engines.mujoco.mujoco_balls import Balls, SphericalJoint, is_driven_spherical
-from nuno.engines.mujoco.mujoco_blends import Blend, add_blend, find_blend, place_blend
-from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited, is_loose
+from nuno.engines.mujoco import mujoco_spring_limits as spring_limits
+from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_spherical
+from nuno.engines.mujoco.mujoco_blends import add_blend, find_blend, place_blend
+from nuno.engines.mujoco.mujoco_bushing import is_loose
 from nuno.engines.mujoco.mujoco_bushings import Bushings
+from nuno.engines.mujoco.mujoco_held import Held, is_spring
 from nuno.engines.mujoco.mujoco_leaders import LEADER, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package
-from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring, limit_tie
+from nuno.engines.mujoco.mujoco_spring_limits import limit_springs
+from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs
 from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, dynamics_of
@@ -35,43 +37,6 @@ from nuno.shapes.coordinates import apply, compose
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
-
-
-@dataclass(eq=False)
-class Held:
-    """A grip as it is in the spec.
-
-    Attributes:
-        grip: The grip.
-        names: Its equalities; of one by springs its actuators.
-        rows: Their numbers in the model; of actuators (points, 3).
-        point: (worlds, k) int, of each held point its number among the grip's distinct points, -1 for none.
-        rest: (points, 3) [m], of each distinct point its place at rest, which coordinates are counted from.
-        leader: The body that leads, or None.
-        address: Its first coordinate and its first velocity in the model.
-        terms, others: Of one by springs, of each distinct point its own vertices with their weights, and of a tie the
-            other body's, whose weights are below 0.
-        weights, qpos, dof: Of the same, arrays (points, most), and where they are in the model.
-        blends: Of a tie of points inside faces to a rigid body, these points.
-        bushings: Of a loose one, its bushings.
-        ball: Of a ball joint with drives, that.
-    """
-
-    grip: Grip
-    names: list[str] = field(default_factory=list)
-    rows: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    point: np.ndarray | None = None
-    rest: np.ndarray | None = None
-    leader: Any = None
-    address: tuple[int, int] = (-1, -1)
-    terms: list[list[tuple[int, float]]] = field(default_factory=list)
-    others: list[list[tuple[int, float]]] = field(default_factory=list)
-    weights: Any = None
-    qpos: Any = None
-    dof: Any = None
-    blends: list[Blend] = field(default_factory=list)
-    bushings: list[Bushing] = field(default_factory=list)
-    ball: SphericalJoint | None = None
 
 
 class Holds:
@@ -323,7 +288,7 @@ class Holds:
                 found.append((own, driven_points(own.grip, start, frame, times)))
             elif own.leader is not None:
                 found.append((own, driven_hold(own.grip, start, end, times, self._world.world_count)))
-            elif is_spring(own.grip.spec) and is_limited(own.grip.spec):
+            elif own.is_limited_spring:
                 found.append((own, None))
         return found
 
@@ -332,6 +297,8 @@ class Holds:
         found: list[tuple[Held, Any]] = []
         for own in self._held:
             spec, target = own.grip.spec, own.grip.target
+            if own.is_limited_spring:  # the last substep tells what it bears
+                continue
             if isinstance(spec, GripSpec):
                 times = np.array([time, time + step])
                 if target is None or own.grip.offsets is None:
@@ -344,8 +311,6 @@ class Holds:
                 lead = compose(target.pose(), own.grip.offsets)
                 parts = (np.broadcast_to(part[..., None, :], (*shape, part.shape[-1])) for part in lead)
                 found.append((own, tuple(parts)))
-            elif is_spring(spec) and is_limited(spec):
-                found.append((own, None))
             elif own.leader is not None:
                 places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
                 found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
@@ -358,8 +323,8 @@ class Holds:
                 place, turn = (part[:, k : k + 2] for part in goals)
                 send(batch, own.address, place, turn, step)
                 continue
-            if goals is None:
-                limit_tie(own, batch)
+            if own.is_limited_spring:
+                self._limit(own, goals, batch, k, step)
                 continue
             if own.terms:
                 draw(own, batch, goals[:, :, k + 1 if at_end else k])
@@ -372,6 +337,27 @@ class Holds:
             world, point = np.nonzero(own.point >= 0)
             which = own.point[world, point]
             data[world[:, None], own.rows.reshape(-1, 3)[which], 0] = goal[world, point] - own.rest[which]
+
+    def _limit(self, own: Held, goals: Any, batch: Any, k: int, step: float) -> None:
+        assert own.point is not None and own.rest is not None
+        world, point = np.nonzero(own.point >= 0)
+        rest = own.rest[own.point[world, point]]
+        if goals is None:  # a tie draws its sides to each other
+            limit_springs(own, batch, -rest, -rest, step)
+        else:
+            limit_springs(own, batch, goals[world, point, k] - rest, goals[world, point, k + 1] - rest, step)
+
+    def begin(self) -> None:
+        """Take over, before a frame, what springs with limits did last."""
+        spring_limits.begin(self._held)
+
+    def restart(self) -> None:
+        """Go back to the start of the frame."""
+        spring_limits.restart(self._held)
+
+    def end(self, batch: Any) -> None:
+        """Note, after a frame, what springs with limits did last."""
+        spring_limits.end(self._held, batch)
 
     def held_by(self, grip: Grip) -> Held | None:
         """Return a grip as it is in the spec; None where it is not known there."""
