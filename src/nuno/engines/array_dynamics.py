@@ -16,7 +16,7 @@ from nuno.bodies.given_velocity import GivenVelocity
 from nuno.bodies.shape_topology import element_count, topology_of
 from nuno.constraints.compliances import vertex_masses
 from nuno.engines.world_view import dynamics_of
-from nuno.materials import Material, Soft
+from nuno.materials import Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 
@@ -227,6 +227,22 @@ class ArrayRigid(ArrayDynamics):
     def elastic_energy(self, body: Body) -> np.ndarray:
         """Return (worlds,) [J]: none, for it does not deform."""
         return np.zeros(self.world_count)
+
+
+def state_at_rest(body: Body, material: Material, worlds: int) -> State:
+    """Return the state that dynamics begin with in which a static body is as it is now, at rest."""
+    if isinstance(material, Rigid):
+        place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
+        still = np.zeros((worlds, 3))
+        return {"place": place, "turn": turn, "velocity": still, "spin": still}
+    positions = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
+    return {"positions": positions, "velocities": np.zeros(positions.shape)}
+
+
+def make_arrays(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> ArrayDynamics:
+    """Return the dynamics of a body's kind, which has copies of the arrays of a state."""
+    kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
+    return kind(body, material, friction, world, state)
 
 
 def motions_of(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nuno.engines.array_dynamics import motions_of
 from nuno.engines.driven_motion import kinematic_velocity
-from nuno.engines.engine_needs import needs_of_all, needs_of_dynamics, needs_of_grip
+from nuno.engines.engine_needs import needs_of_dynamics, needs_of_grip
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import EngineCapabilityError
 
@@ -31,7 +31,6 @@ CAPABILITIES: dict[str, str] = {
     "self-contact of cloth": "layers of one cloth touch each other",
     "self-contact of soft bodies": "Soft(self_contact=True)",
     "restitution": "Rigid(restitution=...) above 0",
-    "restitution beside deformables": "such a body in a world with cloth or soft bodies that move",
     "directed stretch": "a stretch stiffness for warp and weft",
     "directed bending": "a bending rigidity for warp and weft",
     "elements' materials": "values of a material by element",
@@ -45,7 +44,6 @@ CAPABILITIES: dict[str, str] = {
     "sliding welds": "grip(free=...) to a body that moves",
     "compliant grips": "grip(compliance=...) of points, above 0",
     "compliant grips of rigid bodies": "grip(compliance=...) or weld of a rigid body, above 0",
-    "compliant joints": "a joint with a compliance",
     "limited grips": "grip(max_force=...) of points",
     "limited welds and joints": "max_force below 10 kN of ties, joints, and grips of rigid bodies",
     "ties": "grip or weld of points to a body that moves",
@@ -125,14 +123,6 @@ class Engine(ABC):
             EngineCapabilityError: it cannot move such a body, or not of such a material.
         """
         self.require(*needs_of_dynamics(body, material, self.world))
-
-    def allow_together(self, materials: Iterable[Material]) -> None:
-        """Refuse bodies of such materials in one world, before anything changes.
-
-        Raises:
-            EngineCapabilityError: it cannot move them together.
-        """
-        self.require(*needs_of_all(list(materials)))
 
     def allow_contacts(self) -> None:  # noqa: B027, most tell any pairs apart
         """Refuse rules of which pairs touch that the engine lacks, before a run.

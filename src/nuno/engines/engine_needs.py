@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,13 +47,6 @@ def needs_of_dynamics(body: Body, material: Material, world: Simulation) -> list
     return list(dict.fromkeys(needs))
 
 
-def needs_of_all(materials: Sequence[Material]) -> list[str]:
-    """Return the capabilities that bodies of some materials ask for as they move in one world."""
-    bounces = any(np.max(getattr(material, "restitution", 0.0)) > 0.0 for material in materials)
-    deforms = any(isinstance(material, Cloth | Soft) for material in materials)
-    return ["restitution beside deformables"] if bounces and deforms else []
-
-
 def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
     """Return the capabilities that a grip, weld or joint asks for, on another body that is dynamic or not."""
     needs: list[str] = []
@@ -63,8 +55,7 @@ def needs_of_grip(spec: Any, on_moving: bool) -> list[str]:
         drives = "drives of ball joints" if spec.kind == "ball" else "joint drives"
         needs += [kind, drives] if _is_driven(spec) else [kind]
     if spec.compliance > 0.0:
-        kinds = {JointSpec: "compliant joints", HoldSpec: "compliant grips of rigid bodies"}
-        needs.append(kinds.get(type(spec), "compliant grips"))
+        needs.append("compliant grips of rigid bodies" if isinstance(spec, HoldSpec) else "compliant grips")
     if not isinstance(spec, GripSpec) and np.min(spec.max_force) < MAX_FORCE:
         needs.append("limited welds and joints")
     if isinstance(spec, HoldSpec):

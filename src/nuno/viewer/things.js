@@ -80,7 +80,9 @@ class Mesh {
       this.surface.setIndex(new THREE.BufferAttribute(Uint32Array.from(index), 1));
       const room = new Float32Array(source === null ? points.length : 3 * source.length);
       this.surface.setAttribute("position", new THREE.BufferAttribute(room, 3));
-      const inset = { polygonOffset: command.lines.length > 0, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+      // skins lie behind their outlines, and a floor behind the skins of what lies on it
+      const back = command.endless ? 2 : Number(command.lines.length > 0);
+      const inset = { polygonOffset: back > 0, polygonOffsetFactor: back, polygonOffsetUnits: back };
       const mesh = new THREE.Mesh(this.surface, material_of(command, inset));
       this.skin = mesh;
       this.own_color = command.color;

@@ -109,7 +109,6 @@ def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
     moving = {record.key for record in snapshot.bodies if record.dynamics is not None}
     for grip in snapshot.grips:
         engine.allow_grip(grip.spec, grip.target in moving)
-    engine.allow_together(record.dynamics.material for record in snapshot.bodies if record.dynamics is not None)
     if any(record.path is not None for record in snapshot.bodies):
         engine.require("moving shapes")
     if snapshot.pair_friction:

@@ -169,7 +169,7 @@ class World(Setting):
             ]
             if own._dynamics is None:
                 check_leader(own, not isinstance(chosen, Rigid), following)
-            self._allow_dynamics(own, chosen)
+            self._engine.allow_dynamics(own, chosen)
             dynamics = self._engine.attach(own._as_static(), chosen)
             if given is not None:
                 dynamics.set_velocity(own, given)
@@ -240,18 +240,11 @@ class World(Setting):
                 raise BodyStateError(f"{own.name!r} moves as {kinds}; detach it to attach it as another kind")
             chosen: Any = material
             check_material(own.shape, chosen, self.world_count)
-            self._allow_dynamics(own, chosen)
+            self._engine.allow_dynamics(own, chosen)
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
             warn_of_resolution(own, self)
-
-    def _allow_dynamics(self, own: Body, material: Any) -> None:
-        """Refuse a material that the engine cannot move the body with, by itself or beside the others."""
-        self._engine.allow_dynamics(own, material)
-        self._engine.allow_together(
-            [material, *(each.material for each in self._attached() if each is not own._dynamics)]
-        )
 
     def grip(
         self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,

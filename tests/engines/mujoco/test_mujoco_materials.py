@@ -145,3 +145,22 @@ def test_parts_of_a_soft_body_touch_where_its_material_asks_for_it(touches):
     world.run(0.4)
     assert slabs.vertices[:count, 2].min() == pytest.approx(0.0, abs=1e-4)
     assert slabs.vertices[count:, 2].min() == pytest.approx(0.02 if touches else 0.0, abs=1e-4)
+
+
+def test_a_cloth_bends_alike_after_a_soft_body():
+    """Its numbers are read where its own edges are, whatever was added before it: the same bits."""
+    tips = []
+    for soft_first in (False, True):
+        world = nuno.World(device="cpu", engine="mujoco")
+        kinds = ("soft", "cloth") if soft_first else ("cloth", "soft")
+        for kind in kinds:
+            if kind == "soft":
+                soft = world.add(nuno.soft_box((0.1, 0.1, 0.1), cells=(1, 1, 1), position=(5.0, 0.0, 1.0)))
+                world.attach(soft, nuno.Soft(youngs_modulus=5e4))
+                continue
+            cloth = world.add(nuno.sheet((0.3, 0.1), cells=(6, 2), name="cloth", position=(0.0, 0.0, 1.0)))
+            world.attach(cloth, nuno.Cloth(bending_rigidity=1e-3, air_drag=3.0))
+            world.grip(cloth, [0, 7, 14], to=cloth.vertices[[0, 7, 14]].mean(axis=0))
+        world.run(0.1)
+        tips.append(world.find("cloth").vertices[6])
+    np.testing.assert_allclose(tips[1], tips[0], atol=1e-12)

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, State
-from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.array_dynamics import make_arrays, state_at_rest
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
-from nuno.engines.mujoco.mujoco_grips import push, send
+from nuno.engines.mujoco.mujoco_leaders import push, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_touch import touch_classes
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, bodies_by_key, dynamics_of
-from nuno.materials import Material, Rigid
+from nuno.materials import Material
 from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
@@ -29,17 +29,13 @@ STEP = 0.0021
 """[s] The longest substep where none are asked for: MuJoCo's default is 2 ms, a frame of 1/60 s has 8 of 2.08 ms."""
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 """Of numbers that are not finite or beyond 1e10, by which MuJoCo tells that a simulation has diverged."""
-LACKING = {
-    "restitution beside deformables", "sliding welds", "compliant joints",
-    "limited welds and joints", "drives of ball joints", "cuda",
-}  # fmt: skip
 
 
 class MujocoEngine(Engine):
     """MuJoCo 4: flexes with the ``discrete`` integrator, on the CPU; see docs/engines.md."""
 
     name = "mujoco"
-    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - LACKING
+    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - {"cuda"}
 
     def __init__(self, world: Simulation) -> None:
         super().__init__(world)
@@ -61,20 +57,12 @@ class MujocoEngine(Engine):
 
     def attach(self, body: Body, material: Any) -> Dynamics:
         """Return dynamics for a static body in the shape that it has now, at rest."""
-        worlds = self.world.world_count
-        if isinstance(material, Rigid):
-            place, turn = (np.broadcast_to(part, (worlds, part.shape[-1])) for part in body.pose())
-            still = np.zeros((worlds, 3))
-            values = {"place": place, "turn": turn, "velocity": still, "spin": still}
-            return ArrayRigid(body, material, material.friction, self.world, values)
-        vertices = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
-        values = {"positions": vertices, "velocities": np.zeros(vertices.shape)}
-        return ArrayParticles(body, material, material.friction, self.world, values)
+        state = state_at_rest(body, material, self.world.world_count)
+        return self.make(body, material, state, material.friction)
 
     def make(self, body: Body, material: Material, state: State, friction: Any, neutral: bool = False) -> Dynamics:
         """Return dynamics for a body in a state."""
-        kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
-        return kind(body, material, friction, self.world, state)
+        return make_arrays(body, material, state, friction, self.world)
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""
@@ -117,7 +105,9 @@ class MujocoEngine(Engine):
         batch = scene.batch
         count = max(1, math.ceil((end - start) / self.substep - 1e-6))
         step = (end - start) / count
-        if not math.isclose(step, self.substep, rel_tol=1e-9) or scene.shortened:
+        if math.isclose(step, self.substep, rel_tol=1e-9):
+            step = self.substep  # to the bit what the model was compiled with, also after one that was cut short
+        if step != self.substep or scene.shortened:
             scene.set_step(step)
         times = start + step * np.arange(count + 1)
         paths = {
@@ -205,6 +195,10 @@ class MujocoEngine(Engine):
             if np.shape(values.get("warmstart"))[1:] == dofs.shape:  # a joint that is new has other coordinates
                 warm[:, dofs] = values["warmstart"]
         scene.joints.write(batch, moved)
+        scene.holds.place(batch)
+        scene.balls.write()
+        scene.bushings.begin()
+        scene.holds.begin()
 
     def _read(self) -> None:
         """Read all states out of the batch."""
@@ -249,7 +243,11 @@ class MujocoEngine(Engine):
         return wrench_of(self, grip)
 
     def effort(self, joint: Any) -> np.ndarray:
-        """Return what a joint's drives did, in the mean over the last frame."""
+        """Return what a joint's drives did, in the mean over the last frame; a ball's cone, in the present state."""
+        if not is_of_tree(joint):
+            from nuno.engines.mujoco.mujoco_forces import effort_of
+
+            return effort_of(self, joint)
         return self.joint_loads([joint])[1][:, 0]
 
     def joint_loads(self, joints: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -277,17 +275,26 @@ class MujocoEngine(Engine):
 
 def _go(batch: Any, scene: Any, count: int, step: float, moving: Any, targets: Any, sums: Any) -> None:
     """Advance by substeps of ``step`` [s], before each of which is written what leads and what follows a path."""
-    if not moving and not targets and sums is None:
+    changes = moving or targets or scene.bounces or scene.bushings.changes or scene.balls.changes
+    if not changes and sums is None:
         batch.step(nstep=count)
         return
+    scene.bushings.restart()
+    scene.holds.restart()
     for k in range(count):
         for lead, address, (place, turn) in moving:
             lead(batch, address, place[:, k : k + 2], turn[:, k : k + 2], step)
         scene.holds.write(targets, batch, k, step)
         scene.joints.lead(batch)
+        scene.bushings.follow(step)
+        scene.balls.follow()
+        scene.bounces.prepare(step)
         batch.step()
         if sums is not None:
             sums.add(step)
+    scene.bounces.settle(step)
+    scene.bushings.end(step)
+    scene.holds.end(batch)
 
 
 def _go_again(batch: Any, state: np.ndarray, go: Callable[[Any], None], sums: Any) -> None:

@@ -154,7 +154,7 @@ def cloth_numbers(model: Any, flex: int, mesh: FlexMesh, dynamics: ArrayParticle
     assert mesh.axes is not None
     first, count = int(model.flex_edgeadr[flex]), int(model.flex_edgenum[flex])
     ends = model.flex_edge[first : first + count]
-    start = 3 * int(model.flex_elemadr[flex])  # each triangle has three edges
+    start = int(model.flex_elemedgeadr[flex])
     sides = model.flex_elemedge[start : start + 3 * len(mesh.elements)].reshape(-1, 3)
     along = mesh.rest[ends[:, 1]] - mesh.rest[ends[:, 0]]
     local = np.einsum("max,mcx->mca", mesh.axes, along[sides])  # (m, 3 edges, 2)

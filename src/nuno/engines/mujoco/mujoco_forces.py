@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.engines.mujoco.mujoco_loose import THIN
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_scene import THIN
 from nuno.engines.mujoco.mujoco_springs import drawn_with
+from nuno.engines.mujoco.mujoco_sums import owners_of
 from nuno.engines.world_view import bodies_by_key, dynamics_of
 from nuno.joints.grip import Grip
 from nuno.joints.joint import JointSpec
@@ -26,6 +27,7 @@ def forwarded(engine: MujocoEngine) -> list[tuple[Any, Any]]:
     step = engine.substep
     # where grips lead now, with the velocity of the substep to come
     scene.holds.write(scene.holds.present(time, step), scene.batch, 0, step, at_end=False)
+    scene.balls.follow()
     found = []
     for world in range(engine.world.world_count):
         model, data = scene.batch.get_model(world), scene.batch.get_data(world)
@@ -45,6 +47,13 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
     if held is None or engine.world.time == 0.0:
         return force, torque
     for world, (model, data) in enumerate(forwarded(engine)):
+        if held.bushings:
+            force[world], torque[world] = _borne_by_bushings(scene.bushings, held, data, world)
+            if held.ball is not None and not own.depth:
+                share, about = _share_of_helper(dynamics, world, model, data, int(own.dof[0]))
+                arm = quat.rotate(dynamics.values["turn"][world], grip.spec.place[world])
+                force[world], torque[world] = force[world] + share, torque[world] + about - np.cross(arm, share)
+            continue
         kind = mujoco.mjtConstraint.mjCNSTR_EQUALITY
         if held.terms:
             given = drawn_with(held, data, world)
@@ -70,28 +79,49 @@ def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]
                 torque[world] = np.cross(quat.rotate(turn, grip.spec.place[world]), force[world])
         else:
             force[world], torque[world] = -given[at : at + 3], -quat.rotate(turn, given[at + 3 : at + 6])
-        if held.helper is not None and not own.depth:  # what leads bears the helper's share of the mass besides
-            share = THIN * float(dynamics.mass[world]) * (model.opt.gravity - data.qacc[at : at + 3])
-            force[world] += share
-            torque[world] += np.cross(quat.rotate(turn, dynamics.centre), share)
+        if held.ball is not None and not own.depth:
+            share, about = _share_of_helper(dynamics, world, model, data, at)
+            force[world], torque[world] = force[world] + share, torque[world] + about
         if isinstance(grip.spec, JointSpec):  # told at the joint's point
             arm = quat.rotate(turn, grip.spec.place[world])
             torque[world] -= np.cross(arm, force[world])
     return force, torque
 
 
+def _borne_by_bushings(bushings: Any, held: Any, data: Any, world: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force and torque that a grip's bushings bear; of several points about their mean."""
+    found = [bushings.borne(own, world, data) for own in held.bushings if own.worlds[world]]
+    if not found:
+        return np.zeros(3), np.zeros(3)
+    forces, torques, places = (np.array(part) for part in zip(*found, strict=True))
+    about = np.cross(places - places.mean(axis=0), forces)
+    return -forces.sum(axis=0), -(torques + about).sum(axis=0)
+
+
+def _share_of_helper(dynamics: Any, world: int, model: Any, data: Any, at: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the helper of a body with its velocities ``at`` needs besides: force, and torque about its origin."""
+    share = THIN * float(dynamics.mass[world]) * (model.opt.gravity - data.qacc[at : at + 3])
+    return share, np.cross(quat.rotate(dynamics.values["turn"][world], dynamics.centre), share)
+
+
+def effort_of(engine: MujocoEngine, joint: Any) -> np.ndarray:
+    """Return (worlds,) the torque [N m] that keeps the axis of a ball joint in its cone; 0 of a fixed joint."""
+    if engine.world.time == 0.0 or not len(engine.scene.balls):
+        return np.zeros(engine.world.world_count)
+    return np.array([engine.scene.balls.effort(joint, data) for _, data in forwarded(engine)])
+
+
 def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[Any, ...]]:
     """Return a dynamic body's contacts: rows of point, normal towards it, force on it, other's name, world."""
     mujoco = mujoco_package()
     found: list[tuple[Any, ...]] = []
+    owned = list(engine.scene.placed)
     for world, (model, data) in enumerate(forwarded(engine)):
-        owners = _owners(engine, model)
+        geoms, flexes = owners_of(engine.scene, owned)
         for k in range(data.ncon):
             contact = data.contact[k]
-            keys = [
-                owners["geom"].get(int(geom)) if geom >= 0 else owners["flex"].get(int(flex))
-                for geom, flex in zip(contact.geom, contact.flex, strict=True)
-            ]
+            owners = np.where(contact.geom >= 0, geoms[contact.geom], flexes[contact.flex])
+            keys = [owned[owner] if owner >= 0 else None for owner in owners]
             if body.key not in keys or (keys[0] == keys[1] and not itself):
                 continue
             own = np.zeros(6)
@@ -107,16 +137,4 @@ def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[An
             found.append((contact.pos.copy(), sign * axes[0], sign * force, name, world))
             if keys[0] == keys[1]:
                 found.append((contact.pos.copy(), -axes[0], -force, name, world))
-    return found
-
-
-def _owners(engine: MujocoEngine, model: Any) -> dict[str, dict[int, str]]:
-    """Return the keys of the bodies that own each geom and each flex of a model."""
-    mujoco = mujoco_package()
-    kinds = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "flex": mujoco.mjtObj.mjOBJ_FLEX}
-    found: dict[str, dict[int, str]] = {"geom": {}, "flex": {}}
-    for key, own in engine.scene.placed.items():
-        for kind, elements in (("geom", own.geoms), ("flex", own.flexes)):
-            for element in elements:
-                found[kind][int(mujoco.mj_name2id(model, kinds[kind], element.name))] = key
     return found

@@ -3,21 +3,30 @@
 A held vertex has an equality of each of its coordinates with a number, a point inside a face one of each coordinate's
 weighted sum, by fixed tendons. Points that give way, or whose grip bears a limited force, are drawn by springs, see
 `nuno.engines.mujoco.mujoco_springs`. A rigid body is welded to what leads it: another body, or a heavy one without a
-shape that is sent along the path. Ball joints are one connected point, fixed joints welds; hinges and sliders are
-joints of MuJoCo, see `nuno.engines.mujoco.mujoco_joints`.
+shape that is sent along the path. Ball joints are one connected point, fixed joints welds; those with drives are in
+`nuno.engines.mujoco.mujoco_balls`. What gives way, slides or bears a limited force at a rigid body is held by bushings,
+see `nuno.engines.mujoco.mujoco_bushings`. Hinges and sliders are joints of MuJoCo, see
+`nuno.engines.mujoco.mujoco_joints`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nuno.engines.driven_motion import driven_hold, driven_points
-from nuno.engines.mujoco.mujoco_loose import WELDED, add_helper, find_helper, is_loose, place_helper
+from nuno.engines.mujoco import mujoco_spring_limits as spring_limits
+from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_spherical
+from nuno.engines.mujoco.mujoco_blends import add_blend, find_blend, place_blend
+from nuno.engines.mujoco.mujoco_bushing import is_loose
+from nuno.engines.mujoco.mujoco_bushings import Bushings
+from nuno.engines.mujoco.mujoco_held import Held, is_spring
+from nuno.engines.mujoco.mujoco_leaders import LEADER, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package
-from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs, is_spring
+from nuno.engines.mujoco.mujoco_spring_limits import limit_springs
+from nuno.engines.mujoco.mujoco_springs import add_spring, draw, find_springs
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import is_of_tree
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.joints.grip import Grip, GripSpec
@@ -29,71 +38,23 @@ from nuno.shapes.coordinates import apply, compose
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of all equalities."""
-CLOSING = 2.0
-"""Time constant of all equalities, in substeps."""
-SOFT = 0.1
-"""Impedance of a tie that gives way: a constraint of the stiffness k is a spring of k (1 - 0.1) / inverse mass."""
-LEADER = 1e6
-"""[kg] and [kg m2] Of the body that leads a rigid one along a path."""
-
-
-@dataclass(eq=False)
-class Held:
-    """A grip as it is in the spec.
-
-    Attributes:
-        grip: The grip.
-        names: Its equalities; of one by springs its actuators.
-        rows: Their numbers in the model; of actuators (points, 3).
-        point: (worlds, k) int, of each held point its number among the grip's distinct points, -1 for none.
-        rest: (points, 3) [m], of each distinct point its place at rest, which coordinates are counted from.
-        leader: The body that leads, or None.
-        address: Its first coordinate and its first velocity in the model.
-        terms: Of one by springs, of each distinct point its own vertices with their weights.
-        corners, weights, qpos, dof: The same as arrays (points, most), and where they are in the model.
-        helper: Of a loose one of a rigid body, what that is welded to.
-        slides, ball: The numbers of its joints in the model, -1 for no ball.
-        addresses: Of the coordinates and velocities of all joints.
-    """
-
-    grip: Grip
-    names: list[str] = field(default_factory=list)
-    rows: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    point: np.ndarray | None = None
-    rest: np.ndarray | None = None
-    leader: Any = None
-    address: tuple[int, int] = (-1, -1)
-    terms: list[list[tuple[int, float]]] = field(default_factory=list)
-    corners: Any = None
-    weights: Any = None
-    qpos: Any = None
-    dof: Any = None
-    helper: Any = None
-    slides: Any = None
-    ball: int = -1
-    addresses: Any = None
-
 
 class Holds:
-    """All grips and joints of a world.
+    """All grips of a world, and its ball and fixed joints.
 
     Args:
         world: The world.
+        bushings: Its bushings.
+        balls: Its ball joints with drives.
     """
 
-    def __init__(self, world: Simulation) -> None:
-        self._world = world
+    def __init__(self, world: Simulation, bushings: Bushings, balls: Balls) -> None:
+        self._world, self._bushings, self._balls = world, bushings, balls
         self._held: list[Held] = []
         self._elements: list[Any] = []
         self._spec: Any = None
+        self._step = 0.0
         self._made = 0
-
-    @property
-    def is_driven(self) -> bool:
-        """Return True if any target must be written as time goes on."""
-        return any(isinstance(own.grip.spec, GripSpec) or own.leader is not None for own in self._held)
 
     # The spec
 
@@ -103,9 +64,9 @@ class Holds:
             self._spec.delete(element)
         self._held, self._elements = [], []
 
-    def add(self, spec: Any, placed: dict[str, Any]) -> None:
-        """Put all present grips into the spec."""
-        self._spec = spec
+    def add(self, spec: Any, placed: dict[str, Any], step: float) -> None:
+        """Put all present grips into the spec, for substeps so long [s]."""
+        self._spec, self._step = spec, step
         for dynamics in attached(self._world):
             for grip in dynamics.grips:
                 if is_of_tree(grip):
@@ -138,6 +99,8 @@ class Holds:
         corners, weights = corners_of(spec)
         other_corners, other_weights = getattr(spec, "other_corners", None), getattr(spec, "other_weights", None)
         rigid = isinstance(spec, TieSpec) and spec.places is not None
+        # a stiff equality with a light point would give way
+        loose = is_loose(spec) or (rigid and bool(((weights > 0.0).sum(axis=-1) > 1).any()))
         target: Any = placed[own.grip.target.key] if own.grip.target is not None else None
         known: dict[Any, int] = {}
         rest: list[np.ndarray] = []
@@ -158,18 +121,33 @@ class Holds:
                 if others:
                     place = place + sum(w * target.mesh.rest[c] for c, w in others)
                 rest.append(np.asarray(place))
-                if rigid:
+                if loose:
+                    self._add_bushing(own, (self._point(own, mine, terms), target.bodies[0]), other=spec.places[:, k])
+                elif rigid:
                     self._equality(own, "CONNECT", mine.bodies[terms[0][0]].name, target.bodies[0].name, "BODY")
                 else:
                     self._add_coordinates(own, mine, terms, target, others)
             own.point[world, k] = known[key]
+        for k, made in enumerate(own.bushings):
+            made.worlds = (own.point == k).any(axis=1)
         own.rest = np.array(rest).reshape(-1, 3)
+
+    def _point(self, own: Held, mine: Any, terms: list[tuple[int, float]]) -> Any:
+        """Return the body of a vertex in the spec, or of a blend of some, which is added."""
+        if len(terms) == 1:
+            return mine.bodies[terms[0][0]]
+        self._made += 1
+        blend = add_blend(self._spec, f"p{self._made}", mine, terms)
+        self._elements += blend.elements
+        own.blends.append(blend)
+        return blend.body
 
     def _add_coordinates(self, own: Held, mine: Any, terms: Any, target: Any, others: Any) -> None:
         """Add an equality, or a spring, of each coordinate of a point of a flex."""
         soft = is_spring(own.grip.spec)
         if soft:
             own.terms.append(terms)
+            own.others.append(others)
         for letter in "xyz":
             if len(terms) == 1 and not others and not soft:
                 self._equality(own, "JOINT", f"{mine.bodies[terms[0][0]].name}.{letter}")
@@ -189,7 +167,7 @@ class Holds:
             self._equality(own, "TENDON", tendon.name)
 
     def _add_hold(self, own: Held, placed: dict[str, Any]) -> None:
-        grip, joined = own.grip, placed[own.grip.body.key]
+        grip, mine = own.grip, placed[own.grip.body.key].bodies[0]
         loose = is_loose(grip.spec)
         if grip.target is not None and not (loose and dynamics_of(grip.target) is None):
             leads = placed[grip.target.key].bodies[0]
@@ -200,20 +178,46 @@ class Holds:
             )
             own.leader.add_freejoint(name=own.leader.name)
             self._elements.append(own.leader)
-        if loose:
-            self._made += 1
-            leads = own.helper = add_helper(own, leads, f"h{self._made}")
-            joined.thin.append(own.helper)
-            self._elements.append(own.helper)
-        self._equality(own, "WELD", leads.name, joined.bodies[0].name, "BODY")
+        if not loose:
+            self._equality(own, "WELD", leads.name, mine.name, "BODY")
+            return
+        place, turn = grip.spec.pose_at(0) if own.leader is None else (None, None)
+        self._add_bushing(own, (mine, leads), other=place, other_turn=turn)
 
     def _add_joint(self, own: Held, placed: dict[str, Any]) -> None:
-        grip, mine = own.grip, placed[own.grip.body.key].bodies[0].name
-        other = "world" if grip.target is None else placed[grip.target.key].bodies[0].name
-        if grip.spec.kind == "fixed":
-            self._equality(own, "WELD", other, mine, "BODY")
-            return
-        self._equality(own, "CONNECT", other, mine, "BODY")
+        grip, joined = own.grip, placed[own.grip.body.key]
+        spec, mine = grip.spec, joined.bodies[0]
+        other = self._spec.worldbody if grip.target is None else placed[grip.target.key].bodies[0]
+        if is_driven_spherical(spec):
+            own.ball = self._balls.add(self._spec, grip, mine, other)
+            joined.thin.append(own.ball.helper)
+            if is_loose(spec):
+                self._add_bushing(own, (mine, own.ball.helper), spec.place, other=spec.place)
+            else:
+                self._equality(own, "WELD", own.ball.helper.name, mine.name, "BODY")
+        elif is_loose(spec):
+            frames = spec.place, spec.turn, spec.other_place, spec.other_turn
+            self._add_bushing(own, (mine, other), *frames, turns=spec.kind == "fixed")
+        else:
+            self._equality(own, "WELD" if spec.kind == "fixed" else "CONNECT", other.name, mine.name, "BODY")
+
+    def _add_bushing(
+        self, own: Held, bodies: Any, place: Any = None, turn: Any = None, other: Any = None, other_turn: Any = None,
+        turns: bool = True,
+    ) -> None:  # fmt: skip
+        """Add a bushing between frames (worlds, 3 or 4) of two bodies; None is the body's own."""
+        worlds, spec = self._world.world_count, own.grip.spec
+        frames = [np.zeros((worlds, 3)) if part is None else part for part in (place, other)]
+        quaternions = [np.tile(quat.IDENTITY, (worlds, 1)) if part is None else part for part in (turn, other_turn)]
+        is_tie = isinstance(spec, TieSpec)
+        mass = 0.0 if is_tie else float(dynamics_of(own.grip.body).mass[0])
+        frames = [frames[0], quaternions[0], frames[1], quaternions[1]]
+        target = own.grip.target
+        moves = own.leader is None and own.ball is None and target is not None and dynamics_of(target) is not None
+        made = self._bushings.add(
+            self._spec, bodies, frames, spec, mass, self._step, dynamics_of(own.grip.body), moves, turns and not is_tie
+        )
+        own.bushings.append(made)
 
     # The model
 
@@ -230,22 +234,24 @@ class Holds:
             own.rows = np.array([model.equality(name).id for name in own.names], dtype=int)
             batch.expand("eq_solref")[:, own.rows] = (CLOSING * step, 1.0)
             spec = own.grip.spec
+            for blend in own.blends:
+                find_blend(blend, placed[own.grip.body.key], model, batch, step)
             if own.leader is not None:
                 body = model.body(own.leader.name).id
                 own.address = int(model.jnt_qposadr[model.body_jntadr[body]]), int(model.body_dofadr[body])
             if isinstance(spec, GripSpec | TieSpec):
-                self._find_points(own, data, active)
-                if spec.compliance > 0.0:
-                    self._soften(own, model, batch, placed)
+                if not own.bushings:
+                    self._find_points(own, data, active)
+            elif own.bushings:
+                continue
             elif isinstance(spec, HoldSpec):
                 place, turn = np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1))
-                if own.helper is not None:
-                    find_helper(own, model, batch)
-                elif own.leader is None:
+                if own.leader is None:
                     place, turn = own.grip.offsets if own.grip.offsets is not None else spec.pose_at(0)
                 _weld(data, int(own.rows[0]), place, turn)
-                if own.helper is not None:
-                    data[:, own.rows[0], 10] = WELDED
+            elif own.ball is not None:  # at the joint's place in both
+                _weld(data, int(own.rows[0]), np.zeros((worlds, 3)), np.tile(quat.IDENTITY, (worlds, 1)))
+                data[:, own.rows[0], 0:3], data[:, own.rows[0], 3:6] = spec.place, spec.place
             else:
                 _joint(data, own.rows, spec)
 
@@ -267,18 +273,11 @@ class Holds:
                         data[world, rows[point], :5] = 0.0
                         data[world, rows[point], 0] = -own.rest[point]
 
-    def _soften(self, own: Held, model: Any, batch: Any, placed: dict[str, Any]) -> None:
-        """Let a tie to a rigid body give way as a spring does."""
-        assert own.grip.target is not None
-        bodies = [int(model.body(placed[own.grip.body.key].bodies[0].name).id)] * len(own.rows)
-        for k, name in enumerate(own.names):
-            bodies[k] = int(model.body(self._spec.equality(name).name1).id)
-        other = placed[own.grip.target.key].id
-        for world in range(self._world.world_count):
-            inverse = batch.get_model(world).body_invweight0[:, 0]
-            stiffness = (1.0 - SOFT) * (inverse[bodies] + inverse[other]) / own.grip.spec.compliance
-            batch.expand("eq_solref")[world, own.rows] = np.stack([-stiffness, np.full_like(stiffness, -1e-9)], axis=-1)
-        batch.expand("eq_solimp")[:, own.rows, :2] = SOFT
+    def place(self, batch: Any) -> None:
+        """Set what is not a body of the world to where it belongs, once those are written."""
+        for own in self._held:
+            for blend in own.blends:
+                place_blend(blend, batch)
 
     def targets(self, start: float, end: float, times: np.ndarray) -> list[tuple[Held, Any]]:
         """Return where each driven grip leads at ``times`` (k + 1,) [s] from ``start`` to ``end``."""
@@ -289,7 +288,7 @@ class Holds:
                 found.append((own, driven_points(own.grip, start, frame, times)))
             elif own.leader is not None:
                 found.append((own, driven_hold(own.grip, start, end, times, self._world.world_count)))
-            elif own.helper is not None:
+            elif own.is_limited_spring:
                 found.append((own, None))
         return found
 
@@ -298,6 +297,8 @@ class Holds:
         found: list[tuple[Held, Any]] = []
         for own in self._held:
             spec, target = own.grip.spec, own.grip.target
+            if own.is_limited_spring:  # the last substep tells what it bears
+                continue
             if isinstance(spec, GripSpec):
                 times = np.array([time, time + step])
                 if target is None or own.grip.offsets is None:
@@ -310,8 +311,6 @@ class Holds:
                 lead = compose(target.pose(), own.grip.offsets)
                 parts = (np.broadcast_to(part[..., None, :], (*shape, part.shape[-1])) for part in lead)
                 found.append((own, tuple(parts)))
-            elif own.leader is None and own.helper is not None:
-                found.append((own, None))
             elif own.leader is not None:
                 places, turns = zip(spec.at(time), spec.at(time + step), strict=True)
                 found.append((own, (np.stack(places, axis=1), np.stack(turns, axis=1))))
@@ -320,12 +319,12 @@ class Holds:
     def write(self, targets: list[tuple[Held, Any]], batch: Any, k: int, step: float, at_end: bool = True) -> None:
         """Write where driven grips lead in substep ``k``, which takes ``step`` [s]; springs at its start or end."""
         for own, goals in targets:
-            if own.helper is not None:
-                place_helper(own, batch, goals, k, step)
             if own.leader is not None:
                 place, turn = (part[:, k : k + 2] for part in goals)
                 send(batch, own.address, place, turn, step)
-            if own.leader is not None or own.helper is not None:
+                continue
+            if own.is_limited_spring:
+                self._limit(own, goals, batch, k, step)
                 continue
             if own.terms:
                 draw(own, batch, goals[:, :, k + 1 if at_end else k])
@@ -339,41 +338,30 @@ class Holds:
             which = own.point[world, point]
             data[world[:, None], own.rows.reshape(-1, 3)[which], 0] = goal[world, point] - own.rest[which]
 
+    def _limit(self, own: Held, goals: Any, batch: Any, k: int, step: float) -> None:
+        assert own.point is not None and own.rest is not None
+        world, point = np.nonzero(own.point >= 0)
+        rest = own.rest[own.point[world, point]]
+        if goals is None:  # a tie draws its sides to each other
+            limit_springs(own, batch, -rest, -rest, step)
+        else:
+            limit_springs(own, batch, goals[world, point, k] - rest, goals[world, point, k + 1] - rest, step)
+
+    def begin(self) -> None:
+        """Take over, before a frame, what springs with limits did last."""
+        spring_limits.begin(self._held)
+
+    def restart(self) -> None:
+        """Go back to the start of the frame."""
+        spring_limits.restart(self._held)
+
+    def end(self, batch: Any) -> None:
+        """Note, after a frame, what springs with limits did last."""
+        spring_limits.end(self._held, batch)
+
     def held_by(self, grip: Grip) -> Held | None:
         """Return a grip as it is in the spec; None where it is not known there."""
         return next((own for own in self._held if own.grip is grip), None)
-
-
-def push(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:
-    """Send a heavy body on as `send` does, by a force, so that what hangs on it by joints feels how it speeds up."""
-    qvel, applied = batch.bind("qvel"), batch.bind("qfrc_applied")
-    to = address[1]
-    before = qvel[:, to : to + 6].copy()
-    send(batch, address, place, turn, step)
-    applied[:, to : to + 6] = LEADER * (qvel[:, to : to + 6] - before) / step
-    qvel[:, to : to + 6] = before
-
-
-def send(batch: Any, address: tuple[int, int], place: np.ndarray, turn: np.ndarray, step: float) -> None:
-    """Put a heavy body where it is at the start of a substep, with the velocity that brings it to its end.
-
-    Args:
-        batch: The batch.
-        address: Its first coordinate and its first velocity.
-        place: (worlds, 2, 3) [m].
-        turn: (worlds, 2, 4).
-        step: [s].
-    """
-    qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
-    at, to = address
-    qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = place[:, 0], turn[:, 0]
-    own = quat.multiply(quat.inverse(turn[:, 0]), turn[:, 1])
-    own = np.where(own[:, :1] < 0.0, -own, own)
-    sine = np.linalg.norm(own[:, 1:], axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, own[:, :1])
-    axis = np.divide(own[:, 1:], sine, out=np.zeros_like(own[:, 1:]), where=sine > 0.0)
-    qvel[:, to : to + 3] = (place[:, 1] - place[:, 0]) / step
-    qvel[:, to + 3 : to + 6] = axis * angle / step  # along the body's axes
 
 
 def _weld(data: np.ndarray, row: int, place: np.ndarray, turn: np.ndarray) -> None:

@@ -8,8 +8,7 @@ MuJoCo cuts off an actuator's force before the substep, not at its end: a strong
 to and fro. Such a motor is a clutch too, which gives way as its gains do: with the stiffness k, the damping d, substeps
 h and the limit F, min(k (x - x_next) - d v_next, F) is a friction of at most F that has the coefficient c = k h + d
 against the velocity k (x - x_now) / c. MuJoCo's friction f obeys (v_next - v) / h + b v = -R f, where ``discrete``
-takes b at the velocity of the substep's end: f is the motor's for R = b / c and a large b. The other integrators take
-it at the start, and b = 1 / h makes the two terms one.
+takes b at the velocity of the substep's end: f is the motor's for R = b / c and a large b.
 """
 
 from __future__ import annotations
@@ -19,7 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited
+from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_package import mujoco_package
+from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import (
     JointStates,
     axis_of,
@@ -28,6 +30,7 @@ from nuno.engines.mujoco.mujoco_tree import (
     inertias,
     rest_pose,
 )
+from nuno.engines.world_view import dynamics_of
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
@@ -35,10 +38,6 @@ from nuno.shapes import quaternion as quat
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
-STIFF = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of dry friction, stops and the welds of helpers."""
-CLOSING = 2.0
-"""Their time constant, in substeps."""
 FAR = 1e10
 """[rad, m] Where the stops are of what has none."""
 STRONGEST = 1e9
@@ -61,6 +60,8 @@ class Jointed:
         name: Of MuJoCo's joint, site, actuator and sensors.
         helper: The helper, or None: a copy of the body, which takes a share of its mass.
         clutch: Whether it has one.
+        weld: Whether the body is welded to the helper.
+        bushing: By which else the helper holds it.
     """
 
     joint: Joint
@@ -68,6 +69,8 @@ class Jointed:
     name: str
     helper: Any = None
     clutch: bool = False
+    weld: bool = False
+    bushing: Bushing | None = None
 
 
 def hang(made: Any, name: str, joint: Joint) -> None:
@@ -90,21 +93,22 @@ class Joints:
 
     Args:
         world: The world.
+        bushings: Its bushings.
 
     Attributes:
         states: Their coordinates from the bodies' states, and back.
         qpos, dof, number: Addresses (n,) of their coordinates and velocities in the model, and their numbers there.
     """
 
-    def __init__(self, world: Simulation) -> None:
-        self._world = world
+    def __init__(self, world: Simulation, bushings: Bushings) -> None:
+        self._world, self._bushings = world, bushings
         self._joined: list[Jointed] = []
         self._elements: list[Any] = []
         self._spec: Any = None
         self._made = 0
         self.states: Any = None
         self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
-        self._step, self._steepness = 0.0, STEEPNESS
+        self._step = 0.0
         self._carried: dict[Joint, np.ndarray] = {}
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         self._is_driven = False  # whether the numbers of the drives are those that the batch has
@@ -146,15 +150,28 @@ class Joints:
         joined = placed[joint.body.key]
         parent = self._spec.worldbody if joint.target is None else placed[joint.target.key].bodies[0]
         helper = parent.add_body(name=f"j{self._made}")
-        joined.helpers.append(helper)
         hang(helper, helper.name, joint)
+        self._elements.append(helper)
+        if is_limited(joint.spec):
+            joined.thin.append(helper)
+            return Jointed(joint, -1, helper.name, helper, bushing=self._add_bushing(joint, joined.bodies[0], helper))
+        joined.helpers.append(helper)
         mujoco = mujoco_package()
         weld = self._spec.add_equality(
             name=helper.name, type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=helper.name,
             name2=joined.bodies[0].name, solimp=STIFF,
         )  # fmt: skip
-        self._elements += [helper, weld]
-        return Jointed(joint, -1, helper.name, helper)
+        self._elements.append(weld)
+        return Jointed(joint, -1, helper.name, helper, weld=True)
+
+    def _add_bushing(self, joint: Joint, body: Any, helper: Any) -> Bushing:
+        """Let a limited force hold a body at the helper that its joint has."""
+        spec, turn = joint.spec, np.tile(quat.IDENTITY, (self._world.world_count, 1))
+        dynamics = dynamics_of(joint.body)
+        frames = spec.place, turn, spec.place, turn
+        return self._bushings.add(
+            self._spec, (body, helper), frames, spec, float(dynamics.mass[0]), self._step, dynamics, other_moves=False
+        )
 
     def _add_drive(self, own: Jointed) -> None:
         mujoco, spec, name = mujoco_package(), self._spec, own.name
@@ -190,8 +207,6 @@ class Joints:
         self.number = np.array([model.joint(own.name).id for own in joined], dtype=int)
         self.qpos, self.dof = model.jnt_qposadr[self.number], model.jnt_dofadr[self.number]
         self._is_driven, self.states = False, None
-        is_discrete = model.opt.integrator == mujoco_package().mjtIntegrator.mjINT_DISCRETE
-        self._steepness = STEEPNESS if is_discrete else 1.0
         self._wheel, self._gives = np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
         if not joined:
             return
@@ -225,7 +240,7 @@ class Joints:
     def weld(self, model: Any, batch: Any, step: float) -> None:
         """Write of each helper that it is where the body is, after MuJoCo's constants are set, which would undo it."""
         for own in self._joined:
-            if own.helper is None:
+            if not own.weld:
                 continue
             row, place = model.equality(own.name).id, own.joint.spec.place
             batch.expand("eq_solref")[:, row] = CLOSING * step, 1.0
@@ -305,13 +320,13 @@ class Joints:
         pull = own["stiffness"] * own["position"] + damping * own["velocity"]
         self._gains = own["stiffness"], pull, np.where(self._gives, coefficient, 1.0)
         inverse = np.stack([batch.get_model(k).tendon_invweight0[self._clutch] for k in range(len(keeps))])
-        share = step * coefficient * inverse / self._steepness
+        share = step * coefficient * inverse / STEEPNESS
         impedance = np.clip(share / (1.0 + share), 1e-4, STIFF[0])  # R is (1 - d) / d of the inverse inertia
         batch.expand("tendon_frictionloss")[:, self._clutch] = np.where(keeps | self._gives, most, 0.0)
         solimp = batch.expand("tendon_solimp_fri")
         solimp[:, self._clutch] = STIFF
         solimp[:, self._clutch, :2] = np.where(self._gives, impedance, STIFF[0])[..., None]
-        gives = np.stack([np.full_like(impedance, -1e-9), -self._steepness * impedance / step], axis=-1)
+        gives = np.stack([np.full_like(impedance, -1e-9), -STEEPNESS * impedance / step], axis=-1)
         solref = np.where(self._gives[..., None], gives, (CLOSING * step, 1.0))
         batch.expand("tendon_solref_fri")[:, self._clutch] = solref
 
@@ -320,8 +335,8 @@ class Joints:
         if self._joined:
             self.states.set_bodies(batch.bind("qpos")[:, self.qpos], batch.bind("qvel")[:, self.dof], moved)
 
-    def loads(self, batch: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return what the last substep's joints bore and did.
+    def loads(self, batch: Any, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return what the joints bore and did in the last substep, of ``step`` [s].
 
         Force [N] and torque [N m] of each body on the other, (worlds, n, 6), along the world's axes and about the
         joint; and the part of it along the free direction that drives do to the body [N m; N], (worlds, n).
@@ -329,6 +344,10 @@ class Joints:
         given = batch.bind("sensordata")[:, self._sensor].reshape(self._world.world_count, -1, 2, 3)
         frames = batch.bind("site_xmat")[:, self._site].reshape(*given.shape[:2], 3, 3)
         on_body = np.einsum("wnxy,wnky->wnkx", frames, given)
+        self._bushings.note(step)
+        for n, own in enumerate(self._joined):
+            if own.bushing is not None:  # which MuJoCo's sensors do not see
+                on_body[:, n] += own.bushing.last.reshape(-1, 2, 6)[..., :3]
         axis = batch.bind("xaxis")[:, self.number]
         which = np.where(self.states.slides, 0, 1)
         along = np.einsum("wnx,wnx->wn", on_body[:, np.arange(len(which)), which], axis)

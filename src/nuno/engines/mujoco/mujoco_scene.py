@@ -12,25 +12,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_spherical
+from nuno.engines.mujoco.mujoco_bounces import Bounces
+from nuno.engines.mujoco.mujoco_bushings import Bushings
 from nuno.engines.mujoco.mujoco_flex import FlexMesh, add_flex, write_flex
 from nuno.engines.mujoco.mujoco_geoms import add_parts
 from nuno.engines.mujoco.mujoco_grips import Holds
 from nuno.engines.mujoco.mujoco_joints import Joints, hang
-from nuno.engines.mujoco.mujoco_loose import THIN
+from nuno.engines.mujoco.mujoco_kinematics import Kinematics
+from nuno.engines.mujoco.mujoco_leaders import LEADER
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
     CONTACT,
     IMPEDANCE,
     TouchingPair,
-    restitution_of,
     set_masks,
     set_pairs,
     write_friction,
     write_pairs,
 )
-from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, hinges_and_sliders, plan_tree
-from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
+from nuno.engines.mujoco.mujoco_tree import depth_of, frames_of, is_of_tree, plan_tree
+from nuno.engines.world_view import attached, bodies_by_key, dynamics_of, rules_of
 from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
@@ -38,9 +41,9 @@ if TYPE_CHECKING:
     from nuno.joints.joint import Joint
     from nuno.world.simulation import Simulation
 
-HEAVY = 1e6
-"""[kg] and [kg m2] Of a body that follows a path: what touches it does not move it within a step."""
-LEADING = 0.5 * HEAVY
+THIN = 0.02
+"""Share of its body's mass that the helper of a joint has that is loose or a ball."""
+LEADING = 0.5 * LEADER
 """[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
 
 
@@ -57,7 +60,7 @@ class Placed:
         mesh: Of one that deforms, its elements.
         friction: (worlds,), the coefficient of its shapes.
         helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
-        thin: Helpers of loose holds, each with a fiftieth of its mass.
+        thin: Helpers of joints that are loose or balls, each with a fiftieth of its mass.
         carries: Whether bodies hang on it by joints.
         depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
         id: Of the first of its bodies in the model.
@@ -90,6 +93,8 @@ class MujocoScene:
         batch: The batch of as many simulations as there are worlds.
         holds: The grips, and what is held as grips are, as equality constraints.
         joints: The hinges and sliders.
+        bushings, balls: The bushings, and the ball joints with drives.
+        bounces: The pairs that bounce.
         sums: What joints bear and contacts give over a frame; None of cloth and soft bodies that were not asked about.
         compilations: How often the model was compiled.
         shortened: Whether a substep was of another length than the model's.
@@ -105,6 +110,9 @@ class MujocoScene:
         self.placed: dict[str, Placed]
         self.holds: Holds
         self.joints: Joints
+        self.bushings: Bushings
+        self.balls: Balls
+        self.bounces: Bounces
         self.model: Any = None
         self.batch: Any = None
         self.sums: Sums | None = None
@@ -123,7 +131,8 @@ class MujocoScene:
         # bodies that a joint joins touch each other where the world says so, not where MuJoCo would
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
         self.spec, self.placed = spec, {}
-        self.holds, self.joints = Holds(self._world), Joints(self._world)
+        self.bushings, self.balls = Bushings(), Balls()
+        self.holds, self.joints = Holds(self._world, self.bushings, self.balls), Joints(self._world, self.bushings)
         self._settings = (self._world.gravity, self._world.world_count)
 
     def bring(self, substep: float) -> None:
@@ -145,8 +154,8 @@ class MujocoScene:
         if self._settings != (world.gravity, world.world_count) or any(self.placed[k].role == "flex" for k in dropped):
             self._begin()
         else:
-            self.holds.clear()
-            self.joints.clear()
+            for part in (self.bushings, self.holds, self.balls, self.joints):  # what refers to others goes first
+                part.clear()
             for key in sorted(dropped, key=lambda key: -self.placed[key].depth):  # a body's children go with it
                 self._delete(key)
         for depth, key, body in found:
@@ -154,22 +163,19 @@ class MujocoScene:
                 _, role, signature = wanted[key]
                 self.placed[key] = self._place(body, role, signature, tree.get(key))
                 self.placed[key].depth = depth
-        carriers = {joint.target.key for joint in hinges_and_sliders(world) if joint.target is not None}
+        carriers = {joint.target.key for joint in _helped(world) if joint.target is not None}
         for key, own in self.placed.items():
             own.carries, own.helpers, own.thin = key in carriers, [], []
         bodies = [(body, self.placed[key]) for key, body in bodies_by_key(world).items()]
         set_masks(world, bodies)
         self._pairs = set_pairs(self.spec, world, bodies)
-        self.holds.add(self.spec, self.placed)
+        self.holds.add(self.spec, self.placed, substep)
         self.joints.add(self.spec, self.placed, tree, substep)
         for body, own in bodies:
             if own.role == "rigid":
                 _share_mass(dynamics_of(body), _shares(own))
         self.spec.option.timestep, self.shortened = substep, False
-        # a contact that bounces needs one that takes its damper as it is, and a flex needs the other
-        bounces = any(restitution_of(world, body).any() for body in world.bodies)
-        kinds = self._mujoco.mjtIntegrator
-        self.spec.option.integrator = kinds.mjINT_IMPLICITFAST if bounces else kinds.mjINT_DISCRETE
+        self.spec.option.integrator = self._mujoco.mjtIntegrator.mjINT_DISCRETE
         self.spec.option.disableflags |= self._mujoco.mjtDisableBit.mjDSBL_AUTORESET
         with warnings_logged():
             self.model = self.spec.compile()
@@ -183,15 +189,20 @@ class MujocoScene:
         self.joints.find(self.model, self.batch, substep)
         self._set_numbers(bodies)
         write_friction(self.model, self.batch, bodies)
-        write_pairs(self.model, self.batch, self._pairs, substep)
+        write_pairs(self.model, self.batch, self._pairs)
+        movable = {own.id for own in self.placed.values() if own.role == "rigid"}
+        kinematics = Kinematics(self.batch)
+        bouncing = [(pair.name, pair.restitution) for pair in self._pairs]
+        self.bounces = Bounces(self.model, self.batch, bouncing, movable, kinematics, (CONTACT, IMPEDANCE))
         self.joints.weld(self.model, self.batch, substep)
         self.holds.find(self.model, self.batch, self.placed, substep)
+        self.bushings.find(self.model, self.batch, kinematics)
+        self.balls.find(self.model, self.batch, kinematics, substep)
         self.sums = Sums(self, world.world_count) if kept else None
 
     def set_step(self, step: float) -> None:
         """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
         self.batch.expand("opt.timestep")[:] = step
-        write_pairs(self.model, self.batch, self._pairs, step)
         self.joints.set_step(step)
         self.shortened = True
 
@@ -224,7 +235,7 @@ class MujocoScene:
             else:
                 parts = parts_of(body, moves=False)
                 if role == "moving":
-                    made.mass, made.inertia, made.explicitinertial, made.gravcomp = HEAVY, [HEAVY] * 3, True, 1.0
+                    made.mass, made.inertia, made.explicitinertial, made.gravcomp = LEADER, [LEADER] * 3, True, 1.0
                     made.add_freejoint(name=name)
                 else:
                     made.mocap = True
@@ -312,6 +323,12 @@ def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
         made.fullinertia = [
             inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
         ]  # fmt: skip
+
+
+def _helped(world: Simulation) -> list[Joint]:
+    """Return the joints whose body, or a helper of it, hangs on the other body."""
+    grips = [grip for dynamics in attached(world) for grip in dynamics.grips]
+    return [grip for grip in grips if is_of_tree(grip) or is_driven_spherical(grip.spec)]
 
 
 def flex_id(model: Any, name: str) -> int:

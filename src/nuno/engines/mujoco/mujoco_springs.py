@@ -1,8 +1,9 @@
 """Springs: grips of points that give way, or bear a limited force, in MuJoCo.
 
 Each coordinate of a held point is a fixed tendon, the weighted sum of its vertices' coordinates, which an actuator
-draws to where the grip leads with the force of a spring, up to a limit. The ``discrete`` integrator takes both as they
-are at the end of a substep, so that a spring as stiff as `STIFFEST` stays calm.
+draws to where the grip leads with the force of a spring. The ``discrete`` integrator takes that as it is at the end of
+a substep, so that a spring as stiff as `STIFFEST` stays calm. Limits are in
+`nuno.engines.mujoco.mujoco_spring_limits`.
 """
 
 from __future__ import annotations
@@ -12,23 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.engines.mujoco.mujoco_package import mujoco_package
-from nuno.joints.grip import GripSpec
+from nuno.engines.world_view import dynamics_of
 from nuno.joints.tie import TieSpec
 
 if TYPE_CHECKING:
-    from nuno.engines.mujoco.mujoco_grips import Held
+    from nuno.engines.mujoco.mujoco_held import Held
 
 STIFFEST = 1e6
 """[N/m] Of a grip with a limit that does not give way below it."""
 STRONGEST = 1e9
 """[N] Of a grip without a limit."""
-
-
-def is_spring(spec: Any) -> bool:
-    """Return True if a grip's points are drawn by springs: it gives way, or its force is limited."""
-    if isinstance(spec, TieSpec):
-        return spec.places is None and spec.compliance > 0.0
-    return isinstance(spec, GripSpec) and (spec.compliance > 0.0 or spec.max_force is not None)
 
 
 def stiffness_of(spec: Any) -> float:
@@ -55,12 +49,19 @@ def find_springs(own: Held, placed: dict[str, Any], model: Any, batch: Any) -> N
     spec, mine = own.grip.spec, placed[own.grip.body.key]
     assert own.point is not None and own.rest is not None
     own.rows = np.array([model.actuator(name).id for name in own.names], dtype=int).reshape(-1, 3)
-    most = max((len(terms) for terms in own.terms), default=1)
-    own.corners, own.weights = np.zeros((len(own.terms), most), dtype=int), np.zeros((len(own.terms), most))
-    for k, terms in enumerate(own.terms):
-        for n, (corner, weight) in enumerate(terms):
-            own.corners[k, n], own.weights[k, n] = corner, weight
-    own.qpos, own.dof = mine.qpos[own.corners], mine.dof[own.corners]
+    own.weights, vertices = _table(own.terms)
+    own.qpos, own.dof = mine.qpos[vertices], mine.dof[vertices]
+    own.all_dof = own.dof
+    masses = dynamics_of(own.grip.body).mass[:, vertices]
+    if isinstance(spec, TieSpec):
+        assert own.grip.target is not None
+        theirs, vertices = _table(own.others)
+        own.weights = np.concatenate([own.weights, theirs], axis=1)
+        other = placed[own.grip.target.key]
+        own.qpos = np.concatenate([own.qpos, other.qpos[vertices]], axis=1)
+        own.all_dof = np.concatenate([own.dof, other.dof[vertices]], axis=1)
+        masses = np.concatenate([masses, dynamics_of(own.grip.target).mass[:, vertices]], axis=2)
+    own.inverse = (own.weights**2 / masses).sum(axis=-1)
     stiffness = stiffness_of(spec)
     law, limits = batch.expand("actuator_biasprm"), batch.expand("actuator_forcerange")
     law[:, own.rows], limits[:, own.rows] = 0.0, (0.0, 0.0)
@@ -73,23 +74,23 @@ def find_springs(own: Held, placed: dict[str, Any], model: Any, batch: Any) -> N
 
 
 def draw(own: Held, batch: Any, goals: np.ndarray) -> None:
-    """Let a grip's springs draw its points to ``goals`` (worlds, k, 3) [m], each with its limit along the way there."""
+    """Let a grip's springs draw its points to ``goals`` (worlds, k, 3) [m]."""
     assert own.point is not None and own.rest is not None
-    spec, stiffness = own.grip.spec, stiffness_of(own.grip.spec)
+    stiffness = stiffness_of(own.grip.spec)
     world, point = np.nonzero(own.point >= 0)
     which = own.point[world, point]
     rows, goal = own.rows[which], goals[world, point] - own.rest[which]
     batch.expand("actuator_biasprm")[world[:, None], rows, 0] = stiffness * goal
-    if spec.max_force is None:
-        return
-    places = batch.bind("qpos")[world[:, None, None], own.qpos[which][..., None] + np.arange(3)]
-    way = goal - np.einsum("pc,pcx->px", own.weights[which], places)
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    limit = np.minimum(spec.max_force, STRONGEST)[world, None]
-    # at its limit it draws along the way to the goal; below, no coordinate is beyond it
-    share = np.divide(np.abs(way), length, out=np.ones_like(way), where=stiffness * length >= limit)
-    most = limit * np.maximum(share, 1e-6)
-    batch.expand("actuator_forcerange")[world[:, None], rows] = np.stack([-most, most], axis=-1)
+
+
+def _table(terms: list[list[tuple[int, float]]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights and vertices (points, most) of sums of vertices, 0 for none."""
+    most = max((len(own) for own in terms), default=1)
+    weights, vertices = np.zeros((len(terms), most)), np.zeros((len(terms), most), dtype=int)
+    for k, own in enumerate(terms):
+        for n, (vertex, weight) in enumerate(own):
+            weights[k, n], vertices[k, n] = weight, vertex
+    return weights, vertices
 
 
 def drawn_with(own: Held, data: Any, world: int) -> np.ndarray:
@@ -97,6 +98,7 @@ def drawn_with(own: Held, data: Any, world: int) -> np.ndarray:
     assert own.point is not None
     given = np.zeros(len(data.qvel))
     for point in np.unique(own.point[world][own.point[world] >= 0]):
-        force = data.actuator_force[own.rows[point]]
-        np.add.at(given, own.dof[point][:, None] + np.arange(3), own.weights[point][:, None] * force)
+        force = own.last[world, point, :3] if own.is_limited_spring else data.actuator_force[own.rows[point]]
+        weights = own.weights[point, : own.dof.shape[1], None]
+        np.add.at(given, own.dof[point][:, None] + np.arange(3), weights * force)
     return given

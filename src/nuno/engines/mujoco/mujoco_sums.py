@@ -31,7 +31,7 @@ class Sums:
         self._keys = list(scene.placed)
         self._given = np.zeros((worlds, len(self._keys), len(self._keys), 3))
         self._data: Any = None
-        self._owner = _owners(scene, self._keys)
+        self._owner = owners_of(scene, self._keys)
 
     def begin(self) -> None:
         """Forget what was summed up."""
@@ -41,7 +41,7 @@ class Sums:
         """Add what happened in the last substep, of ``step`` [s]."""
         self._duration += step
         if self._joints:
-            borne, along = self._of_joints.loads(self._batch)
+            borne, along = self._of_joints.loads(self._batch, step)
             self._borne += step * borne
             self._along += step * along
         if self._data is None:
@@ -81,7 +81,7 @@ class Sums:
         return {self._keys[k]: rows[:, k].copy() for k in np.flatnonzero(rows.any(axis=(0, 2)))}
 
 
-def _owners(scene: MujocoScene, keys: list[str]) -> tuple[np.ndarray, np.ndarray]:
+def owners_of(scene: MujocoScene, keys: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return the places among ``keys`` of the bodies that own each geom and each flex, and -1 at the end."""
     mujoco, model = mujoco_package(), scene.model
     geoms, flexes = np.full(model.ngeom + 1, -1), np.full(model.nflex + 1, -1)

@@ -1,9 +1,6 @@
 """Touching: which pairs collide, as bit masks, and the friction and restitution of each pair.
 
-Two bodies of which one has a restitution e touch by a damper that a single substep h goes through: of
-``v_next = v - h b v`` with b = (1 + e) / h there is -e v left. A spring as weak as 0.02 (1 - e) / h^2 brings out what
-overlaps, and friction stops what sticks by a damper of its own. The integrators that take a contact's damper as it is
-are those other than ``discrete``.
+Two geoms of which one bounces are an explicit pair, see `nuno.engines.mujoco.mujoco_bounces`.
 """
 
 from __future__ import annotations
@@ -32,11 +29,6 @@ CONTACT = (0.004, 1.0)
 into a table."""
 IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
 """``solimp`` of contacts."""
-BOUNCING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""``solimp`` of contacts that bounce."""
-LIFT = 0.02
-"""Of the spring that brings out what overlaps, over (1 - e) / h^2: a bounce is faster by a share of 0.02 (1 - e) at
-most."""
 _warned: set[frozenset[str]] = set()
 
 
@@ -161,22 +153,16 @@ def set_pairs(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -> l
     return found
 
 
-def write_pairs(model: Any, batch: Any, pairs: Sequence[TouchingPair], step: float) -> None:
-    """Write the numbers of pairs that have their own, for substeps so long [s]."""
+def write_pairs(model: Any, batch: Any, pairs: Sequence[TouchingPair]) -> None:
+    """Write the numbers of pairs that have their own."""
     if not pairs:
         return
     number = [model.pair(pair.name).id for pair in pairs]
-    mu, bounce = (np.stack([getattr(p, kind) for p in pairs], axis=1) for kind in ("friction", "restitution"))
+    mu = np.stack([pair.friction for pair in pairs], axis=1)
     batch.expand("pair_friction")[:, number] = np.stack(
         [mu, mu, *(np.full_like(mu, k) for k in (5e-3, 1e-4, 1e-4))], -1
     )
-    bounces = (bounce > 0.0)[..., None]
-    spring = -np.maximum(LIFT * (1.0 - bounce), 1e-6) / step**2
-    by_damper = np.stack([spring, -(1.0 + bounce) / step], axis=-1)
-    batch.expand("pair_solref")[:, number] = np.where(bounces, by_damper, CONTACT)
-    batch.expand("pair_solimp")[:, number] = np.where(bounces, BOUNCING, IMPEDANCE)
-    # what sticks stops within a substep; zeros are for as in ``pair_solref``
-    batch.expand("pair_solreffriction")[:, number] = np.where(bounces, (-1e-9, -1.0 / step), 0.0)
+    batch.expand("pair_solref")[:, number], batch.expand("pair_solimp")[:, number] = CONTACT, IMPEDANCE
 
 
 def restitution_of(world: Simulation, body: Body) -> np.ndarray:

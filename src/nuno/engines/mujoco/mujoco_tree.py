@@ -2,7 +2,7 @@
 
 Each body hangs on the other one of its first hinge or slider by a joint of MuJoCo's own, which cannot give way. A
 joint that would close a loop, or whose body air slows down, has a helper in its place, which is welded to the body and
-takes a share of its mass.
+takes a share of its mass. One that bears a limited force has a light helper, at which a bushing holds the body.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_bushing import is_limited
 from nuno.engines.world_view import attached, dynamics_of
 from nuno.joints.joint import Joint
 from nuno.joints.joint_motion import positions_of, velocities_of
@@ -48,7 +49,7 @@ def plan_tree(world: Simulation) -> dict[str, Joint]:
         if dynamics is None or not dynamics.is_rigid or np.any(dynamics.material.air_drag):
             continue
         for grip in dynamics.grips:
-            if is_of_tree(grip) and not _is_below(grip.target, body, found):
+            if is_of_tree(grip) and not is_limited(grip.spec) and not _is_below(grip.target, body, found):
                 found[body.key] = grip
                 break
     return found

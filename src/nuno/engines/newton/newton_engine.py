@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.dynamics import Dynamics, State
-from nuno.engines.array_dynamics import ArrayParticles, ArrayRigid
+from nuno.engines.array_dynamics import ArrayParticles, make_arrays, state_at_rest
 from nuno.engines.driven_motion import driven_hold, driven_points, kinematic_poses
 from nuno.engines.engine import Engine
 from nuno.engines.newton.newton_resolution import MINIMUM, substeps_for
@@ -16,7 +16,7 @@ from nuno.engines.world_view import attached, dynamics_of
 from nuno.errors import MissingPackageError
 from nuno.joints.tie import HoldSpec
 from nuno.kernels.quiet import quiet_warp
-from nuno.materials import Material, Rigid
+from nuno.materials import Material
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
@@ -52,24 +52,13 @@ class NewtonEngine(Engine):
 
     def attach(self, body: Body, material: Any) -> Dynamics:
         """Return dynamics for a static body in the shape that it has now, at rest."""
-        worlds = self.world.world_count
-        if isinstance(material, Rigid):
-            place, turn = (np.array(np.broadcast_to(p, (worlds, p.shape[-1])), float) for p in body.pose())
-            still = np.zeros((worlds, 3))
-            return self.make(
-                body, material, {"place": place, "turn": turn, "velocity": still, "spin": still.copy()},
-                material.friction,
-            )  # fmt: skip
-        vertices = body.vertices
-        positions = np.array(np.broadcast_to(vertices, (worlds, *vertices.shape[-2:])), float)
-        state = {"positions": positions, "velocities": np.zeros_like(positions)}
+        state = state_at_rest(body, material, self.world.world_count)
         return self.make(body, material, state, material.friction)
 
     def make(self, body: Body, material: Material, state: State, friction: Any, neutral: bool = False) -> Dynamics:
         """Return dynamics for a body in a state."""
         self.changed()
-        kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
-        return kind(body, material, friction, self.world, state)
+        return make_arrays(body, material, state, friction, self.world)
 
     def load(self, body: Body, state: State, neutral: bool = False) -> None:
         """Set a dynamic body's state."""

@@ -2,8 +2,9 @@
 
 Block descent goes through vertices one by one, a few times a substep. What it leaves of bending depends on how much
 stiffer the membrane is than a vertex's inertia, r = stretch stiffness times h^2 over the area density and a cell's
-area, with substeps h. Cantilevers of 10 and 20 cells, whose drop should be 0.59 of their reach, dropped too far by 3 to
-8 % at r = 0.6, by 11 to 13 % at 1, by 46 to 49 % at 2.4 and by 89 % at 4, whatever the cells, stiffness and substeps.
+area, with substeps h. Cantilevers of 10 and 20 cells, whose drop should be 0.59 of their reach, dropped too far by 2 to
+9 % at r = 0.6, by 8 to 10 % at 1 and by 36 to 42 % at 2.4, whatever the cells, stiffness and substeps
+(``benchmarks/newton_substeps.py``).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ logger = logging.getLogger(__name__)
 MINIMUM, MAXIMUM = 40, 160
 """Substeps of a frame where the world gives no number; the most take four times as long as the least."""
 NOMINAL = 0.6
-"""The r up to which bending is nominal within 8 %."""
+"""The r up to which bending is nominal within 9 %."""
 LIMP = 1.2
 """The r beyond which a warning says that a cloth is too limp."""
 _warned: set[str] = set()
