@@ -71,6 +71,7 @@ class Colliders:
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
         self._times = np.zeros(0)
         self._launches = RecordedLaunches(shapes.pose.device, BLOCK_SIZE)
+        self._rows: dict[bytes, Any] = {}
         # keys of a path batch's bodies, their slots and rows
         self._batch: tuple[Any, ...] | None = None
 
@@ -174,11 +175,16 @@ class Colliders:
         between = by_frame(instants, instants, np.zeros(len(instants)), schedule.times)
         for own, alike in _alike_or_not(place, turn):
             which = slice(0, 1) if alike else slice(None)
-            rows = np.stack([slots[own], np.arange(len(slots[own]))], axis=1)
-            self._write_keys(
-                self._on_device(place[own, which], wp.vec3d), self._on_device(turn[own, which], wp.vec4d), between,
-                self._on_device(rows.astype(np.int32), int),
-            )  # fmt: skip
+            rows = self._rows_of(slots[own])
+            poses = self._on_device(place[own, which], wp.vec3d), self._on_device(turn[own, which], wp.vec4d)
+            self._write_keys(*poses, between, rows)
+
+    def _rows_of(self, slots: np.ndarray) -> Any:
+        """What `write_pose_keys` has for ``rows`` of bodies in some slots, one after the other; made once."""
+        key = slots.tobytes()
+        if key not in self._rows:
+            self._rows[key] = self._on_device(np.stack([slots, np.arange(len(slots))], axis=1).astype(np.int32), int)
+        return self._rows[key]
 
     def _follow_batch(self, motion: BatchMotion) -> None:
         """Take where the bodies of a path batch are."""
@@ -200,7 +206,7 @@ class Colliders:
         )  # fmt: skip
 
     def _on_device(self, values: np.ndarray, kind: Any) -> Any:
-        return wp.array(values, dtype=kind, device=self.shapes.pose.device)
+        return wp.array(np.ascontiguousarray(values), dtype=kind, device=self.shapes.pose.device, copy=False)
 
     @cached_property
     def _slots(self) -> dict[str, int]:
