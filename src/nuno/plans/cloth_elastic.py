@@ -18,7 +18,7 @@ from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import add, div, full_like, mul, product, sub  # noqa: F401
 from nuno.numbers.warp_lanes import lane_of
 from nuno.numbers.warps import WARP, in_warps
-from nuno.plans.cloth_prefetch import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
+from nuno.plans.cloth_prefetch import bend_ahead
 from nuno.plans.grid_lines_by_threads import GRID_LINE_EDGES, stretch_grid_lines_by_threads
 from nuno.plans.grid_lines_by_warp import PAIR_EDGES, WARP_EDGES, stretch_double_grid_lines
 from nuno.plans.sheet_strips import bend_in_strips, fits_strips
@@ -178,15 +178,6 @@ def bend_sheet(t: Any, table: Any, run: Settings, crew: Crew):
 
 
 @wp.func
-def bend_sheet_ahead(t: Any, table: Topology, run: Settings, crew: Crew):
-    """`bend_sheet` by the threads of a block, which read elements before their turn."""
-    bend_twists_ahead(t, table, run, crew.rank, crew.size)
-    bend_lines_ahead(t, table, run, crew.rank, crew.size)
-    if run.sweeps == 0:
-        shear_cells_ahead(t, table, run, crew.rank, crew.size)
-
-
-@wp.func
 def bend(t: Any, table: Any, run: Settings, crew: Crew):
     """A sheet's bends and shears, in the crew's quickest way."""
     bend_sheet(t, table, run, crew)
@@ -197,7 +188,7 @@ def bend(t: StateFloat, table: Topology, run: Settings, crew: Crew):
     if in_warps(crew.size) and fits_strips(table):
         bend_in_strips(t, table, run, crew.rank, crew.size)
     elif shares_work(crew.size):
-        bend_sheet_ahead(t, table, run, crew)
+        bend_ahead(t, table, run, crew.rank, crew.size)
     else:
         bend_sheet(t, table, run, crew)
 
@@ -205,7 +196,7 @@ def bend(t: StateFloat, table: Topology, run: Settings, crew: Crew):
 @wp.func
 def bend(t: StateDouble, table: Topology, run: Settings, crew: Crew):
     if shares_work(crew.size):
-        bend_sheet_ahead(t, table, run, crew)
+        bend_ahead(t, table, run, crew.rank, crew.size)
     else:
         bend_sheet(t, table, run, crew)
 
