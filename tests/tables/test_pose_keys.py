@@ -1,4 +1,4 @@
-"""Key poses of path batches, which a kernel writes: where NumPy puts those of each path alone."""
+"""Key poses of bodies on paths of their own and on path batches, which a kernel writes: where NumPy puts them."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 import nuno
 from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, ROW, STANDING
 from nuno.contact.particle.shape_contact import COLUMNS
+from nuno.shapes import quaternion as quat
 from nuno.shapes.path import path_as_it_is
 from nuno.shapes.shape import Hull
 from nuno.tables.colliders import Colliders
@@ -23,7 +24,10 @@ def lead(group, bodies, times, places, turns):
 
 
 def sent(worlds, frames, apart):
-    """Return the table and the worlds' greatest speeds for boxes and a hull sent on ways of so many frames."""
+    """Return the table and the worlds' greatest speeds for boxes and a hull sent on ways of so many frames.
+
+    Then the same by NumPy: positions and quaternions (worlds, bodies, frames, 3, ...) and speeds.
+    """
     random = np.random.default_rng(4)
     wedge = [(0, 0, 0), (0.3, 0, 0), (0, 0.1, 0), (0, 0, 0.1)]  # its box's middle is not its origin, their mean
     hull = nuno.Body(Hull(wedge, [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]), name="hull")
@@ -45,7 +49,19 @@ def sent(worlds, frames, apart):
     assert len(schedule.path_batches) == 1 - apart
     colliders.follow(schedule)
     table = colliders.shapes.pose.numpy().reshape(-1, len(bodies), FRAMES, FRAME_SIZE)[:, :, : frames + 1]
-    return table, colliders.shapes.shape_speed.numpy().astype(float)
+    middle = np.array([0.15, 0.05, 0.05]) - np.mean(wedge, axis=0)
+    radii = np.array([*3 * [np.linalg.norm([0.05, 0.1, 0.05])], np.linalg.norm([0.15, 0.05, 0.05])])
+    where = [schedule.poses[body.key] for body in bodies]
+    turn = np.stack([np.broadcast_to(t, (worlds, *t.shape[-2:])) for _, t in where], axis=1)
+    place = np.stack([np.broadcast_to(p, (worlds, *p.shape[-2:])) for p, _ in where], axis=1)
+    place = place + quat.rotate(turn, np.array([0 * middle, 0 * middle, 0 * middle, middle])[:, None])
+    way = np.linalg.norm(np.diff(place, axis=2), axis=-1)
+    angle = 2.0 * np.arccos(np.minimum(np.abs((turn[:, :, 1:] * turn[:, :, :-1]).sum(axis=-1)), 1.0))
+    speed = ((way + angle * radii[:, None]) / np.diff(schedule.times)).max(axis=(1, 2))
+    keys = np.minimum(2 * np.arange(frames + 1)[:, None] + np.arange(3), 2 * frames)
+    fastest = colliders.shapes.shape_speed.numpy().astype(float)
+    turn = np.where(turn[..., :1] < 0.0, -turn, turn)
+    return table, fastest, (place[:, :, keys], turn[:, :, keys], speed)
 
 
 def poses_in(table):
@@ -55,16 +71,17 @@ def poses_in(table):
     return table[..., None, :3] + keys[..., :3], turns
 
 
+@pytest.mark.parametrize("apart", [False, True])
 @pytest.mark.parametrize(("worlds", "frames"), [(1, 1), (1, 4), (3, 1), (3, 4)])
-def test_a_batch_is_where_its_paths_are(worlds, frames):
+def test_keys_are_where_the_paths_are(worlds, frames, apart):
     """The kernel's keys are NumPy's, but for float's rounding (1e-6) and 1e-8 of a way for rounded times."""
-    (batch, fastest), (alone, fastest_alone) = sent(worlds, frames, False), sent(worlds, frames, True)
-    np.testing.assert_array_equal(batch[..., :3], alone[..., :3])
-    for found, expected in zip(poses_in(batch), poses_in(alone), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-6)
+    table, fastest, (place, turn, speed) = sent(worlds, frames, apart)
+    found, turned = poses_in(table)
+    np.testing.assert_allclose(found, place, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(turned, turn, rtol=0, atol=2e-6)
     # a bound, of turns that are near to each other up to 1 % above
     assert len(fastest) == worlds
-    assert (fastest > 0.999 * fastest_alone).all() and (fastest < 1.02 * fastest_alone).all()
+    assert (fastest > 0.999 * speed).all() and (fastest < 1.02 * speed).all()
 
 
 @pytest.mark.parametrize("apart", [False, True])

@@ -1,4 +1,4 @@
-"""Shear and stretch in several sweeps of a substep, where one pass would leave them too soft.
+"""Shear and stretch in one plain pass of a substep, or in several sweeps where that would leave them too soft.
 
 Multipliers add up over a substep's sweeps, so that the compliance at which the sweeps arrive is the material's (XPBD,
 Macklin et al. 2016); shear and a mesh's triangles are over-relaxed (successive over-relaxation). How many sweeps, and
@@ -27,10 +27,15 @@ def past_of(sums: Any, k: int, sweep: int, like: Any):
 
 
 @wp.func
-def shear_cells_again(
-    t: Any, table: Any, sums: Any, run: Settings, sweep: int, first: int, last: int, rank: int, size: int
-):
-    """The cell shears of one colour in a sweep, their multipliers in ``sums``."""
+def keep(sums: Any, k: int, past: Any, change: Any, more: bool):
+    """Keep what a multiplier has come to, where another sweep follows."""
+    if more:
+        put(sums, k, past + change)
+
+
+@wp.func
+def shear_cells(t: Any, table: Any, sums: Any, run: Settings, sweep: int, first: int, last: int, rank: int, size: int):
+    """The cell shears of one colour in a sweep, their multipliers in ``sums``; 4 scale is 1 / area."""
     rate = 1.0 / (run.dt * run.dt)
     for k in range(first + rank, last, size):
         scale = table.cell_scale[k]
@@ -40,11 +45,28 @@ def shear_cells_again(
         c = corner(table.cell, k, 2, 4)
         d = corner(table.cell, k, 3, 4)
         past = past_of(sums, k, sweep, alpha)
-        put(sums, k, past + shear_cell(t, a, b, c, d, scale, alpha, past, run.rise, run.onset))
+        change = shear_cell(t, a, b, c, d, scale, alpha, past, run.rise, run.onset)
+        keep(sums, k, past, change, sweep + 1 < run.sweeps)
 
 
 @wp.func
-def strain_triangles_again(
+def stretch_along(
+    t: Any, table: Any, factors: Any, which: int, k: int, a: Any, b: Any, c: Any, scale: Any, sums: Any, run: Settings,
+    sweep: int,
+):  # fmt: skip
+    """Triangle k's stretch by the ``factors`` of a direction, of which a triangle has the compliance ``which``."""
+    alpha = at(t.stretch_compliance, corner(table.triangle_compliance, k, which, 3)) * scale
+    ka = corner(factors, k, 0, 3)
+    kb = corner(factors, k, 1, 3)
+    kc = corner(factors, k, 2, 3)
+    place = 3 * k + 2 - which
+    past = past_of(sums, place, sweep, alpha)
+    change = stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset)
+    keep(sums, place, past, change, sweep + 1 < run.sweeps)
+
+
+@wp.func
+def strain_triangles(
     t: Any, table: Any, sums: Any, run: Settings, sweep: int, first: int, last: int, rank: int, size: int
 ):
     """The triangles of one colour in a sweep, three multipliers each in ``sums``: shear, weft and warp."""
@@ -57,19 +79,10 @@ def strain_triangles_again(
         c = corner(table.triangle, k, 2, 3)
         alpha = at(t.shear_compliance, corner(table.triangle_compliance, k, 2, 3)) * scale
         past = past_of(sums, 3 * k, sweep, alpha)
-        put(sums, 3 * k, past + shear_triangle(t, table, k, a, b, c, alpha, past, run.rise, run.onset))
-        alpha = at(t.stretch_compliance, corner(table.triangle_compliance, k, 1, 3)) * scale
-        ka = corner(table.triangle_v, k, 0, 3)
-        kb = corner(table.triangle_v, k, 1, 3)
-        kc = corner(table.triangle_v, k, 2, 3)
-        past = past_of(sums, 3 * k + 1, sweep, alpha)
-        put(sums, 3 * k + 1, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset))
-        alpha = at(t.stretch_compliance, corner(table.triangle_compliance, k, 0, 3)) * scale
-        ka = corner(table.triangle_u, k, 0, 3)
-        kb = corner(table.triangle_u, k, 1, 3)
-        kc = corner(table.triangle_u, k, 2, 3)
-        past = past_of(sums, 3 * k + 2, sweep, alpha)
-        put(sums, 3 * k + 2, past + stretch_triangle(t, a, b, c, ka, kb, kc, alpha, past, run.rise, run.onset))
+        change = shear_triangle(t, table, k, a, b, c, alpha, past, run.rise, run.onset)
+        keep(sums, 3 * k, past, change, sweep + 1 < run.sweeps)
+        stretch_along(t, table, table.triangle_v, 1, k, a, b, c, scale, sums, run, sweep)
+        stretch_along(t, table, table.triangle_u, 0, k, a, b, c, scale, sums, run, sweep)
 
 
 @wp.func

@@ -10,15 +10,15 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.bending import bend_alpha, bend_line, bend_patch, bend_twist
-from nuno.constraints.membrane import shear_alpha, shear_cell, shear_triangle, stretch_grid_line, stretch_triangle
-from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
+from nuno.constraints.membrane import stretch_grid_line
+from nuno.constraints.sweeps import note_lengths, shear_cells, strain_triangles
 from nuno.numbers.block_group import wait_for
 from nuno.numbers.crew import Crew, shares_work
 from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import add, div, full_like, mul, product, sub  # noqa: F401
 from nuno.numbers.warp_lanes import lane_of
 from nuno.numbers.warps import WARP, in_warps
-from nuno.plans.cloth_prefetch import bend_lines_ahead, bend_twists_ahead, shear_cells_ahead
+from nuno.plans.cloth_prefetch import bend_ahead
 from nuno.plans.grid_lines_by_threads import GRID_LINE_EDGES, stretch_grid_lines_by_threads
 from nuno.plans.grid_lines_by_warp import PAIR_EDGES, WARP_EDGES, stretch_double_grid_lines
 from nuno.plans.sheet_strips import bend_in_strips, fits_strips
@@ -64,45 +64,6 @@ def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, rank:
 
 
 @wp.func
-def shear_cells(t: Any, table: Any, run: Settings, first: int, last: int, rank: int, size: int):
-    """The cell shears of one colour; 4 scale is 1 / area."""
-    rate = 1.0 / (run.dt * run.dt)
-    for k in range(first + rank, last, size):
-        scale = table.cell_scale[k]
-        alpha = shear_alpha(at(t.shear_compliance, table.cell_compliance[k]), scale, rate)
-        a = corner(table.cell, k, 0, 4)
-        b = corner(table.cell, k, 1, 4)
-        c = corner(table.cell, k, 2, 4)
-        d = corner(table.cell, k, 3, 4)
-        shear_cell(t, a, b, c, d, scale, alpha, full_like(alpha, 0.0), 0.0, 0.0)
-
-
-@wp.func
-def strain_triangles(t: Any, table: Any, run: Settings, first: int, last: int, rank: int, size: int):
-    """The triangles of one colour: shear, then stretch along weft and warp."""
-    rate = 1.0 / (run.dt * run.dt)
-    for k in range(first + rank, last, size):
-        area = table.triangle_area[k]
-        scale = rate / area
-        a = corner(table.triangle, k, 0, 3)
-        b = corner(table.triangle, k, 1, 3)
-        c = corner(table.triangle, k, 2, 3)
-        alpha = at(t.shear_compliance, corner(table.triangle_compliance, k, 2, 3)) * scale
-        zero = full_like(alpha, 0.0)
-        shear_triangle(t, table, k, a, b, c, alpha, zero, 0.0, 0.0)
-        alpha = at(t.stretch_compliance, corner(table.triangle_compliance, k, 1, 3)) * scale
-        ka = corner(table.triangle_v, k, 0, 3)
-        kb = corner(table.triangle_v, k, 1, 3)
-        kc = corner(table.triangle_v, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
-        alpha = at(t.stretch_compliance, corner(table.triangle_compliance, k, 0, 3)) * scale
-        ka = corner(table.triangle_u, k, 0, 3)
-        kb = corner(table.triangle_u, k, 1, 3)
-        kc = corner(table.triangle_u, k, 2, 3)
-        stretch_triangle(t, a, b, c, ka, kb, kc, alpha, zero, 0.0, 0.0)
-
-
-@wp.func
 def scratch_of(t: Any, table: SimdElements):
     """The arrays that grid lines and sweeps write between the passes over a table's elements."""
     return table
@@ -134,15 +95,21 @@ def stretch_each_grid_line(t: Any, table: Any, rest: Any, run: Settings, first: 
 
 
 @wp.func
-def stretch_grid_lines(
-    t: StateFloat, table: Topology, rest: wp.array(dtype=float), run: Settings, sweep: int, first: int, last: int,
-    rank: int, size: int,
-):  # fmt: skip
-    """The grid lines of one direction, which are equally long: on CUDA each by a few threads, else by one.
+def lengths_of(t: Any, table: Topology, sweep: int):
+    """The edges' lengths at rest in a sweep, ``rest`` of `nuno.constraints.membrane.stretch_grid_line`."""
+    lengths = table.edge_rest
+    if sweep > 0:
+        lengths = t.grid_line_goal
+    return lengths
 
-    ``rest`` is as `nuno.constraints.membrane.stretch_grid_line` has it.
-    """
+
+@wp.func
+def stretch_grid_lines(
+    t: StateFloat, table: Topology, run: Settings, sweep: int, first: int, last: int, rank: int, size: int
+):
+    """The grid lines of one direction, which are equally long: on CUDA each by a few threads, else by one."""
     rate = 1.0 / (run.dt * run.dt)
+    rest = lengths_of(t, table, sweep)
     count = int(0)
     if in_warps(size) and first < last:
         count = table.grid_line[first + 1] - table.grid_line[first]
@@ -157,10 +124,10 @@ def stretch_grid_lines(
 
 @wp.func
 def stretch_grid_lines(
-    t: StateDouble, table: Topology, rest: wp.array(dtype=float), run: Settings, sweep: int, first: int, last: int,
-    rank: int, size: int,
-):  # fmt: skip
+    t: StateDouble, table: Topology, run: Settings, sweep: int, first: int, last: int, rank: int, size: int
+):
     rate = 1.0 / (run.dt * run.dt)
+    rest = lengths_of(t, table, sweep)
     if in_warps(size):
         warps = size / WARP
         k = int(first + rank / WARP)
@@ -186,11 +153,11 @@ def stretch_grid_lines(
 
 
 @wp.func
-def stretch_grid_lines(
-    t: Any, table: Any, rest: Any, run: Settings, sweep: int, first: int, last: int,
-    rank: int, size: int,
-):  # fmt: skip
-    stretch_each_grid_line(t, table, rest, run, first, last, rank, size)
+def stretch_grid_lines(t: Any, table: Any, run: Settings, sweep: int, first: int, last: int, rank: int, size: int):
+    if sweep == 0:
+        stretch_each_grid_line(t, table, table.edge_rest, run, first, last, rank, size)
+    else:
+        stretch_each_grid_line(t, table, scratch_of(t, table).grid_line_goal, run, first, last, rank, size)
 
 
 @wp.func
@@ -204,17 +171,10 @@ def bend_sheet(t: Any, table: Any, run: Settings, crew: Crew):
         wait_for(crew)
     if run.sweeps == 0:
         for c in range(table.cell_colour.shape[0] - 1):
-            shear_cells(t, table, run, table.cell_colour[c], table.cell_colour[c + 1], crew.rank, crew.size)
+            first = table.cell_colour[c]
+            last = table.cell_colour[c + 1]
+            shear_cells(t, table, scratch_of(t, table).cell_sum, run, 0, first, last, crew.rank, crew.size)
             wait_for(crew)
-
-
-@wp.func
-def bend_sheet_ahead(t: Any, table: Topology, run: Settings, crew: Crew):
-    """`bend_sheet` by the threads of a block, which read elements before their turn."""
-    bend_twists_ahead(t, table, run, crew.rank, crew.size)
-    bend_lines_ahead(t, table, run, crew.rank, crew.size)
-    if run.sweeps == 0:
-        shear_cells_ahead(t, table, run, crew.rank, crew.size)
 
 
 @wp.func
@@ -228,7 +188,7 @@ def bend(t: StateFloat, table: Topology, run: Settings, crew: Crew):
     if in_warps(crew.size) and fits_strips(table):
         bend_in_strips(t, table, run, crew.rank, crew.size)
     elif shares_work(crew.size):
-        bend_sheet_ahead(t, table, run, crew)
+        bend_ahead(t, table, run, crew.rank, crew.size)
     else:
         bend_sheet(t, table, run, crew)
 
@@ -236,33 +196,31 @@ def bend(t: StateFloat, table: Topology, run: Settings, crew: Crew):
 @wp.func
 def bend(t: StateDouble, table: Topology, run: Settings, crew: Crew):
     if shares_work(crew.size):
-        bend_sheet_ahead(t, table, run, crew)
+        bend_ahead(t, table, run, crew.rank, crew.size)
     else:
         bend_sheet(t, table, run, crew)
 
 
 @wp.func
 def sweep_membrane(t: Any, table: Any, run: Settings, crew: Crew):
-    """Shear and stretch in ``run.sweeps`` sweeps, grid lines last in each."""
+    """Shear and stretch in ``run.sweeps`` sweeps, grid lines last; in one plain pass `bend` has done the shears."""
     room = scratch_of(t, table)
-    for sweep in range(run.sweeps):
-        for c in range(table.cell_colour.shape[0] - 1):
-            first = table.cell_colour[c]
-            last = table.cell_colour[c + 1]
-            shear_cells_again(t, table, room.cell_sum, run, sweep, first, last, crew.rank, crew.size)
-            wait_for(crew)
+    for sweep in range(wp.max(run.sweeps, 1)):
+        if run.sweeps > 0:
+            for c in range(table.cell_colour.shape[0] - 1):
+                first = table.cell_colour[c]
+                last = table.cell_colour[c + 1]
+                shear_cells(t, table, room.cell_sum, run, sweep, first, last, crew.rank, crew.size)
+                wait_for(crew)
         for c in range(table.triangle_colour.shape[0] - 1):
             first = table.triangle_colour[c]
             last = table.triangle_colour[c + 1]
-            strain_triangles_again(t, table, room.triangle_sum, run, sweep, first, last, crew.rank, crew.size)
+            strain_triangles(t, table, room.triangle_sum, run, sweep, first, last, crew.rank, crew.size)
             wait_for(crew)
         for c in range(table.grid_line_kind.shape[0] - 1):
             first = table.grid_line_kind[c]
             last = table.grid_line_kind[c + 1]
-            if sweep == 0:
-                stretch_grid_lines(t, table, table.edge_rest, run, sweep, first, last, crew.rank, crew.size)
-            else:
-                stretch_grid_lines(t, table, room.grid_line_goal, run, sweep, first, last, crew.rank, crew.size)
+            stretch_grid_lines(t, table, run, sweep, first, last, crew.rank, crew.size)
             wait_for(crew)
             if sweep + 1 < run.sweeps:
                 start = table.grid_line[first]
@@ -277,15 +235,4 @@ def solve_cloth(t: Any, table: Any, run: Settings, crew: Crew):
         bend_patches(t, table, run, table.patch_colour[c], table.patch_colour[c + 1], crew.rank, crew.size)
         wait_for(crew)
     bend(t, table, run, crew)
-    if run.sweeps > 0:
-        sweep_membrane(t, table, run, crew)
-    else:
-        for c in range(table.triangle_colour.shape[0] - 1):
-            first = table.triangle_colour[c]
-            strain_triangles(t, table, run, first, table.triangle_colour[c + 1], crew.rank, crew.size)
-            wait_for(crew)
-        for c in range(table.grid_line_kind.shape[0] - 1):
-            first = table.grid_line_kind[c]
-            last = table.grid_line_kind[c + 1]
-            stretch_grid_lines(t, table, table.edge_rest, run, 0, first, last, crew.rank, crew.size)
-            wait_for(crew)
+    sweep_membrane(t, table, run, crew)

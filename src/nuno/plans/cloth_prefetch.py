@@ -71,84 +71,57 @@ def read_cell(table: Topology, k: int, last: int):
 
 
 @wp.func
-def bend_lines_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All line bends, as `nuno.plans.cloth_elastic.bend_lines` colour by colour."""
+def solve_line(t: Any, e: Element, compliance: float, rate: float):
+    """A line bend of a compliance, which counts over dt^2."""
+    bend_line(t, e.a, e.b, e.c, bend_alpha(compliance, e.scale, rate))
+
+
+@wp.func
+def solve_twist(t: Any, e: Element, compliance: float, rate: float):
+    """A cell twist."""
+    bend_twist(t, e.a, e.b, e.c, e.d, bend_alpha(compliance, e.scale, rate))
+
+
+@wp.func
+def solve_cell(t: Any, e: Element, compliance: float, rate: float):
+    """One pass of a cell shear."""
+    shear_cell(t, e.a, e.b, e.c, e.d, e.scale, shear_alpha(compliance, e.scale, rate), 0.0, 0.0, 0.0)
+
+
+@wp.func
+def solve_ahead(
+    t: Any, table: Topology, colour: wp.array(dtype=int), compliances: wp.array(dtype=float), run: Settings, rank: int,
+    size: int, read: wp.Function, solve: wp.Function,
+):  # fmt: skip
+    """All elements of a kind, colour by colour: these start where ``colour`` says; ``read`` and ``solve`` are its."""
     rate = 1.0 / (run.dt * run.dt)
-    colours = table.line_colour.shape[0] - 1
+    colours = colour.shape[0] - 1
     if colours > 0:
-        first = table.line_colour[0]
-        last = table.line_colour[1]
-        ready = read_line(table, first + rank, last)
-        compliance = t.bend_compliance[ready.compliance]
+        first = colour[0]
+        last = colour[1]
+        ready = read(table, first + rank, last)
+        compliance = compliances[ready.compliance]
         for c in range(colours):
             now = ready
-            alpha = bend_alpha(compliance, now.scale, rate)
+            given = compliance
             start = last
-            stop = table.line_colour[wp.min(c + 2, colours)]
-            ready = read_line(table, start + rank, stop)
+            stop = colour[wp.min(c + 2, colours)]
+            ready = read(table, start + rank, stop)
             if first + rank < last:
-                bend_line(t, now.a, now.b, now.c, alpha)
+                solve(t, now, given, rate)
             for k in range(first + rank + size, last, size):
-                element = read_line(table, k, last)
-                alpha = bend_alpha(t.bend_compliance[element.compliance], element.scale, rate)
-                bend_line(t, element.a, element.b, element.c, alpha)
-            compliance = t.bend_compliance[ready.compliance]
+                element = read(table, k, last)
+                solve(t, element, compliances[element.compliance], rate)
+            compliance = compliances[ready.compliance]
             first = start
             last = stop
             barrier(size)
 
 
 @wp.func
-def bend_twists_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All cell twists, as `nuno.plans.cloth_elastic.bend_twists` colour by colour."""
-    rate = 1.0 / (run.dt * run.dt)
-    colours = table.twist_colour.shape[0] - 1
-    if colours > 0:
-        first = table.twist_colour[0]
-        last = table.twist_colour[1]
-        ready = read_twist(table, first + rank, last)
-        compliance = t.bend_compliance[ready.compliance]
-        for c in range(colours):
-            now = ready
-            alpha = bend_alpha(compliance, now.scale, rate)
-            start = last
-            stop = table.twist_colour[wp.min(c + 2, colours)]
-            ready = read_twist(table, start + rank, stop)
-            if first + rank < last:
-                bend_twist(t, now.a, now.b, now.c, now.d, alpha)
-            for k in range(first + rank + size, last, size):
-                element = read_twist(table, k, last)
-                alpha = bend_alpha(t.bend_compliance[element.compliance], element.scale, rate)
-                bend_twist(t, element.a, element.b, element.c, element.d, alpha)
-            compliance = t.bend_compliance[ready.compliance]
-            first = start
-            last = stop
-            barrier(size)
-
-
-@wp.func
-def shear_cells_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
-    """All cell shears, as `nuno.plans.cloth_elastic.shear_cells` colour by colour."""
-    rate = 1.0 / (run.dt * run.dt)
-    colours = table.cell_colour.shape[0] - 1
-    if colours > 0:
-        first = table.cell_colour[0]
-        last = table.cell_colour[1]
-        ready = read_cell(table, first + rank, last)
-        compliance = t.shear_compliance[ready.compliance]
-        for c in range(colours):
-            now = ready
-            alpha = shear_alpha(compliance, now.scale, rate)
-            start = last
-            stop = table.cell_colour[wp.min(c + 2, colours)]
-            ready = read_cell(table, start + rank, stop)
-            if first + rank < last:
-                shear_cell(t, now.a, now.b, now.c, now.d, now.scale, alpha, 0.0, 0.0, 0.0)
-            for k in range(first + rank + size, last, size):
-                element = read_cell(table, k, last)
-                alpha = shear_alpha(t.shear_compliance[element.compliance], element.scale, rate)
-                shear_cell(t, element.a, element.b, element.c, element.d, element.scale, alpha, 0.0, 0.0, 0.0)
-            compliance = t.shear_compliance[ready.compliance]
-            first = start
-            last = stop
-            barrier(size)
+def bend_ahead(t: Any, table: Topology, run: Settings, rank: int, size: int):
+    """A sheet's twists, bends and, where they are not swept, shears, as `nuno.plans.cloth_elastic.bend_sheet`."""
+    solve_ahead(t, table, table.twist_colour, t.bend_compliance, run, rank, size, read_twist, solve_twist)
+    solve_ahead(t, table, table.line_colour, t.bend_compliance, run, rank, size, read_line, solve_line)
+    if run.sweeps == 0:
+        solve_ahead(t, table, table.cell_colour, t.shear_compliance, run, rank, size, read_cell, solve_cell)

@@ -22,7 +22,7 @@ from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import mul, sub  # noqa: F401 (mul, sub: the operators)
 from nuno.numbers.tridiagonal import free_row
 from nuno.numbers.vec3 import move, position, vec3
-from nuno.plans.cloth_elastic import stretch_grid_lines
+from nuno.plans.cloth_elastic import lengths_of, stretch_grid_lines
 from nuno.state.cloth_state import Settings, Topology
 
 EDGES = wp.constant(512)
@@ -110,14 +110,11 @@ def stretch_edges(
 
 @wp.func
 def stretch_grid_lines_of_block(
-    t: Any, table: Topology, lengths: wp.array(dtype=float), run: Settings, first: int, last: int, rank: int,
-    size: int,
-):  # fmt: skip
-    """The grid lines first to last: on CUDA by a block, as many at once as it has threads for; else each by a thread.
-
-    ``lengths`` is ``rest`` as `nuno.constraints.membrane.stretch_grid_line` has it.
-    """
+    t: Any, table: Topology, run: Settings, sweep: int, first: int, last: int, rank: int, size: int
+):
+    """The grid lines first to last: on CUDA by a block, as many at once as it has threads; else each by a thread."""
     if shares_work(size):
+        lengths = lengths_of(t, table, sweep)
         rate = 1.0 / (run.dt * run.dt)
         k = int(first)
         while k < last:
@@ -137,4 +134,4 @@ def stretch_grid_lines_of_block(
                 k += 1
             barrier(size)
     else:
-        stretch_grid_lines(t, table, lengths, run, run.sweeps, first, last, rank, size)
+        stretch_grid_lines(t, table, run, sweep, first, last, rank, size)

@@ -14,12 +14,12 @@ from nuno.constraints.bending import bend_alpha, bend_line, bend_twist
 from nuno.constraints.compliances import Compliances
 from nuno.constraints.grips import hold_vertices
 from nuno.constraints.membrane import shear_alpha, shear_cell
-from nuno.constraints.sweeps import note_lengths, shear_cells_again, strain_triangles_again
+from nuno.constraints.sweeps import note_lengths, shear_cells, strain_triangles
 from nuno.contact.self.group_search import Lists
 from nuno.numbers.block_group import BlockGroup, grid_barrier
 from nuno.numbers.crew import barrier
 from nuno.numbers.lanes import subarray
-from nuno.plans.cloth_elastic import bend_patches, strain_triangles
+from nuno.plans.cloth_elastic import bend_patches
 from nuno.plans.grid_lines_by_block import stretch_grid_lines_of_block
 from nuno.state.cloth_state import Settings, Topology
 from nuno.state.integrate import predict
@@ -27,12 +27,10 @@ from nuno.topology.barrier_stages import Colour, Stages, make_stages
 from nuno.topology.cloth_topology import ClothTopology, Elements
 from nuno.topology.grid_lines import find_grid_lines
 
-PARTICLES, PATCHES, TWISTS, LINES, CELLS, TRIANGLES, GRID_LINES, SWEPT_CELLS, SWEPT_TRIANGLES, SWEPT_GRID_LINES = range(
-    10
-)
+PARTICLES, PATCHES, TWISTS, LINES, CELLS, SWEPT_CELLS, TRIANGLES, GRID_LINES = range(8)
 """Kinds of elements in the order in which they are solved; particles are predicted first. Those in the cloth's plane
 may be swept several times."""
-KINDS = 16
+KINDS = 8
 """A step's kind is one of these, plus so many times the number of its sweep."""
 SORTED = (TWISTS, LINES, CELLS)
 """Kinds whose elements are copied into a table in the order of the blocks' shares."""
@@ -69,17 +67,14 @@ def divide(topology: ClothTopology, blocks: int, sweeps: int = 0) -> Stages:
         add(kind, elements)
     order, starts, kinds = find_grid_lines(topology.edges)
     ends = topology.edges.vertices[order]
-    cells, triangles, grid_lines = (
-        (SWEPT_CELLS, SWEPT_TRIANGLES, SWEPT_GRID_LINES) if sweeps else (CELLS, TRIANGLES, GRID_LINES)
-    )
     for sweep in range(max(1, sweeps)):
-        add(cells + KINDS * sweep, topology.cells)
-        add(triangles + KINDS * sweep, topology.triangles)
+        add(SWEPT_CELLS + KINDS * sweep if sweeps else CELLS, topology.cells)
+        add(TRIANGLES + KINDS * sweep, topology.triangles)
         for first, last in pairwise(kinds):
             if last > first:
                 owner = np.repeat(np.arange(last - first), 2 * np.diff(starts[first : last + 1]))
                 vertices = ends[starts[first] : starts[last]].ravel()
-                colours.append(Colour(grid_lines + KINDS * sweep, int(first), int(last - first), owner, vertices))
+                colours.append(Colour(GRID_LINES + KINDS * sweep, int(first), int(last - first), owner, vertices))
     made = topology.device_arrays[key] = make_stages(colours, n, blocks, SORTED)
     return made
 
@@ -206,14 +201,11 @@ def sweep_share(
 ):
     """A block's share of a step of `nuno.plans.cloth_elastic.sweep_membrane`."""
     if kind == SWEPT_CELLS:
-        shear_cells_again(t, topo, t.cell_sum, run, sweep, first, last, rank, size)
-    elif kind == SWEPT_TRIANGLES:
-        strain_triangles_again(t, topo, t.triangle_sum, run, sweep, first, last, rank, size)
+        shear_cells(t, topo, t.cell_sum, run, sweep, first, last, rank, size)
+    elif kind == TRIANGLES:
+        strain_triangles(t, topo, t.triangle_sum, run, sweep, first, last, rank, size)
     else:
-        lengths = topo.edge_rest
-        if sweep > 0:
-            lengths = t.grid_line_goal
-        stretch_grid_lines_of_block(t, topo, lengths, run, first, last, rank, size)
+        stretch_grid_lines_of_block(t, topo, run, sweep, first, last, rank, size)
         if sweep + 1 < run.sweeps:
             barrier(size)
             note_lengths(t, topo, t.grid_line_goal, topo.grid_line[first], topo.grid_line[last], rank, size)
@@ -252,10 +244,6 @@ def go_through(
             set_out(t, run, grips, first, last, rank, size)
         elif what == PATCHES:
             bend_patches(t, topo, run, first, last, rank, size)
-        elif what == TRIANGLES:
-            strain_triangles(t, topo, run, first, last, rank, size)
-        elif what == GRID_LINES:
-            stretch_grid_lines_of_block(t, topo, topo.edge_rest, run, first, last, rank, size)
         else:
             sweep_share(t, topo, run, what % KINDS, what / KINDS, first, last, rank, size)
         if step + 1 < end:

@@ -59,7 +59,8 @@ class MotionBatch:
         self._joints: JointBatch | None = None  # which has what the joints are, while nobody asks the copies
         self._aims: list[RobotState] = []
         self._asked: list[int] = []
-        self._pending: tuple[Any, ...] = ()
+        self._pending: tuple[Any, ...] = ()  # aims, and what `JointBatch.take` is told of them
+        self._worked_out: tuple[Any, ...] = ()  # aims, and what joints are after frames that were worked out ahead
         self._ahead = FramesAhead(0.0)
 
     def look_ahead(self, start: float, ends: Sequence[float]) -> int:
@@ -111,7 +112,7 @@ class MotionBatch:
         count = ahead.ends.index(end) + 1
         configurations = np.stack(ahead.configurations[:count])
         aims = [RobotState(end, *own) for own in zip(configurations[-1], *ahead.motions[count - 1], strict=True)]
-        self._asked, self._pending = [], (aims, *ahead.joints[count - 1])
+        self._asked, self._pending, self._worked_out = [], (), (aims, *ahead.joints[count - 1])
         angles = np.stack([motion[0] for _, motion, _ in ahead.joints[:count]])
         return aims, np.array(ahead.ends[:count]), configurations, angles
 
@@ -120,7 +121,7 @@ class MotionBatch:
 
         ``end`` of this class takes that, ``cancel`` does not.
         """
-        self._asked, self._pending = list(range(len(self._motions))), ()
+        self._asked, self._pending, self._worked_out = list(range(len(self._motions))), (), ()
         if span <= 0.0:
             self.bring()
             return [own.begin(end, span) for own in self._motions], self._angles()
@@ -158,19 +159,21 @@ class MotionBatch:
             own.gait.end_frame()
             if self._joints is not None:
                 self._joints.gather(w)
-        if self._joints is not None and self._pending:
+        if self._joints is not None and self._worked_out:
+            self._aims, self._joints.clock, self._joints.motion, self._joints.desired = self._worked_out
+        elif self._joints is not None and self._pending:
             self._aims, *found = self._pending
-            if len(found) == 3:  # of frames that were worked out ahead
-                self._joints.clock, self._joints.motion, self._joints.desired = found
-            else:
-                self._joints.take(*found)
-        self._asked, self._pending = [], ()
+            self._joints.take(*found)
+        self._drop_step()
 
     def cancel(self) -> None:
         """Go back to where all was when the step began."""
         for w in self._asked:
             self._motions[w].cancel()
-        self._asked, self._pending = [], ()
+        self._drop_step()
+
+    def _drop_step(self) -> None:
+        self._asked, self._pending, self._worked_out = [], (), ()
 
     def bring(self) -> None:
         """Bring all copies up to date, for whoever reads or changes them."""
@@ -181,7 +184,7 @@ class MotionBatch:
 
     def forget(self) -> None:
         """Begin anew with the copies as they are."""
-        self._joints, self._pending, self._ahead = None, (), FramesAhead(0.0)
+        self._joints, self._pending, self._worked_out, self._ahead = None, (), (), FramesAhead(0.0)
 
     def _prepared(self) -> JointBatch:
         """Return the joints of all copies as arrays."""

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
-from nuno.contact.particle.kinematic_pose import FRAME_SIZE, FRAMES, KEY_SIZE, ROW, SLOT_SIZE, STANDING
+from nuno.contact.particle.kinematic_pose import FRAMES, SLOT_SIZE
 from nuno.contact.particle.shape_contact import COLUMNS
 from nuno.errors import BodyStateError
 from nuno.plans.recorded_launches import RecordedLaunches
@@ -19,7 +19,7 @@ from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
 from nuno.state.cloth_state import Shapes
 from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
-from nuno.tables.path_batch import BatchMotion
+from nuno.tables.path_batch import BatchMotion, by_frame
 from nuno.tables.pose_keys import write_pose_keys
 
 if TYPE_CHECKING:
@@ -69,10 +69,10 @@ class Colliders:
         self._meshes = meshes
         # (worlds, kinematic, 3) [m], where the kinematic bodies' meshes have their origins in the bodies' frames
         self._centres = np.stack(centres, axis=1) if centres else np.zeros((1, 0, 3))
-        self._has_centres = bool(self._centres.any())
         self._times = np.zeros(0)
         self._launches = RecordedLaunches(shapes.pose.device, BLOCK_SIZE)
-        # keys of a path batch's bodies, their slots and rows, middles, radii
+        self._rows: dict[bytes, Any] = {}
+        # keys of a path batch's bodies, their slots and rows
         self._batch: tuple[Any, ...] | None = None
 
     @classmethod
@@ -158,66 +158,55 @@ class Colliders:
         frames = len(schedule.times) // 2
         if not 1 <= frames < FRAMES:
             raise ValueError(f"a run may have 1 to {FRAMES - 1} frames, got {frames}")
-        slots = [self._slots[key] for key in schedule.alone if key in self._slots]
-        shape_speed = self._follow_alone(schedule, slots) if slots else np.zeros(self._worlds)
-        if self.shapes.pose.device.is_cpu:  # the table is the kernels' own
-            self._shape_speed_on_cpu[:] = shape_speed
-        else:
-            if slots:
-                self.shapes.pose.assign(self._table.ravel())
-            self.shapes.shape_speed.assign(shape_speed.astype(np.float32))
+        self.shapes.shape_speed.zero_()
+        if slots := [self._slots[key] for key in schedule.alone if key in self._slots]:
+            self._follow_alone(schedule, np.array(slots))
         for motion in schedule.path_batches:
             self._follow_batch(motion)
         self._times = schedule.times
 
-    def _follow_alone(self, schedule: Schedule, slots: list[int]) -> np.ndarray:
-        """Take where bodies on paths of their own are, and return how fast any point of them moves [m/s], by world."""
-        worlds, rows = self._worlds, np.array(slots)
-        place = np.empty((worlds, len(slots), len(schedule.times), 3))
-        turn = np.empty((worlds, len(slots), len(schedule.times), 4))
+    def _follow_alone(self, schedule: Schedule, slots: np.ndarray) -> None:
+        """Take where bodies on paths of their own are: (n,) of these."""
+        place = np.empty((len(slots), self._worlds, len(schedule.times), 3))
+        turn = np.empty((len(slots), self._worlds, len(schedule.times), 4))
         for k, slot in enumerate(slots):
-            place[:, k], turn[:, k] = schedule.alone[self.kinematic[slot].key]
-        if self._has_centres:
-            place += quat.rotate(turn, self._centres[:, rows, None])
-        shape_speed = np.zeros(worlds)
+            place[k], turn[k] = schedule.alone[self.kinematic[slot].key]
+        instants = np.arange(len(schedule.times))
+        between = by_frame(instants, instants, np.zeros(len(instants)), schedule.times)
         for own, alike in _alike_or_not(place, turn):
             which = slice(0, 1) if alike else slice(None)
-            speed = self._write_keys(rows[own], place[which, own], turn[which, own], schedule.times)
-            np.maximum(shape_speed, speed, out=shape_speed)
-        return shape_speed
+            rows = self._rows_of(slots[own])
+            poses = self._on_device(place[own, which], wp.vec3d), self._on_device(turn[own, which], wp.vec4d)
+            self._write_keys(*poses, between, rows)
+
+    def _rows_of(self, slots: np.ndarray) -> Any:
+        """What `write_pose_keys` has for ``rows`` of bodies in some slots, one after the other; made once."""
+        key = slots.tobytes()
+        if key not in self._rows:
+            self._rows[key] = self._on_device(np.stack([slots, np.arange(len(slots))], axis=1).astype(np.int32), int)
+        return self._rows[key]
 
     def _follow_batch(self, motion: BatchMotion) -> None:
         """Take where the bodies of a path batch are."""
-        device, keys = self.shapes.pose.device, motion.path_batch.keys
+        keys = motion.path_batch.keys
         if self._batch is None or self._batch[0] is not keys:
             pairs = [(self._slots[key], row) for row, key in enumerate(keys) if key in self._slots]
-            fixed = (
-                (np.array(pairs, dtype=np.int32).reshape(-1, 2), int), (self._centres, wp.vec3d),
-                (self._radii, wp.float64),
-            )  # fmt: skip
-            self._batch = keys, *[wp.array(part, dtype=kind, device=device) for part, kind in fixed]
-        rows, centres, radii = self._batch[1:]
-        positions, quaternions = motion.path_batch.on_device(device)
-        between: Any = wp.array(motion.by_frame, dtype=wp.float64, device=device)
+            self._batch = keys, self._on_device(np.array(pairs, dtype=np.int32).reshape(-1, 2), int)
+        poses = motion.path_batch.on_device(self.shapes.pose.device)
+        self._write_keys(*poses, motion.by_frame, self._batch[1])
+
+    def _write_keys(self, positions: Any, quaternions: Any, between: np.ndarray, rows: Any) -> None:
+        """Write key poses of some bodies, and raise the worlds' speeds: the arguments of `write_pose_keys`."""
         self._launches.launch(
             write_pose_keys, (self._worlds, len(rows)),
             [
-                positions, quaternions, between, rows, centres, radii, len(self.kinematic) * SLOT_SIZE,
-                self.shapes.pose, self.shapes.shape_speed,
+                positions, quaternions, self._on_device(between, wp.float64), rows, self._middles, self._bounds,
+                len(self.kinematic) * SLOT_SIZE, self.shapes.pose, self.shapes.shape_speed,
             ],
         )  # fmt: skip
 
-    @cached_property
-    def _table(self) -> np.ndarray:
-        """Key poses (worlds, kinematic, FRAMES, FRAME_SIZE) as the kernels read them; on the CPU the very numbers."""
-        shape = (-1, len(self.kinematic), FRAMES, FRAME_SIZE)
-        pose = self.shapes.pose
-        found = pose.numpy() if pose.device.is_cpu else np.zeros(len(pose), dtype=np.float32)
-        return np.asarray(found.reshape(shape))
-
-    @cached_property
-    def _shape_speed_on_cpu(self) -> np.ndarray:
-        return np.asarray(self.shapes.shape_speed.numpy())
+    def _on_device(self, values: np.ndarray, kind: Any) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=kind, device=self.shapes.pose.device, copy=False)
 
     @cached_property
     def _slots(self) -> dict[str, int]:
@@ -227,62 +216,18 @@ class Colliders:
     def _worlds(self) -> int:
         return len(self.shapes.pose) // (len(self.kinematic) * SLOT_SIZE)
 
-    def _write_keys(self, rows: Any, place: np.ndarray, turn: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Write key poses of some kinematic bodies, and return the fastest that any point of them moves [m/s].
-
-        Args:
-            rows: Slots of k bodies.
-            place: (worlds, k, times, 3) [m], one world where all are alike.
-            turn: (worlds, k, times, 4).
-            times: [s].
-
-        Returns:
-            (worlds,).
-        """
-        frames = len(times) // 2
-        # the short way round between neighbours, which the kernels blend number by number
-        flips = np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1) < 0.0
-        turn[..., 1:, :] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=-1)[..., None]
-        first = 2 * np.arange(frames + 1)
-        base = np.round(place[:, :, first] * 1024.0) / 1024.0
-        keys = np.empty((*base.shape[:3], FRAME_SIZE), dtype=np.float32)
-        keys[..., :3] = base
-        rests = (place[:, :, 1:] == place[:, :, :-1]).all(axis=-1) & (turn[:, :, 1:] == turn[:, :, :-1]).all(axis=-1)
-        for k in range(3):
-            # the frame that begins at the end stands still
-            which = np.minimum(first + k, 2 * frames)
-            into = keys[..., 3 + k * KEY_SIZE : 3 + (k + 1) * KEY_SIZE]
-            into[..., :3] = place[:, :, which] - base
-            into[..., 3:] = turn[:, :, which]
-        # the frame that begins at the end stands where the last one stands: what moves ends where its keys say
-        stands = (rests[:, :, ::2] & rests[:, :, 1::2])[:, :, np.minimum(np.arange(frames + 1), frames - 1)]
-        keys[..., STANDING] = stands
-        if stands.any():
-            still = keys[stands]
-            still[:, ROW : ROW + 3] = place[:, :, first][stands]
-            still[:, ROW + 3 : ROW + 12] = rotation_matrices(turn[:, :, first][stands]).reshape(-1, 9)
-            keys[stands] = still
-        self._table[:, rows, : frames + 1] = keys
-        return self._shape_speed(times, place, turn, rests, self._radii[rows])
-
-    def _shape_speed(
-        self, times: np.ndarray, place: np.ndarray, turn: np.ndarray, rests: np.ndarray, radii: np.ndarray
-    ) -> np.ndarray:
-        """Return the fastest that any point of kinematic bodies of some radii [m] moves [m/s], by world."""
-        span, radii = np.diff(times), radii[:, None]
-        speed = np.linalg.norm(place[:, :, 1:] - place[:, :, :-1], axis=-1) / span
-        dot = np.minimum(np.abs(np.sum(turn[..., 1:, :] * turn[..., :-1, :], axis=-1)), 1.0)
-        # of a turn that stays the same the arc cosine is what rounding makes it
-        speed = np.where(rests, 0.0, speed + 2.0 * np.arccos(dot) / span * radii)
-        return np.asarray(speed.max(axis=(1, 2)))
+    @cached_property
+    def _middles(self) -> Any:
+        """(worlds or 1, kinematic) [m], where the bodies' meshes have their origins in the bodies' frames."""
+        return self._on_device(self._centres, wp.vec3d)
 
     @cached_property
-    def _radii(self) -> np.ndarray:
+    def _bounds(self) -> Any:
         """Bounding radii of the kinematic bodies [m]; 0 for a plane, of which no bound is needed."""
         slots = self.shapes.slot.numpy()
         rows = np.argsort(slots)[len(slots) - len(self.kinematic) :]
         radii = self.shapes.table.numpy().reshape(-1, len(slots), COLUMNS)[0, rows, 18]
-        return np.where(radii < UNBOUNDED, radii, 0.0)
+        return self._on_device(np.where(radii < UNBOUNDED, radii, 0.0), wp.float64)
 
     def begin(self, time: float, dt: float) -> None:
         """Be told that a launch begins at ``time`` with substeps of ``dt`` [s]."""
@@ -295,10 +240,10 @@ class Colliders:
 
 
 def _alike_or_not(place: np.ndarray, turn: np.ndarray) -> list[tuple[Any, bool]]:
-    """Return which bodies (worlds, n, times, ...) are in the same place in all worlds and which are not, if any are."""
-    if len(place) == 1:
+    """Return which bodies (n, worlds, times, ...) are in the same place in all worlds and which are not, if any are."""
+    if place.shape[1] == 1:
         return [(slice(None), False)]
-    alike = (place == place[:1]).all(axis=(0, 2, 3)) & (turn == turn[:1]).all(axis=(0, 2, 3))
+    alike = (place == place[:, :1]).all(axis=(1, 2, 3)) & (turn == turn[:, :1]).all(axis=(1, 2, 3))
     return [(np.flatnonzero(own), same) for own, same in ((alike, True), (~alike, False)) if own.any()]
 
 

@@ -137,14 +137,20 @@ class BatchMotion:
     @property
     def by_frame(self) -> np.ndarray:
         """(frames, 3, 4) float: of each instant of a frame the keys around it, the part between them, the time [s]."""
-        found = np.stack([*self.between, self.times], axis=1)
-        return np.stack([found[k : k + 3] for k in range(0, len(found) - 1, 2)])
+        first, last, part = self.between
+        return by_frame(first, last, part, self.times)
 
     @cached_property
     def poses(self) -> dict[str, Pose]:
         """By body key, positions (k, 3) or (worlds, k, 3) [m] and quaternions (k, 4) or (worlds, k, 4)."""
         keys, found = self.path_batch.keys, self.path_batch.at(self.between)
         return {key: (place, turn) for key, place, turn in zip(keys, *found, strict=True)}
+
+
+def by_frame(first: np.ndarray, last: np.ndarray, part: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """(frames, 3, 4) float: what `nuno.tables.pose_keys.write_pose_keys` is told of a frame's start, middle and end."""
+    found = np.stack([first, last, part, times], axis=1)
+    return np.stack([found[k : k + 3] for k in range(0, len(found) - 1, 2)])
 
 
 class KinematicGroup:

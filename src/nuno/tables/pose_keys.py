@@ -1,6 +1,6 @@
-"""Key poses of bodies on one path batch, such as a robot's links in all worlds, written into the contacts' table.
+"""Key poses of kinematic bodies, on paths of their own or on one path batch, written into the contacts' table.
 
-What a kernel does here with some thousand links takes NumPy longer than a small cloth's whole frame.
+What a kernel does here with some thousand links of robots takes NumPy longer than a small cloth's whole frame.
 """
 
 import warp as wp

@@ -16,7 +16,7 @@ from typing import Any
 import warp as wp
 
 from nuno.contact.particle.distances import BOX, FAR, HULL
-from nuno.contact.particle.feature_lists import DUE, EARLIEST, SETS, TRAVELLED, element_of, names_sets, set_of
+from nuno.contact.particle.feature_lists import DUE, EARLIEST, TRAVELLED, element_of, names_sets, set_of, sets_in
 from nuno.contact.particle.feature_points import edge_point, triangle_point
 from nuno.contact.particle.feature_pose import feature_pose
 from nuno.contact.particle.feature_push import push_apart
@@ -65,7 +65,7 @@ def find_active_features(t: Any, topo: Any, travelled: float, rank: int, size: i
             if travelled >= due:
                 t.feature_due[DUE + k] = FAR
                 active += 1
-                sets = sets | (element >> SETS << SETS)
+                sets = sets | sets_in(element)
             else:
                 element = -1 - element
                 soon = wp.min(soon, due)
@@ -89,7 +89,7 @@ def find_active_features(t: Any, topo: Any, travelled: lane, rank: int, size: in
                 t.feature_due[DUE + k] = in_lanes(due, now, FAR)
                 t.feature_asleep[k] = ALL_LANES ^ now
                 active += 1
-                sets = sets | (element >> SETS << SETS)
+                sets = sets | sets_in(element)
             else:
                 element = -1 - element
                 soon = wp.min(soon, -lane_max(-1.0 * due))

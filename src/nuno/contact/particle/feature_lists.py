@@ -209,6 +209,12 @@ def slack_in(mark: int):
 
 
 @wp.func
+def sets_in(number: int):
+    """Return the sets of shapes in a mark, in what `slack_of` returns, or in an element's number in a list."""
+    return number >> SETS << SETS
+
+
+@wp.func
 def names_sets(topo: Any):
     """Return True where listed elements have the sets of shapes that they may touch: there are not too many of them."""
     return topo.side.shape[0] + topo.face.shape[0] <= 1 << SETS
@@ -243,7 +249,7 @@ def marked(mark: int, point: float, at_once: float, own: int):
     found = (mark & 3) | 1
     if point > 0.0:
         found = found | 2
-    return found | slack << 2 | (mark >> SETS << SETS) | own
+    return found | slack << 2 | sets_in(mark) | own
 
 
 @wp.func
@@ -288,14 +294,14 @@ def slack_of(t: Any, topo: Any, k: int, world: int):
         for c in range(2):
             at = mark_in(t.feature_mark[e[c]], world)
             mark = mark | (at & 1)
-            sets = sets | (at >> SETS << SETS)
+            sets = sets | sets_in(at)
             slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
     elif k < edges + topo.face.shape[0]:
         f = topo.face[k - edges]
         for c in range(3):
             at = mark_in(t.feature_mark[f[c]], world)
             mark = mark | (at & 2)
-            sets = sets | (at >> SETS << SETS)
+            sets = sets | sets_in(at)
             slack = wp.min(slack, wp.where(at != 0, slack_in(at), slack))
     return wp.where(mark != 0, slack | sets, -1)
 
@@ -321,7 +327,7 @@ def way_of(slack: int):
 def note_feature_shape(t: Any, topo: Any, k: int, slack: int):
     """List element k where its slack is not below zero."""
     if slack >= 0:
-        place = place_of(t, topo, k, slack >> SETS << SETS)
+        place = place_of(t, topo, k, sets_in(slack))
         t.feature_due[DUE + place] = way_of(slack)
 
 
@@ -349,7 +355,7 @@ def list_marked(like: lane, t: Any, topo: Any, rank: int, size: int):
         for world in range(lanes):
             slack = slack_of(t, topo, k, world)
             if slack >= 0:
-                sets = sets | (slack >> SETS << SETS)
+                sets = sets | sets_in(slack)
                 due[world] = way_of(slack)
         if sets != 0:
             place = place_of(t, topo, k, sets)
