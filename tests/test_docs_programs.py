@@ -31,7 +31,9 @@ def blocks(page):
     return re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long] if name in LONG else []) for name in sorted(PAGES)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in sorted(PAGES)]
+)
 def test_a_page_runs(name, tmp_path):
     """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
@@ -74,7 +76,7 @@ COMMANDS = sorted(
 def test_a_command_is_known(command, capsys):
     """What a page tells to type is a command, and its --help has the options that are typed."""
     _, name, *words = command.split()
-    with pytest.raises(SystemExit, match="^0$"):
+    with pytest.raises(SystemExit, match=r"^0$"):
         main([name, "--help"])
     text = capsys.readouterr().out
     for option in (word.partition("=")[0] for word in words if word.startswith("--")):

@@ -1,8 +1,8 @@
 """CUDA's side of every kernel, seen without a GPU: each module that CUDA runs is compiled to PTX for an H100 or H200.
 
-Native snippets have a branch for CUDA, which no other test looks at on a machine without a device. Where only the source
-is looked at, nothing is optimised (Warp's mode "debug") or inlined. Warp keeps what was compiled in its cache, by a hash
-of the source, so that only what has changed is compiled again.
+Native snippets have a branch for CUDA, which no other test looks at on a machine without a device. Where the source
+alone is looked at, nothing is optimised (Warp's mode "debug") or inlined. Warp keeps what was compiled in its cache, by
+a hash of the source, so that only what has changed is compiled again.
 """
 
 import gc
@@ -21,7 +21,7 @@ WHOLE = {
 }  # fmt: skip
 """Of the modules that go through the substeps of bodies, those that between them have all native snippets, in floats
 and doubles: only these have a branch for CUDA. The others have the same snippets over other memory, and functions that
-the CPU compiles too; `.ci/run` leaves them, named "again-...", to the slow tests."""
+the CPU compiles too; they are slow tests, named "again-..."."""
 
 
 def _again(name):
@@ -66,8 +66,14 @@ def compile_to_ptx(name, mode):
         assert f".entry {kernel.key}_" in ptx, kernel.key
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}" if _again(name) else name)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, id=f"again-{name}", marks=pytest.mark.slow) if _again(name)
+        else pytest.param(name, id=name, marks=pytest.mark.long)
+        for name in MODULES
+    ],
+)  # fmt: skip
 def test_module_compiles_to_ptx(functions_apart, name):
     """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
     assert len(functions_apart) > 100
