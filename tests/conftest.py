@@ -1,26 +1,22 @@
 """What all tests share: those marked ``cuda`` need a CUDA device, and are skipped where there is none.
 
-Kernels that the CPU runs in tests alone, to compare plans, are compiled there without optimising: a third of the time.
-They give the same bits, which is what those tests compare.
+Kernels of CUDA that one short test runs on the CPU are compiled there without optimising: a third of the time, and the
+same bits, which is what it compares. Where tests run kernels for longer that costs more than it saves.
 """
 
 import pytest
 
-FOR_COMPARISON = (
-    "plans.run_worlds", "plans.run_double_worlds", "plans.run_soft_worlds", "plans.run_soft_double_worlds",
-    "plans.run_grid", "plans.run_double_grid", "plans.run_soft_grid", "plans.run_soft_blocks",
-    "plans.run_soft_blocks_sharp",
-)  # fmt: skip
-"""Modules of worlds by a thread, and of CUDA's kernels: no world on the CPU takes these plans by itself."""
+RUN_SHORTLY = ("plans.run_soft_blocks", "plans.run_soft_blocks_sharp")
+"""Their modules."""
 
 
 def pytest_collection_modifyitems(items):
-    """Skip the tests that this machine cannot run, and compile quickly what only tests run."""
+    """Skip the tests that this machine cannot run, and compile quickly what one test runs."""
     import warp as wp
 
     if wp.get_cuda_device_count():
         return  # which would get slow kernels by the same modules
-    for name in FOR_COMPARISON:
+    for name in RUN_SHORTLY:
         wp.get_module(f"nuno.{name}").options["optimization_level"] = 0
     for item in items:
         if item.get_closest_marker("cuda"):
