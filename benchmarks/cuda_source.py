@@ -1,8 +1,9 @@
 """CPU seconds in which each module of kernels is compiled to PTX for CUDA, by which functions are kept out of line.
 
 ``python benchmarks/cuda_source.py --lines 0 25 60 --json source.json``; no GPU is needed. Functions whose source has at
-least so many lines are not inlined; 0 inlines all, as what is launched. Each module is compiled in a process and into a
-cache of its own, as many at once as there are cores.
+least so many lines are not inlined; 0 inlines all, as what is launched. ``--mode debug`` optimises nothing; with
+``--lines 1`` that is what the tests compile. Each module is compiled in a process and into a cache of its own, as many
+at once as there are cores.
 """
 
 import argparse
@@ -17,7 +18,7 @@ import time
 ARCHITECTURE = 90
 
 
-def compiled(name, lines):
+def compiled(name, lines, mode):
     """Return the CPU seconds for a module, and how large its PTX is [MB]."""
     import warp as wp
 
@@ -29,7 +30,7 @@ def compiled(name, lines):
         own = each.func is not None and each.func.__module__.startswith("nuno.")
         if own and each.native_snippet is None and each.adj.source.count("\n") >= lines:
             each.inline_hint = "noinline"
-    wp.set_module_options({"block_dim": module.blocks[0]}, module=module.module)
+    wp.set_module_options({"block_dim": module.blocks[0], "mode": mode}, module=module.module)
     begin = time.process_time()
     (made,) = wp.compile_aot_module(module.module, arch=ARCHITECTURE, use_ptx=True)
     return time.process_time() - begin, made.stat().st_size / 1e6
@@ -39,13 +40,14 @@ def main():
     """Compile all, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--lines", type=int, nargs="+", default=[0, 25, 60], help="of functions that are kept apart")
+    parser.add_argument("--mode", choices=("release", "debug"), default="release", help="Warp's, of compiling")
     parser.add_argument("--only", nargs="+", help="these modules (default: all that CUDA runs)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes at once")
     parser.add_argument("--json", help="where the figures go")
     parser.add_argument("--one", nargs=2, metavar=("MODULE", "LINES"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(compiled(options.one[0], int(options.one[1]))))
+        print(json.dumps(compiled(options.one[0], int(options.one[1]), options.mode)))
         return
     from nuno.kernels.kernel_modules import kernel_modules
 
@@ -56,7 +58,7 @@ def main():
         while waiting and len(running) < options.jobs:
             job = waiting.pop(0)
             cache = tempfile.TemporaryDirectory()
-            command = [sys.executable, __file__, "--one", job[0], str(job[1])]
+            command = [sys.executable, __file__, "--mode", options.mode, "--one", job[0], str(job[1])]
             environment = os.environ | {"WARP_CACHE_PATH": cache.name}
             running[job] = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment), cache
         for job in [each for each, (process, _) in running.items() if process.poll() is not None]:

@@ -42,7 +42,7 @@ assert talos.reach({"base_link": nuno.Coordinates(hips.position + np.array(HIPS)
 robot = nuno.SimulatedRobot(talos, world)
 
 as_taught = taught.on(towel, forward=(1, 0))
-better = improve_fold(as_taught, towel, progress=False)
+better = improve_fold(as_taught, towel, population=8, progress=False)
 
 look = FoldPictures(robot, towel)
 played = play_fold(robot, towel, better.motion, watch=look if asked.out else None)

@@ -8,20 +8,21 @@ from pathlib import Path
 
 import pytest
 
+from nuno.__main__ import main
+
 ROOT = Path(__file__).parents[1]
 PAGES = {
     page.stem: page
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     if re.search(r"^```python", page.read_text(encoding="utf-8"), re.M)
 }
-# pages whose programs walk, fold, estimate or search for longer than some twenty seconds of a core
-SLOW = {"carrying", "closed-loop", "picks", "sweeps", "teaching", "tutorial"}
-# and those of some three seconds or more; `test_docs.py` looks for all names of all pages, and runs the first program
+# pages whose programs take some three seconds of a core or more; `test_docs.py` looks for all names of all pages, and
+# runs the first program
 LONG = {
-    "engines", "folds", "following", "garments", "getting-started", "learning", "planning", "robot-dynamics",
-    "robot-interface", "scenes", "sensors", "soft-bodies", "viewer", "wire", "worlds",
+    "carrying", "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
+    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "teaching",
+    "tutorial", "viewer", "wire", "worlds",
 }  # fmt: skip
-MARKS = {**dict.fromkeys(SLOW, pytest.mark.slow), **dict.fromkeys(LONG, pytest.mark.long)}
 
 
 def blocks(page):
@@ -30,7 +31,9 @@ def blocks(page):
     return re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS.get(name, ())) for name in sorted(PAGES)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in sorted(PAGES)]
+)
 def test_a_page_runs(name, tmp_path):
     """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
@@ -70,13 +73,14 @@ COMMANDS = sorted(
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_command_is_known(command):
+def test_a_command_is_known(command, capsys):
     """What a page tells to type is a command, and its --help has the options that are typed."""
-    words = command.split()
-    done = subprocess.run([sys.executable, "-m", *words[:2], "--help"], capture_output=True, text=True, timeout=500)
-    assert done.returncode == 0, done.stderr
+    _, name, *words = command.split()
+    with pytest.raises(SystemExit, match=r"^0$"):
+        main([name, "--help"])
+    text = capsys.readouterr().out
     for option in (word.partition("=")[0] for word in words if word.startswith("--")):
-        assert option in done.stdout, f"{command}: {option}"
+        assert option in text, f"{command}: {option}"
 
 
 @pytest.mark.parametrize(

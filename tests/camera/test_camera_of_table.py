@@ -22,7 +22,7 @@ def test_what_is_right_is_left_alone():
     assert view is not None and view.mistakes == ()
 
 
-@pytest.mark.parametrize("turn", [(-3.0, 0.0, 0.0), (1.5, 0.0, -1.5)])
+@pytest.mark.parametrize("turn", [pytest.param((-3.0, 0.0, 0.0), marks=pytest.mark.long), (1.5, 0.0, -1.5)])
 def test_a_turned_camera_is_set_right(turn):
     """To 0.15 degrees: the prior of a mistake draws by a hundredth, and the least error of an edge is 0.1 px."""
     camera, table = told(turn=turn)
@@ -84,6 +84,7 @@ def test_what_no_mistake_explains_tells_nothing():
         assert view is None or not view.errors.any()
 
 
+@pytest.mark.long
 def test_large_and_distorted_images_tell_the_same():
     """Twice the pixels, and a lens with barrel distortion: the same turn, to 0.15 degrees as above."""
     camera, table = told(turn=(2.0, 0.0, 0.0))

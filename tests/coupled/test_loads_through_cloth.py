@@ -59,8 +59,12 @@ def led_edge(world, cloth, times, places):
 
 @pytest.mark.parametrize("where", DEVICES, indirect=True)
 @pytest.mark.parametrize(
-    ("mass", "cell"), [(0.05, 0.02), (0.5, 0.02), (5.0, 0.02), pytest.param(5.0, 0.01, marks=pytest.mark.long)]
-)
+    ("mass", "cell"),
+    [
+        (0.05, 0.02), pytest.param(0.5, 0.02, marks=pytest.mark.long), (5.0, 0.02),
+        pytest.param(5.0, 0.01, marks=pytest.mark.long),
+    ],
+)  # fmt: skip
 def test_a_box_rests_a_thickness_above_the_table(where, mass, cell):
     """The gap is the cloth's thickness, and forces of table and cloth are the weights.
 

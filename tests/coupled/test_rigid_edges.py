@@ -78,8 +78,8 @@ def plate(world, length=0.24, turn=0.0, height=0.128):
     return body
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3])
-@pytest.mark.parametrize("speed", [1.0, 2.0])
+@pytest.mark.parametrize("turn", [pytest.param(0.0, marks=pytest.mark.long), 0.3])
+@pytest.mark.parametrize("speed", [pytest.param(1.0, marks=pytest.mark.long), 2.0])
 def test_a_plate_on_its_edge_dents_a_soft_cube(speed, turn):
     """Geometry: it went in to its middle at 1 m/s and right through at 2 m/s; now all of the surface stays outside."""
     world, cube = soft_cube()
@@ -144,7 +144,9 @@ def rod(world):
     return world.add(nuno.cylinder(0.2 * CELL, 0.06, name="rod")).rotate(np.pi / 2, "y"), 0.2 * CELL
 
 
-@pytest.mark.parametrize("made", [bar, wedge, rod])
+@pytest.mark.parametrize(
+    "made", [pytest.param(bar, marks=pytest.mark.long), wedge, pytest.param(rod, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("speed", [1.0, pytest.param(2.0, marks=pytest.mark.long)])
 def test_an_edge_falls_on_a_held_cloth(made, speed):
     """Geometry: along a row of cells, between two rows of vertices. They cut in by up to 2.2 mm, through the cloth."""
@@ -161,7 +163,7 @@ def test_an_edge_falls_on_a_held_cloth(made, speed):
     assert body.position[2] > cloth.vertices[:, 2].min()
 
 
-@pytest.mark.parametrize("speed", [1.0, 2.0])
+@pytest.mark.parametrize("speed", [pytest.param(1.0, marks=pytest.mark.long), 2.0])
 def test_a_disc_falls_on_its_rim(speed):
     """Geometry: a rim is a polygon that is nowhere a skin's thickness, 0.5 mm, from its circle."""
     world, cube = soft_cube()

@@ -58,8 +58,14 @@ def test_gymnasium_has_nothing_to_say(name):
     env.close()
 
 
-@pytest.mark.parametrize("thorough", [False, True])
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@pytest.mark.parametrize(
+    ("mode", "thorough"),
+    [
+        (AutoresetMode.NEXT_STEP, True), (AutoresetMode.SAME_STEP, False),
+        pytest.param(AutoresetMode.NEXT_STEP, False, marks=pytest.mark.long),
+        pytest.param(AutoresetMode.SAME_STEP, True, marks=pytest.mark.long),
+    ],
+)  # fmt: skip
 def test_a_batch_is_gymnasiums_vector_of_single_environments(mode, thorough):
     """Observations, rewards, ends and infos of nine steps are those of single worlds, to the bit, resets included."""
     ours = ClothVectorEnv(short(), 3, autoreset_mode=mode, thorough=thorough)

@@ -129,7 +129,7 @@ def test_what_stands_on_a_held_plate_stands(held, count):
     np.testing.assert_allclose(torque, (0.0, count * G * 0.12, 0.0), atol=1e-3)
 
 
-@pytest.mark.parametrize("compliance", [0.0, 1e-3])
+@pytest.mark.parametrize("compliance", [0.0, pytest.param(1e-3, marks=pytest.mark.long)])
 def test_contradicting_holds_stay_slow(compliance, caplog):
     """Two holds of one body in another's frame at places 0.1 m apart: it went off at 15 km/s."""
     world = nuno.World(device="cpu", gravity=(0.0, 0.0, 0.0))

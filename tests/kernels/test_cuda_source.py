@@ -1,7 +1,8 @@
 """CUDA's side of every kernel, seen without a GPU: each module that CUDA runs is compiled to PTX for an H100 or H200.
 
-Native snippets have a branch for CUDA, which no other test looks at on a machine without a device. Warp keeps what was
-compiled in its cache, by a hash of the source, so that only what has changed is compiled again.
+Native snippets have a branch for CUDA, which no other test looks at on a machine without a device. Where the source
+alone is looked at, nothing is optimised (Warp's mode "debug") or inlined. Warp keeps what was compiled in its cache, by
+a hash of the source, so that only what has changed is compiled again.
 """
 
 import gc
@@ -20,11 +21,7 @@ WHOLE = {
 }  # fmt: skip
 """Of the modules that go through the substeps of bodies, those that between them have all native snippets, in floats
 and doubles: only these have a branch for CUDA. The others have the same snippets over other memory, and functions that
-the CPU compiles too; `.ci/run` leaves them, named "again-...", to the slow tests."""
-LONG, LONG_OF_CLOTH = 25, 60
-"""Lines of a function's source from which it is not inlined where only the source is looked at: its callers are small
-then. By CPU time (`benchmarks/cuda_source.py`): `nuno.coupled.coupled_passes` takes 14 s, inlined 75 s. Functions of
-cloth hand on much, and take least from 60 lines on: `nuno.plans.run_blocks_shared` 63 s, from 25 on 119 s."""
+the CPU compiles too; they are slow tests, named "again-..."."""
 
 
 def _again(name):
@@ -34,9 +31,8 @@ def _again(name):
 
 
 @pytest.fixture
-def long_functions_apart(name):
-    """Keep Nuno's long functions out of line; Warp names what is made of them by another hash than what is launched."""
-    lines = LONG_OF_CLOTH if name.startswith(("nuno.plans.run_blocks", "nuno.plans.run_grid")) else LONG
+def functions_apart():
+    """Keep Nuno's functions out of line; Warp names what is made of them by another hash than what is launched."""
     found = [each for each in gc.get_objects() if isinstance(each, wp.Function)]
     apart = [
         each
@@ -45,7 +41,6 @@ def long_functions_apart(name):
         and each.native_snippet is None
         and each.func is not None
         and each.func.__module__.startswith("nuno.")
-        and each.adj.source.count("\n") >= lines
     ]
     for each in apart:
         each.inline_hint = "noinline"
@@ -54,12 +49,12 @@ def long_functions_apart(name):
         each.inline_hint = None
 
 
-def compile_to_ptx(name):
+def compile_to_ptx(name, mode):
     """Compile a module, and look for all its kernels in what was made."""
     module, blocks = MODULES[name].module, MODULES[name].blocks
     pass_structs_by_reference()
     kept = dict(wp.get_module_options(module))
-    wp.set_module_options({"block_dim": blocks[0]}, module=module)
+    wp.set_module_options({"block_dim": blocks[0], "mode": mode, "optimization_level": 3}, module=module)
     try:
         (made,) = wp.compile_aot_module(module, arch=ARCHITECTURE, use_ptx=True)
     finally:
@@ -69,19 +64,24 @@ def compile_to_ptx(name):
     assert kernels
     for kernel in kernels:
         assert f".entry {kernel.key}_" in ptx, kernel.key
-    return ptx
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}" if _again(name) else name)
-def test_module_compiles_to_ptx(long_functions_apart, name):
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, id=f"again-{name}", marks=pytest.mark.slow) if _again(name)
+        else pytest.param(name, id=name, marks=pytest.mark.long)
+        for name in MODULES
+    ],
+)  # fmt: skip
+def test_module_compiles_to_ptx(functions_apart, name):
     """All overloads of its kernels, also of those that a factory made; an error names the line of Nuno's source."""
-    assert len(long_functions_apart) > 10
-    compile_to_ptx(name)
+    assert len(functions_apart) > 100
+    compile_to_ptx(name, "debug")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODULES, ids=lambda name: f"again-{name}")
 def test_module_compiles_as_it_is_launched(name):
-    """The same with everything inlined, as on a device: up to five times as long."""
-    compile_to_ptx(name)
+    """The same inlined and optimised, as on a device: many times as long."""
+    compile_to_ptx(name, "release")

@@ -38,6 +38,7 @@ def is_kernel(node):
     return any(ast.unparse(mark).startswith("wp.kernel") for mark in marks)
 
 
+@pytest.mark.long
 def test_kernels_are_found_without_any_extra():
     """`nuno compile` works where no extra is installed: what declares kernels imports none."""
     code = """

@@ -36,7 +36,7 @@ MESHES = {
 }
 
 
-LONG = ("cylinder", "turned box", "odd sphere", "wavy ball")
+LONG = ("torus", "cylinder", "turned box", "odd sphere", "wavy ball")
 
 
 @pytest.fixture(

@@ -228,7 +228,7 @@ def test_a_strip_at_rest_has_little_of_a_zigzag(h, rigidity, most):
     assert zigzag(*found) < most
 
 
-@pytest.mark.parametrize("tension", [1.0, 20.0, 90.0])
+@pytest.mark.parametrize("tension", [1.0, pytest.param(20.0, marks=pytest.mark.long), 90.0])
 def test_a_pulled_strip_lies_straight(tension):
     """Exact: a pulled strip has no pattern of vertices at all; rounding makes 0.1 um, 1 um is asked."""
     sheet, cells = nuno.sheet((0.3, 0.06), cells=(30, 6), position=(0, 0, 1)), (30, 6)

@@ -36,6 +36,8 @@ def slow_squares(world, params):
 def _mark(params):
     with open(params["marks"], "ab", buffering=0) as file:
         file.write(f"{int(params['x'])}\n".encode())
+    if int(params["x"]) >= float(os.environ.get("HELD_FROM", "inf")):
+        time.sleep(3600.0)  # until it is killed or interrupted, however long that takes on a busy machine
     time.sleep(float(params["seconds"]))
 
 

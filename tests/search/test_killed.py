@@ -1,6 +1,7 @@
 """Sweeps that are killed, interrupted or torn go on where they stopped."""
 
 import json
+import math
 import os
 import random
 import signal
@@ -22,12 +23,13 @@ PROGRAM = Path(__file__).with_name("sweep_program.py")
 PATIENCE = 500.0  # [s] for a process to start on a busy machine, less than what ends a test
 
 
-def begin(results, marks, trials, seconds, way):
-    """Start the program that sweeps, as the head of a group of processes."""
+def begin(results, marks, trials, seconds, way, held_from=math.inf):
+    """Start the program that sweeps, as the head of a group of processes; trials from a number on do not end."""
     command = [sys.executable, str(PROGRAM), str(results), str(marks), str(trials), str(seconds), way]
     return subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts
-    )
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
+        env=os.environ | {"HELD_FROM": str(held_from)},
+    )  # fmt: skip
 
 
 def wait_for_lines(path, count):
@@ -65,8 +67,8 @@ def killed_again_and_again(tmp_path, way, *, trials, seconds, kills, in_flight):
     moments = []
     known = []
     for _ in range(kills):
-        program = begin(results, marks, trials, seconds, way)
-        wait_for_lines(results, len(known) + 3)  # it has begun to record
+        program = begin(results, marks, trials, seconds, way, held_from=trials - 2)  # not all is done by then
+        wait_for_lines(results, min(len(known) + 3, trials - 2))  # it has begun to record
         time.sleep(random.uniform(0.0, 3.0 * seconds))
         program.kill()
         program.wait()
@@ -103,7 +105,7 @@ def test_killed_many_times(tmp_path, way):
 def test_interrupted(tmp_path):
     """Ctrl-C ends the sweep with KeyboardInterrupt and leaves a file that the next one goes on from."""
     results, marks = tmp_path / "results.jsonl", tmp_path / "marks"
-    program = begin(results, marks, 20, 0.1, "batch")
+    program = begin(results, marks, 20, 0.1, "batch", held_from=18)
     wait_for_lines(results, 4)
     program.send_signal(signal.SIGINT)
     _, errors = program.communicate(timeout=PATIENCE)
@@ -127,7 +129,7 @@ def header_and_parameters():
 def test_interrupted_with_its_workers(tmp_path):
     """Ctrl-C in a terminal reaches all processes; the file goes on being good, and nobody is left."""
     results, marks = tmp_path / "results.jsonl", tmp_path / "marks"
-    program = begin(results, marks, 100, 0.1, "spawn")
+    program = begin(results, marks, 100, 0.1, "spawn", held_from=98)
     wait_for_lines(results, 6)
     os.killpg(program.pid, signal.SIGINT)
     program.communicate(timeout=PATIENCE)

@@ -55,7 +55,11 @@ class Browser:
 
     def __exit__(self, *error):
         self._process.terminate()
-        self._process.wait(10)
+        try:
+            self._process.wait(60)
+        except subprocess.TimeoutExpired:  # a busy machine, or one page that hangs
+            self._process.kill()
+            self._process.wait()
         self._loop.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 

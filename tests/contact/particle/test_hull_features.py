@@ -161,6 +161,7 @@ def test_a_world_of_a_batch_meets_hulls_as_alone():
         np.testing.assert_array_equal(batch[k], run(k))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("substeps", [20, 40])
 def test_all_plans_meet_hulls_alike(substeps):
     """One source: sixteen particles at a time and one by one give the same bits, with floats and with doubles."""

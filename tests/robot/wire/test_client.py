@@ -189,7 +189,7 @@ def test_a_robot_with_other_controllers(other, join):
     assert robot.wait_interpolation() == [False]
     assert time.monotonic() - before >= 0.5
     assert robot.angle_vector()[robot.robot.joint_index("left_elbow_joint")] == 0.5
-    robot.angle_vector({"left_elbow_joint": 0.2}, 10.0, start_time=1.0)
+    robot.angle_vector({"left_elbow_joint": 0.2}, 3600.0, start_time=1.0)
     robot.cancel_angle_vector()
     assert robot.controller_actions[0].goal.status == GoalStatus.PREEMPTED
 
@@ -226,12 +226,13 @@ def test_a_robot_that_does_not_tell_its_controllers(still_g1, join):
 def test_velocities_of_a_real_base(other, join):
     """Are told again and again until their time is over, and then that of rest."""
     robot = join(other, controllers={"larm_controller": ["left_elbow_joint"]})
+    begin = time.monotonic()
     assert robot.go_velocity(0.1, 0.0, 0.2, sec=0.5, wait=True)
     until(lambda: other.velocities[-1][1]["linear"]["x"] == 0.0)  # the last one is under way
     told = [(own["linear"]["x"], own["angular"]["z"]) for _, own in other.velocities]
     assert told[:-1] == [(0.1, 0.2)] * (len(told) - 1)
     assert told[-1] == (0.0, 0.0)
-    assert other.velocities[-1][0] - other.velocities[0][0] > 0.4
+    assert other.velocities[-1][0] - begin >= 0.5
     robot.go_velocity(0.1, sec=3600.0)
     assert robot.go_stop()  # long before the hour is over
     assert robot._stream._goal.status == GoalStatus.PREEMPTED
@@ -242,9 +243,9 @@ def test_a_robot_whose_states_stop(other, join):
     robot = join(other, controllers={"larm_controller": ["left_elbow_joint"]})
     robot.connection.timeout = 1.0
     other.silent = True
-    time.sleep(0.05)
     with pytest.raises(RobotTimeoutError, match="no fresh joint state"):
-        robot.angle_vector()
+        while True:  # some states may be under way
+            robot.angle_vector()
 
 
 def test_a_grasp_tells_whether_something_is_held(tmp_path):
