@@ -106,6 +106,7 @@ def test_two_bodies_keep_their_momenta():
     assert one.angular_velocity[2] > 0.5  # friction has taken it along
 
 
+@pytest.mark.long
 def test_drives_in_a_batch_are_each_world_s_own_and_restored_to_the_bit():
     """A limited joint with a cone a world: each at its own; the first to the bit as alone, also from a snapshot."""
     world = nuno.World(device="cpu")

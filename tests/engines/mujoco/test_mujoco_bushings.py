@@ -138,6 +138,7 @@ def test_a_limit_is_of_the_size_of_force_and_torque():
     np.testing.assert_allclose(grip.wrench[1], 0.01 / size * torque, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.long
 def test_what_was_torn_off_comes_back_as_in_nuno():
     """By 0.8 m, and back with 1 m/s and 5 m/s2 at most: within the 8 mm of the first substep, which bore all."""
     ways = {}

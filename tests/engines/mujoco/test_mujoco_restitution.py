@@ -100,6 +100,7 @@ def test_what_touches_a_floor_already_bounces_off_it_and_not_aside():
     np.testing.assert_allclose(ball.velocity, (0.0, 0.0, 0.5), atol=1e-3)
 
 
+@pytest.mark.long
 def test_it_bounces_beside_cloth_in_a_batch_restored_and_back_in_nuno():
     """To the same bits alone, in a batch of three and from a snapshot; to e^2 of its height; Nuno's world goes on."""
     world = nuno.World(device="cpu")
