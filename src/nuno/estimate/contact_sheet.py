@@ -115,7 +115,7 @@ def compared(real: np.ndarray, imagined: np.ndarray) -> np.ndarray:
 def _shrunk(image: np.ndarray, axes: Axes) -> np.ndarray:
     """An image no larger than axes are in pixels, by areas in OpenCV: Matplotlib's filter takes ten times as long."""
     height, width = image.shape[:2]
-    there = axes.get_window_extent()
+    there = axes.bbox  # [pixels]
     share = min(there.width / width, there.height / height, 1.0)
     return cv2.resize(image, (round(share * width), round(share * height)), interpolation=cv2.INTER_AREA)
 

@@ -180,7 +180,7 @@ class Colliders:
             self._write_keys(*poses, between, rows)
 
     def _rows_of(self, slots: np.ndarray) -> Any:
-        """What `write_pose_keys` has for ``rows`` of bodies in some slots, one after the other; made once."""
+        """The ``rows`` of `write_pose_keys` for bodies in some slots, one after the other; made once."""
         key = slots.tobytes()
         if key not in self._rows:
             self._rows[key] = self._on_device(np.stack([slots, np.arange(len(slots))], axis=1).astype(np.int32), int)
