@@ -106,8 +106,9 @@ def test_hostile_calls_are_refused(callers):
     assert made > 2000 and not raw and not accepted and not changed
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("first", range(1, EACH))
+@pytest.mark.parametrize(
+    "first", [pytest.param(k, marks=pytest.mark.long if k < 4 else pytest.mark.slow) for k in range(1, EACH)]
+)
 def test_more_hostile_calls_are_refused(callers, first):
     """All others of them."""
     calls = [call for call in hostile_calls(name for name in CALLS if not is_of_robots(name)) if call[0] != "carry_mat"]
