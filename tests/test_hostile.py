@@ -117,22 +117,13 @@ def test_more_hostile_calls_are_refused(callers, first):
 
 
 @pytest.mark.long
-def test_hostile_calls_to_robots_are_refused(callers):
+@pytest.mark.parametrize("first", range(EACH))
+def test_hostile_calls_to_robots_are_refused(callers, first):
     """Robots, their drivers and what plans for them."""
     pytest.importorskip("pinocchio")
     names = ["carry_mat", *(name for name in CALLS if is_of_robots(name))]
-    made, raw, accepted, changed = attack(callers, list(hostile_calls(names))[::EACH])
+    made, raw, accepted, changed = attack(callers, list(hostile_calls(names))[first::EACH])
     assert made > 500 and not raw and not accepted and not changed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("first", range(1, EACH))
-def test_more_hostile_calls_to_robots_are_refused(callers, first):
-    """All others of them."""
-    pytest.importorskip("pinocchio")
-    names = ["carry_mat", *(name for name in CALLS if is_of_robots(name))]
-    _, raw, accepted, changed = attack(callers, list(hostile_calls(names))[first::EACH])
-    assert not raw and not accepted and not changed
 
 
 def test_the_attack_sees_what_it_looks_for(callers, monkeypatch):
