@@ -60,7 +60,7 @@ ARRAYS = {"no rows", "wrong shape"}
 CONTAINERS = {"no items", "mapping", "texts", *ARRAYS}
 # By a word of an annotation: what an argument of that type may accept. All else it must refuse.
 MAY = {
-    "RealTimeFactor": {"none", "tiny", "inf"},  # of a server: infinite where nothing waits
+    "RealTimeFactor": {"none", "half", "large", "tiny", "inf"},  # of a server: infinite where nothing waits
     "float": NUMBERS,
     "int": WHOLE,
     "bool": {"true"},

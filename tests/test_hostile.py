@@ -106,8 +106,9 @@ def test_hostile_calls_are_refused(callers):
     assert made > 2000 and not raw and not accepted and not changed
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("first", range(1, EACH))
+@pytest.mark.parametrize(
+    "first", [pytest.param(k, marks=pytest.mark.long if k < 4 else pytest.mark.slow) for k in range(1, EACH)]
+)
 def test_more_hostile_calls_are_refused(callers, first):
     """All others of them."""
     calls = [call for call in hostile_calls(name for name in CALLS if not is_of_robots(name)) if call[0] != "carry_mat"]
@@ -116,22 +117,13 @@ def test_more_hostile_calls_are_refused(callers, first):
 
 
 @pytest.mark.long
-def test_hostile_calls_to_robots_are_refused(callers):
+@pytest.mark.parametrize("first", range(EACH))
+def test_hostile_calls_to_robots_are_refused(callers, first):
     """Robots, their drivers and what plans for them."""
     pytest.importorskip("pinocchio")
     names = ["carry_mat", *(name for name in CALLS if is_of_robots(name))]
-    made, raw, accepted, changed = attack(callers, list(hostile_calls(names))[::EACH])
+    made, raw, accepted, changed = attack(callers, list(hostile_calls(names))[first::EACH])
     assert made > 500 and not raw and not accepted and not changed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("first", range(1, EACH))
-def test_more_hostile_calls_to_robots_are_refused(callers, first):
-    """All others of them."""
-    pytest.importorskip("pinocchio")
-    names = ["carry_mat", *(name for name in CALLS if is_of_robots(name))]
-    _, raw, accepted, changed = attack(callers, list(hostile_calls(names))[first::EACH])
-    assert not raw and not accepted and not changed
 
 
 def test_the_attack_sees_what_it_looks_for(callers, monkeypatch):
