@@ -127,18 +127,18 @@ _MISTAKES = tuple(
 )
 
 _WEAVES = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
-_LATER = SHEARING[::3] + _MISTAKES
+_LATER = SHEARING[::2] + _MISTAKES
 
 DISCRETISATIONS = (
     Discretisation(20, 14, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
-    Discretisation(20, 14, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=12),
+    Discretisation(20, 14, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=16),
     Discretisation(
-        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=12, all_if_poor=True
+        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, all_if_poor=True
     ),
     Discretisation(
         20, 14,
         (_loose(3e-4, 0.25), _firm(8e-4, 0.5, hand=_HIGHER), _loose(1e-3, 0.25), _firm(1e-4, 0.5, hand=_LOWER)),
-        best=8, any_way=True,
+        best=16, any_way=True,
     ),
     Discretisation(
         20, 14,
@@ -146,10 +146,10 @@ DISCRETISATIONS = (
             _firm(8e-4, 0.25), _firm(3e-5, 0.5), _firm(3e-4, 0.5), _firm(1.6e-3, 0.5),
             _loose(1e-6, 0.25), _loose(3e-5, 0.25, hand=_HIGHER), _loose(5e-6, 0.5, hand=_LOWER), _loose(3e-4, 0.5),
         ),
-        best=6, any_way=True,
+        best=8, any_way=True,
     ),
-    Discretisation(25, 20, (_WEAVES[0], _WEAVES[6], _WEAVES[2], _WEAVES[8]), best=4, any_way=True),
-    Discretisation(20, 14, _LATER, best=3, any_way=True),
+    Discretisation(25, 20, _WEAVES, best=5, any_way=True),
+    Discretisation(20, 14, _LATER, best=4, any_way=True),
 )  # fmt: skip
 """Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).
 
