@@ -57,7 +57,7 @@ def _plain(
             if kind == TWISTS:
                 bend_twists(s, table, run, table.twist_colour[c], table.twist_colour[c + 1], 0, 1)
             else:
-                shear_cells(s, table, run, table.cell_colour[c], table.cell_colour[c + 1], 0, 1)
+                shear_cells(s, table, s.cell_sum, run, 0, table.cell_colour[c], table.cell_colour[c + 1], 0, 1)
     keep_moved(s, table.particles, start, out)
 
 

@@ -131,10 +131,10 @@ def test_a_trial_that_diverges_has_failed(talos, glides, mat, monkeypatch):
 
     real = carry_trials.carry
 
-    def carry(world, plan, walks, offsets, watch=None):
+    def carry(world, plan, walks, offsets, *more, **named):
         if (wild := np.flatnonzero(offsets[:, 1] > 0.1)).size:
             raise nuno.SimulationDiverged("mat", 0.1, tuple(wild.tolist()))
-        return real(world, plan, walks, offsets, watch)
+        return real(world, plan, walks, offsets, *more, **named)
 
     monkeypatch.setattr(carry_trials, "carry", carry)
     given = FEW | {"seconds": 0.2}
