@@ -19,10 +19,12 @@ PAGES = {
 # pages whose programs take some three seconds of a core or more; `test_docs.py` looks for all names of all pages, and
 # runs the first program
 LONG = {
-    "carrying", "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
+    "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
     "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "teaching",
     "tutorial", "viewer", "wire", "worlds",
 }  # fmt: skip
+# pages whose every call is made by an example, which tests run: examples/carry_mat.py and lift_soft_cube.py
+SLOW = {"carrying"}
 
 
 def blocks(page):
@@ -32,7 +34,11 @@ def blocks(page):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in sorted(PAGES)]
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in SLOW else pytest.mark.long if name in LONG else ())
+        for name in sorted(PAGES)
+    ],
 )
 def test_a_page_runs(name, tmp_path):
     """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
