@@ -47,9 +47,18 @@ def test_the_docs_have_the_table_of_capabilities():
     assert told == {name: [name in nuno.engine_capabilities(engine) for engine in engines] for name in CAPABILITIES}
 
 
-def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it(monkeypatch):
+@pytest.fixture
+def with_newton(monkeypatch):
+    """Newton as if it were installed, for what refuses before anything of it runs.
+
+    `pytest.importorskip` does not tell: the folder of its tests, which is on the path, counts as a package of its name.
+    """
+    monkeypatch.setattr("nuno.engines.newton.newton_engine.find_spec", lambda name: True)
+
+
+@pytest.mark.usefixtures("with_newton")
+def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it():
     """The message has the engine, the capability and the engines that have it, and so have the attributes."""
-    monkeypatch.setattr("nuno.engines.newton.newton_engine.find_spec", lambda name: True)  # nothing of it runs
     world = nuno.World(device="cpu", engine="newton")
     ball = world.add(nuno.sphere(0.05, name="ball", position=(0.0, 0.0, 1.0)))
     world.attach(ball)
@@ -61,9 +70,9 @@ def test_what_an_engine_lacks_is_refused_by_name_and_names_those_that_have_it(mo
     assert ball._dynamics.grips == []  # nothing holds it
 
 
+@pytest.mark.usefixtures("with_newton")
 def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():
     """Newton has no joints here; the world that was to be imagined stays as it is."""
-    pytest.importorskip("newton")
     world = nuno.World(device="cpu")
     box = world.attach(world.add(nuno.box((0.1, 0.1, 0.1), position=(0.0, 0.0, 0.5))))
     nuno.ball_joint(box, None, point=(0.0, 0.0, 0.6), limit=0.5)
@@ -77,9 +86,9 @@ def test_a_world_that_an_engine_lacks_something_for_is_not_imagined_there():
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("with_newton")
 def test_dynamics_of_a_robot_are_refused_before_it_enters_the_world():
     """Newton has no joints here; neither bodies nor a driver are left in the world."""
-    pytest.importorskip("newton")
     pytest.importorskip("pinocchio")
     world = nuno.World(device="cpu", engine="newton")
     match = "newton has no robots with dynamics; engines that have: nuno, mujoco"
