@@ -36,7 +36,7 @@ def decay(damping):
 @pytest.mark.slow
 def test_a_swing_dies_away_by_its_time_constant():
     """The rate rises by c w^2 / 2, within 5 %: beyond what implicit steps take of themselves."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     alone, _ = decay(0.0)
     damped, frequency = decay(0.001)
     assert damped - alone == pytest.approx(0.001 * frequency**2 / 2.0, rel=0.05)

@@ -48,7 +48,7 @@ on_devices = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", ma
 @on_devices
 def test_all_kinds_fall_alike(device):
     """Free fall by g t^2 / 2 of cloth, soft and rigid bodies; steps of dt fall short or too far by g t dt / 2."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     world = nuno.World(device=device, engine="newton")
     bodies = [
         world.add(nuno.sheet((0.2, 0.2), (3, 3), name="cloth", position=(0, 0, 2))),
@@ -71,7 +71,7 @@ def test_all_kinds_fall_alike(device):
 @on_devices
 def test_a_box_slides_down_an_incline_as_coulomb_says(device):
     """Closed form a = g (sin - mu cos), within 3 %: contacts of finite stiffness, found anew every substep."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     slope, mu = np.radians(30.0), 0.3
     world = nuno.World(device=device, engine="newton")
     world.add(nuno.box((2.0, 0.6, 0.1), name="ramp", friction=mu).rotate(slope, "y"))
@@ -88,7 +88,7 @@ def test_a_box_slides_down_an_incline_as_coulomb_says(device):
 @on_devices
 def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices(device):
     """A strip of half the stiffness stretches by twice as much, w L^2 / (2 E t); a grip's vertices are on its path."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     world = nuno.World(device=device, engine="newton")
     strip = world.add(nuno.sheet((0.3, 0.05), (6, 1), name="strip", position=(0, 0, 1)).rotate(0.5 * np.pi, "y"))
     futures = world.imagine(2)
@@ -113,7 +113,7 @@ def test_worlds_of_a_batch_have_their_own_material_and_grips_lead_vertices(devic
 @on_devices
 def test_attaching_and_detaching_carries_the_state_over(device):
     """A box that is attached while another falls changes nothing of the other; a detached one stays where it is."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
 
     def falling(with_other):
         world = nuno.World(device=device, engine="newton")
@@ -139,7 +139,7 @@ def test_attaching_and_detaching_carries_the_state_over(device):
 @newton
 def test_a_recorded_frame_copies_nothing_from_the_host(monkeypatch):
     """CUDA replays a recorded copy from where the host's array was; a box once slid 2 mm instead of 424 by that."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     from nuno.engines.newton.newton_substeps import NewtonSubsteps
 
     recorded, found = [], []
@@ -165,7 +165,7 @@ def test_a_recorded_frame_copies_nothing_from_the_host(monkeypatch):
 @newton
 def test_what_newton_lacks_is_refused_before_anything_changes():
     """By name, with the engines that have it; the body is static as before."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     world = nuno.World(device="cpu", engine="newton")
     box, other = (world.add(nuno.box((0.1, 0.1, 0.1), position=(k, 0, 1))) for k in range(2))
     with pytest.raises(nuno.EngineCapabilityError, match="newton has no restitution; engines that have: nuno"):
@@ -181,7 +181,7 @@ def test_what_newton_lacks_is_refused_before_anything_changes():
 @newton
 def test_newton_tells_the_same_corner_as_nuno():
     """Newton says that the example's cloth was picked at the corner (0, 0), on a coarse mesh and one guess."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     coarse = replace(DISCRETISATIONS[0], cells=8, hypotheses=DISCRETISATIONS[0].hypotheses[:1])
     case = nuno.read_case(Path(__file__).parents[3] / "examples" / "pick-case")
     found = case.estimate(candidates=(2, 2), engine="newton", discretisations=[coarse], device="cpu", progress=False)

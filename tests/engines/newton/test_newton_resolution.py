@@ -11,7 +11,7 @@ from nuno.engines.newton.newton_resolution import MAXIMUM, MINIMUM, NOMINAL, sub
 
 def world_of(cells=10, stretch=1000.0, density=0.2, **settings):
     """Return a world with a cloth of 0.2 m, whose cells and material are given."""
-    pytest.importorskip("newton")
+    pytest.importorskip("newton.solvers")
     world = nuno.World(device="cpu", engine="newton", **settings)
     sheet = world.add(nuno.sheet((0.2, 0.2), (cells, cells), name="mat"))
     world.attach(sheet, nuno.Cloth(stretch_stiffness=stretch, area_density=density))
