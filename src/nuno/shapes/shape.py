@@ -24,13 +24,34 @@ LARGE = 1_000_000
 """Vertices from which on it is asked whether there is memory for them."""
 SHORTEST, LONGEST = 1e-6, 1e6
 """Lengths of shapes [m]."""
+UNBOUNDED = 1.0e9
+"""[m] Bounding radius of a plane."""
 FLAT = 1e-6
 """Of its convex hull's volume, what a hull may lack by rounding."""
 
 
+@dataclass(frozen=True)
+class Formula:
+    """The numbers by which contacts take a shape whose kind has a formula in `nuno.contact.particle.distances`.
+
+    Attributes:
+        sizes: (3,) [m], as the formula takes them.
+        reach: Radius [m] of a sphere about the frame's origin in which all of it lies.
+        curvature: The least radius [m] with which its surface is curved; 0 with edges, infinite where it is flat.
+    """
+
+    sizes: tuple[float, float, float]
+    reach: float
+    curvature: float
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Root of all shapes."""
+    """Root of all shapes.
+
+    A shape by formula is a class here with its `formula` and its triangles, the formula under its ``kind`` in
+    `nuno.contact.particle.distances`, and a function in `nuno.bodies.make_bodies`.
+    """
 
     kind: ClassVar[str] = "shape"
     is_cloth: ClassVar[bool] = False  # whether cloth dynamics can be attached
@@ -46,9 +67,18 @@ class Shape:
         """Return True if the shape has an inside."""
         return not self.is_cloth
 
+    @property
+    def formula(self) -> Formula | None:
+        """The numbers of the formula that contacts take it by; None takes its triangles."""
+        return None
+
     def mesh(self) -> MeshArrays:
         """Return vertices (n, 3) [m] in the shape's own frame and faces (m, 3) int32, both read-only."""
         return _primitive(self)
+
+    def _triangles(self) -> MeshArrays:
+        """Return what `mesh` keeps."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -61,6 +91,15 @@ class Box(Shape):
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", lengths("size", self.size, 3))
 
+    @property
+    def formula(self) -> Formula:
+        """Half the edges."""
+        x, y, z = self.size
+        return Formula((x / 2, y / 2, z / 2), float(np.linalg.norm(np.array(self.size) / 2)), 0.0)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.box_mesh(self.size)
+
 
 @dataclass(frozen=True)
 class Sphere(Shape):
@@ -71,6 +110,14 @@ class Sphere(Shape):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", length("radius", self.radius))
+
+    @property
+    def formula(self) -> Formula:
+        """The radius."""
+        return Formula((self.radius, 0.0, 0.0), self.radius, self.radius)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.sphere_mesh(self.radius)
 
 
 @dataclass(frozen=True)
@@ -85,6 +132,14 @@ class Cylinder(Shape):
         object.__setattr__(self, "radius", length("radius", self.radius))
         object.__setattr__(self, "height", length("height", self.height))
 
+    @property
+    def formula(self) -> Formula:
+        """The radius and half the height."""
+        return Formula((self.radius, self.height / 2, 0.0), float(np.hypot(self.radius, self.height / 2)), 0.0)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.cylinder_mesh(self.radius, self.height)
+
 
 @dataclass(frozen=True)
 class Capsule(Shape):
@@ -98,12 +153,28 @@ class Capsule(Shape):
         object.__setattr__(self, "radius", length("radius", self.radius))
         object.__setattr__(self, "height", length("height", self.height))
 
+    @property
+    def formula(self) -> Formula:
+        """The radius and half the height."""
+        return Formula((self.radius, self.height / 2, 0.0), self.radius + self.height / 2, self.radius)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.capsule_mesh(self.radius, self.height)
+
 
 @dataclass(frozen=True)
 class Plane(Shape):
     """The endless plane z = 0 of its own frame; what lies below it is solid."""
 
     kind: ClassVar[str] = "plane"
+
+    @property
+    def formula(self) -> Formula:
+        """No sizes."""
+        return Formula((0.0, 0.0, 0.0), UNBOUNDED, np.inf)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.plane_mesh()
 
 
 @dataclass(frozen=True)
@@ -125,6 +196,9 @@ class Sheet(Shape):
         vertices = (self.cells[0] + 1) * (self.cells[1] + 1)
         if vertices > LARGE:
             check_host_memory(f"a sheet of {vertices} vertices", SHEET_BYTES * vertices)
+
+    def _triangles(self) -> MeshArrays:
+        return primitives.sheet_mesh(self.size, self.cells)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,15 +311,8 @@ class ClothMesh(TriangleMesh):
 
 @lru_cache(maxsize=512)
 def _primitive(shape: Any) -> MeshArrays:
-    made = {
-        "box": lambda: primitives.box_mesh(shape.size),
-        "sphere": lambda: primitives.sphere_mesh(shape.radius),
-        "cylinder": lambda: primitives.cylinder_mesh(shape.radius, shape.height),
-        "capsule": lambda: primitives.capsule_mesh(shape.radius, shape.height),
-        "plane": primitives.plane_mesh,
-        "sheet": lambda: primitives.sheet_mesh(shape.size, shape.cells),
-    }[shape.kind]()
-    return frozen(made[0]), frozen(made[1])
+    vertices, faces = shape._triangles()
+    return frozen(vertices), frozen(faces)
 
 
 @lru_cache(maxsize=512)

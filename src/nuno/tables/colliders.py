@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, HULL, PLANE, SHELL_MESH, SOLID_MESH, SPHERE
+from nuno.contact.particle.distances import FORMULAS, HULL, PLANE, SHELL_MESH, SOLID_MESH
 from nuno.contact.particle.kinematic_pose import FRAMES, SLOT_SIZE
 from nuno.contact.particle.shape_contact import COLUMNS
 from nuno.errors import BodyStateError
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.shapes import quaternion as quat
-from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sphere
+from nuno.shapes.shape import UNBOUNDED, Hull, Shape
 from nuno.state.cloth_state import Shapes
 from nuno.tables.hull_tables import HullTable, hull_table, put_hulls
 from nuno.tables.kinematic_motion import Schedule, is_kinematic
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 BLOCK_SIZE = 256
 """Threads of a CUDA block."""
-UNBOUNDED = 1.0e9
-"""[m] Bounding radius of a plane."""
 ENDLESS = 2**30
 """Substeps of the frame in which all stand still."""
 
@@ -100,6 +98,7 @@ class Colliders:
         kinematic: list[Body] = []
         centres: list[np.ndarray] = []
         kinds = np.full(max(1, len(bodies)), PLANE, dtype=np.int32)
+        curvature = np.full(max(1, len(bodies)), np.inf, dtype=np.float32)
         slots = np.full(max(1, len(bodies)), -1, dtype=np.int32)
         table = np.zeros((worlds, max(1, len(bodies)), COLUMNS), dtype=np.float32)
         ids = np.zeros((worlds, max(1, len(bodies))), dtype=np.uint64)
@@ -109,14 +108,14 @@ class Colliders:
             row[:, 15] = body.friction
             row[:, 16] = pair_friction.get(body.name, -1.0)
             position, quaternion = body.position, np.asarray(body.quaternion)
-            primitive, centre = _describe(body), np.zeros(3)
+            formula, centre = body.shape.formula, np.zeros(3)
             if isinstance(body.shape, Hull) and not body.is_deformed:
-                kinds[k] = HULL
+                kinds[k], curvature[k] = HULL, 0.0
                 hulls[k] = hull = hull_table(body.shape)
                 centre, row[:, 12:15] = hull.middle, hull.half
                 row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
                 position = position + quat.rotate(quaternion, centre)
-            elif primitive is None:
+            elif formula is None:
                 kinds[k] = SOLID_MESH if body.is_solid else SHELL_MESH
                 made, centre, row[:, 12:15] = _meshes_of(body, device)
                 meshes += made
@@ -125,7 +124,8 @@ class Colliders:
                 row[:, 18] = np.linalg.norm(row[:, 12:15], axis=1)
                 position = position + quat.rotate(quaternion, centre)
             else:
-                kinds[k], row[:, 12:15], row[:, 18] = primitive
+                kinds[k], curvature[k] = FORMULAS[body.shape.kind], formula.curvature
+                row[:, 12:15], row[:, 18] = formula.sizes, formula.reach
             row[:, :3] = position
             row[:, 3:12] = rotation_matrices(quaternion).reshape(-1, 9)
             if is_kinematic(body):
@@ -146,10 +146,8 @@ class Colliders:
         shapes.pose = wp.zeros(worlds * size if kinematic else 1, dtype=float, device=device)
         shapes.timing = wp.zeros(2, dtype=int, device=device)
         shapes.shape_speed = wp.zeros(worlds, dtype=float, device=device)
-        edged = (kinds == BOX) | (kinds == CYLINDER) | (kinds == HULL)
-        curved = np.where(edged, 0.0, np.where(kinds < PLANE, table[0, :, 12], np.inf))
         keys = [body.key for body in bodies]
-        return cls(shapes, keys, meshes, kinematic, centres, float(curved.min()))
+        return cls(shapes, keys, meshes, kinematic, centres, float(curvature.min()))
 
     def follow(self, schedule: Schedule) -> None:
         """Take where the kinematic bodies are during the next run; arrays keep their places on the device."""
@@ -282,20 +280,3 @@ def _differs(body: Body, pair: Any) -> bool:
     rubs = np.ndim(body.friction) == 1 or np.ndim(pair if pair is not None else 0.0) == 1
     curved = body.is_deformed and np.ndim(body.surface()[0]) == 3 and len(body.surface()[0]) > 1
     return posed or rubs or curved
-
-
-def _describe(body: Body) -> tuple[int, tuple[float, float, float], float] | None:
-    """Kind, sizes and bounding radius of a body's shape; None for triangles."""
-    shape = body.shape
-    if isinstance(shape, Box):
-        half = np.asarray(shape.size, dtype=float) / 2
-        return BOX, (float(half[0]), float(half[1]), float(half[2])), float(np.linalg.norm(half))
-    if isinstance(shape, Sphere):
-        return SPHERE, (shape.radius, 0.0, 0.0), shape.radius
-    if isinstance(shape, Cylinder):
-        return CYLINDER, (shape.radius, shape.height / 2, 0.0), float(np.hypot(shape.radius, shape.height / 2))
-    if isinstance(shape, Capsule):
-        return CAPSULE, (shape.radius, shape.height / 2, 0.0), shape.radius + shape.height / 2
-    if isinstance(shape, Plane):
-        return PLANE, (0.0, 0.0, 0.0), UNBOUNDED
-    return None

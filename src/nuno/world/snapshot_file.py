@@ -36,17 +36,19 @@ READABLE = (1, 2, 3, 4, FORMAT)  # 1 has no paths of bodies, 3 no clock of each 
 ORIGIN = 3
 """The first format that says what the places of moving rigid bodies are relative to."""
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
-SHAPES = (
-    shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule, shapes.Plane, shapes.Sheet,
-    shapes.TriangleMesh, shapes.Hull, shapes.ClothMesh, Compound, soft_shape.SoftBox, soft_shape.SoftSphere,
-    soft_shape.SoftCylinder, soft_shape.SoftCapsule, soft_shape.SoftMesh, soft_shape.SoftTetrahedra,
-)  # fmt: skip
+
+
+def _kinds_of(root: type) -> list[type]:
+    """Return the classes below one, at any depth."""
+    return [each for kind in root.__subclasses__() for each in (kind, *_kinds_of(kind))]
+
+
 GRIPS = (GripSpec, TieSpec, HoldSpec, JointSpec)
 TYPES: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
-        *SHAPES, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord, GripRecord, RigidLayout,
-        RigidPlace, Snapshot,
+        *_kinds_of(shapes.Shape), Compound, *GRIPS, Cloth, Soft, Rigid, Path, Push, DynamicsRecord, BodyRecord,
+        GripRecord, RigidLayout, RigidPlace, Snapshot,
     )
 }  # fmt: skip
 

@@ -27,6 +27,9 @@ from nuno.numbers.vec3 import dot, vec3
 from nuno.state.cloth_state import Shapes
 
 BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH, HULL = range(8)
+FORMULAS = {"box": BOX, "sphere": SPHERE, "cylinder": CYLINDER, "capsule": CAPSULE, "plane": PLANE}
+"""The kinds of shapes with a formula, which `distance_solid` has. Edges of cloth, too, look at those before the plane,
+all of them convex; others come between the plane and the meshes."""
 
 FAR = wp.constant(1.0e6)
 """[m] The distance of what is too far to matter."""
