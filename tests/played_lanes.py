@@ -66,7 +66,7 @@ def wrinkled_sheet(cells, material, *, doubles=False):
     table.particles, table.columns = n, sheet.leaves.columns
     found = compliances(sheet, material.resolved(1, sheet.element_count))
     for kind in ("edge", "cell", "line", "twist"):
-        setattr(table, f"{kind}_compliance", wp.array(getattr(found, kind), dtype=int, device="cpu"))
+        setattr(table, f"{kind}_compliance", wp.array(found.place[kind], dtype=int, device="cpu"))
     for kind in ("stretch", "shear", "bend"):
         setattr(state, f"{kind}_compliance", wp.array(getattr(found, kind)[0], dtype=float, device="cpu"))
     # off the axes, so that no coordinate is zero

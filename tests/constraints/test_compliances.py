@@ -18,9 +18,9 @@ def test_bends_that_differ_outnumber_those_that_do_not(cells):
     assert same.bend.shape == (1, UNIFORM_BENDS)
     if cloth.element_count > 1:
         assert own.bend.shape[1] > UNIFORM_BENDS
-        elements = np.concatenate([own.line, own.twist])
+        elements = np.concatenate([own.place["line"], own.place["twist"]])
         assert len(np.unique(elements)) == len(cloth.lines) + len(cloth.twists)
-        np.testing.assert_allclose(np.sort(1 / own.bend[0, own.twist]), rigidity[0], rtol=1e-7)  # floats
+        np.testing.assert_allclose(np.sort(1 / own.bend[0, own.place["twist"]]), rigidity[0], rtol=1e-7)  # floats
 
 
 @pytest.mark.parametrize("own", [False, True])
@@ -30,10 +30,10 @@ def test_twist_has_the_geometric_mean_of_the_two_rigidities(own):
     factor = np.linspace(1.0, 2.0, cloth.element_count)[None] if own else 1.0
     warp, weft = 1e-5 * factor, 9e-5 * factor
     found = compliances(cloth, nuno.Cloth(bending_rigidity=(warp, weft)).resolved(1, cloth.element_count))
-    twists = 1.0 / found.bend[0, found.twist]
+    twists = 1.0 / found.bend[0, found.place["twist"]]
     expected = 3e-5 * (np.sort(factor[0]) if own else np.ones(cloth.element_count))
     np.testing.assert_allclose(np.sort(twists), expected, rtol=1e-6)
-    lines = 1.0 / found.bend[0, found.line]
+    lines = 1.0 / found.bend[0, found.place["line"]]
     assert lines[cloth.lines.axis == 0].max() <= 2.0001e-5 and lines[cloth.lines.axis == 1].min() >= 8.999e-5
 
 

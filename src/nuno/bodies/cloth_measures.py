@@ -42,10 +42,10 @@ def stretch_energy(topology: ClothTopology, x: np.ndarray, soft: Compliances) ->
     order = find_grid_lines(edges)[0]
     i, j = edges.vertices[order].T
     longer = np.linalg.norm(x[:, i] - x[:, j], axis=-1) - edges.extra["rest"][order]
-    energy = _energy(longer, edges.scale[order], soft.stretch[:, soft.edge])
+    energy = _energy(longer, edges.scale[order], soft.stretch[:, soft.place["edge"]])
     for along, place in (("u", 0), ("v", 1)):
         stretch = np.linalg.norm(_slopes(topology, x, along), axis=-1) - 1.0
-        energy = energy + _energy(stretch, triangles.scale, soft.stretch[:, soft.triangle[:, place]])
+        energy = energy + _energy(stretch, triangles.scale, soft.stretch[:, soft.place["triangle"][:, place]])
     return energy
 
 
@@ -57,9 +57,9 @@ def shear_energy(topology: ClothTopology, x: np.ndarray, soft: Compliances) -> n
     cells, triangles = topology.cells, topology.triangles
     a, b, c, d = (x[:, corner] for corner in cells.vertices.T)
     diagonals = ((d - a) ** 2).sum(axis=-1) - ((b - c) ** 2).sum(axis=-1)
-    energy = _energy(diagonals * cells.extra["quarter"], cells.scale, soft.shear[:, soft.cell])
+    energy = _energy(diagonals * cells.extra["quarter"], cells.scale, soft.shear[:, soft.place["cell"]])
     shear = (_slopes(topology, x, "u") * _slopes(topology, x, "v")).sum(axis=-1)
-    return energy + _energy(shear, triangles.scale, soft.shear[:, soft.triangle[:, 2]])
+    return energy + _energy(shear, triangles.scale, soft.shear[:, soft.place["triangle"][:, 2]])
 
 
 def bending_energy(topology: ClothTopology, x: np.ndarray, soft: Compliances) -> np.ndarray:
@@ -70,16 +70,16 @@ def bending_energy(topology: ClothTopology, x: np.ndarray, soft: Compliances) ->
     """
     lines, twists, patches = topology.lines, topology.twists, topology.patches
     along = np.einsum("wmcx,c->wmx", x[:, lines.vertices], (1.0, -2.0, 1.0))
-    energy = _energy(along, lines.scale, soft.bend[:, soft.line])
+    energy = _energy(along, lines.scale, soft.bend[:, soft.place["line"]])
     across = np.einsum("wmcx,c->wmx", x[:, twists.vertices], (1.0, -1.0, -1.0, 1.0))
-    energy = energy + _energy(across, twists.scale, soft.bend[:, soft.twist])
+    energy = energy + _energy(across, twists.scale, soft.bend[:, soft.place["twist"]])
     corners = x[:, patches.vertices]
     side, fold = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
     normal = np.cross(side, fold)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-10)
     at_rest = np.einsum("mjk,wmkx->wmjx", patches.extra["rest"], np.stack([side, fold, normal], axis=2))
     bent = np.einsum("mjc,wmcx->wmjx", patches.extra["weight"], corners) - at_rest
-    return energy + sum(_energy(bent[:, :, j], patches.scale, soft.bend[:, soft.patch]) for j in range(3))
+    return energy + sum(_energy(bent[:, :, j], patches.scale, soft.bend[:, soft.place["patch"]]) for j in range(3))
 
 
 def _slopes(topology: ClothTopology, x: np.ndarray, along: str) -> np.ndarray:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.topology.cloth_topology import ClothTopology, Elements
+from nuno.topology.cloth_topology import ELEMENT_KINDS, RIGIDITY, SHEAR, STIFFNESS, ClothTopology, Elements
 from nuno.topology.grid_lines import find_grid_lines
 
 SOFTEST = 1.0e-12
 """The least stiffness [N/m] and rigidity [N m], so that a cloth without any has a finite compliance."""
-UNIFORM_BENDS = 9
-"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each of three kinds."""
+UNIFORM_BENDS = 3 * sum(kind.compliance == "bend" for kind in ELEMENT_KINDS)
+"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each of its kinds."""
 
 
 @dataclass(frozen=True)
@@ -23,23 +23,15 @@ class Compliances:
         stretch: (worlds, k) float [m/N].
         shear: (worlds, k) float [m/N].
         bend: (worlds, k) float [1/(N m)].
-        edge: (edges,) int32, the place in ``stretch`` of each edge, in the order of the grid lines.
-        triangle: (triangles, 3) int32, the places in ``stretch`` along warp and weft, and in ``shear``.
-        cell: (cells,) int32, the place in ``shear``.
-        line: (lines,) int32, the place in ``bend``.
-        twist: (twists,) int32, the place in ``bend``.
-        patch: (patches,) int32, the place in ``bend``.
+        place: By the name of a kind of `nuno.topology.cloth_topology.ELEMENT_KINDS`, (elements,) int32, the places in
+            its table; of triangles (triangles, 3), two in ``stretch``, along warp and weft, and one in ``shear``; of
+            the "edge", in the order of the grid lines, in ``stretch``.
     """
 
     stretch: np.ndarray
     shear: np.ndarray
     bend: np.ndarray
-    edge: np.ndarray
-    triangle: np.ndarray
-    cell: np.ndarray
-    line: np.ndarray
-    twist: np.ndarray
-    patch: np.ndarray
+    place: dict[str, np.ndarray]
 
 
 def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compliances:
@@ -50,38 +42,36 @@ def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compl
         values: What `nuno.materials.Cloth.resolved` gives: (worlds, elements), or (worlds, 1) for one value of all.
     """
 
-    def table(*which: str) -> list[np.ndarray]:
-        return [np.maximum(np.asarray(values[name], dtype=np.float64), SOFTEST) for name in which]
-
-    stretch = table("stretch_stiffness_warp", "stretch_stiffness_weft")
-    shear = table("shear_stiffness")
-    bend = table("bending_rigidity_warp", "bending_rigidity_weft")
-    bend.append(np.sqrt(bend[0] * bend[1]))
+    def columns(stiffness: tuple[str, ...]) -> list[np.ndarray]:
+        found = [np.maximum(np.asarray(values[name], dtype=np.float64), SOFTEST) for name in stiffness]
+        return [*found, np.sqrt(found[0] * found[1])] if len(found) == 2 else found
 
     edges, triangles = topology.edges, topology.triangles
+    stretch, shear = columns(STIFFNESS)[:2], columns(SHEAR)
+    tables: dict[str, list[np.ndarray]] = {"stretch": [], "shear": [], "bend": []}
+    place: dict[str, np.ndarray] = {}
     if len(triangles):
-        stretch_compliance, places = _of_triangles(triangles, stretch, _differ(shear))
-        edge = np.zeros(0, dtype=int)
+        own, place["triangle"] = _of_triangles(triangles, stretch, _differ(shear))
+        tables["shear"] = [_of_elements(topology, triangles, shear)[0]]
+        place["edge"] = np.zeros(0)
     else:
-        stretch_compliance, edge = _of_elements(topology, edges, stretch)
-        edge = edge[find_grid_lines(edges)[0]]
-        places = np.zeros((0, 3), dtype=int)
-    shear_compliance, cell = _of_elements(topology, topology.cells if len(topology.cells) else triangles, shear)
-    lines, line = _of_elements(topology, topology.lines, bend)
-    twists, twist = _of_elements(topology, topology.twists, bend)
-    soft, patch = _of_elements(topology, topology.patches, bend)
-    twist, patch = twist + lines.shape[1], patch + lines.shape[1] + twists.shape[1]
-    bending = np.concatenate([lines, twists, soft], axis=1)
-    if _differ(bend):
+        own, edge = _of_elements(topology, edges, stretch)
+        place["edge"], place["triangle"] = edge[find_grid_lines(edges)[0]], np.zeros((0, 3))
+    tables["stretch"] = [own]
+    for kind in ELEMENT_KINDS:
+        if kind.name in place:
+            continue
+        elements, table = getattr(topology, kind.elements), tables[kind.compliance]
+        own, index = _of_elements(topology, elements, columns(kind.stiffness))
+        place[kind.name] = index + sum(part.shape[1] for part in table)
+        table.append(own)
+    made = {name: np.concatenate(parts, axis=1) for name, parts in tables.items()}
+    if _differ(columns(RIGIDITY)):
         # the strips on CUDA tell by the count that elements have their own numbers, however few there are
-        bending = np.pad(bending, ((0, 0), (0, max(0, UNIFORM_BENDS + 1 - bending.shape[1]))), mode="edge")
-    indices = (edge, places, cell[: len(topology.cells)], line, twist, patch)
-    return Compliances(
-        stretch_compliance,
-        shear_compliance,
-        bending,
-        *(np.ascontiguousarray(index, dtype=np.int32) for index in indices),
-    )
+        made["bend"] = np.pad(
+            made["bend"], ((0, 0), (0, max(0, UNIFORM_BENDS + 1 - made["bend"].shape[1]))), mode="edge"
+        )
+    return Compliances(**made, place={k: np.ascontiguousarray(v, dtype=np.int32) for k, v in place.items()})
 
 
 def vertex_masses(topology: ClothTopology, density: np.ndarray) -> np.ndarray:

@@ -64,6 +64,13 @@ def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, rank:
 
 
 @wp.func
+def solve_plain(t: Any, table: Any, run: Settings, kind: int, first: int, last: int, rank: int, size: int):
+    """The elements first to last of a plain kind, a number of `PLAIN_KINDS`; they share no vertex."""
+    if kind == 0:
+        bend_patches(t, table, run, first, last, rank, size)
+
+
+@wp.func
 def scratch_of(t: Any, table: SimdElements):
     """The arrays that grid lines and sweeps write between the passes over a table's elements."""
     return table

@@ -16,52 +16,30 @@ import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
 from nuno.numbers.lanes import LANES, full_like, lane, lane_int
-from nuno.state.cloth_state import NOTES, SCALARS
+from nuno.state.cloth_state import NOTES, SCALARS, make_struct
+from nuno.topology.cloth_topology import ELEMENT_KINDS
+
+_LANES, _INDICES, _INTS = wp.array(dtype=lane), wp.array(dtype=lane_int), wp.array(dtype=int)
 
 
-@wp.struct
-class SimdElements:
-    """The elements by groups of sixteen, under the names that `Topology` has for them; room for the grid lines."""
+def _element_fields() -> dict[str, Any]:
+    fields: dict[str, Any] = {"edge": _INDICES, "edge_rest": _LANES, "edge_scale": _LANES, "edge_compliance": _INDICES}
+    fields |= {"grid_line": _INTS, "grid_line_kind": _INTS}
+    for kind in ELEMENT_KINDS:
+        fields[kind.name] = _INDICES
+        fields |= {f"{kind.name}_{name}": _LANES for name in kind.columns}
+        fields |= {f"{kind.name}_compliance": _INDICES, f"{kind.name}_colour": _INTS}
+    return fields
 
-    particles: int
-    edge: wp.array(dtype=lane_int)
-    edge_rest: wp.array(dtype=lane)
-    edge_scale: wp.array(dtype=lane)
-    edge_compliance: wp.array(dtype=lane_int)
-    grid_line: wp.array(dtype=int)
-    grid_line_kind: wp.array(dtype=int)
-    cell: wp.array(dtype=lane_int)
-    cell_scale: wp.array(dtype=lane)
-    cell_compliance: wp.array(dtype=lane_int)
-    cell_colour: wp.array(dtype=int)
-    triangle: wp.array(dtype=lane_int)
-    triangle_u: wp.array(dtype=lane)
-    triangle_v: wp.array(dtype=lane)
-    triangle_area: wp.array(dtype=lane)
-    triangle_compliance: wp.array(dtype=lane_int)
-    triangle_colour: wp.array(dtype=int)
-    line: wp.array(dtype=lane_int)
-    line_scale: wp.array(dtype=lane)
-    line_compliance: wp.array(dtype=lane_int)
-    line_colour: wp.array(dtype=int)
-    twist: wp.array(dtype=lane_int)
-    twist_scale: wp.array(dtype=lane)
-    twist_compliance: wp.array(dtype=lane_int)
-    twist_colour: wp.array(dtype=int)
-    patch: wp.array(dtype=lane_int)
-    patch_weight: wp.array(dtype=lane)
-    patch_rest: wp.array(dtype=lane)
-    patch_curved: wp.array(dtype=lane)
-    patch_compliance: wp.array(dtype=lane_int)
-    patch_colour: wp.array(dtype=int)
-    grid_line_gain: wp.array(dtype=lane)
-    grid_line_pull: wp.array(dtype=lane)
-    grid_line_inverse: wp.array(dtype=lane)
-    grid_line_goal: wp.array(dtype=lane)
-    cell_sum: wp.array(dtype=lane)
-    triangle_sum: wp.array(dtype=lane)
-    scalars: wp.array(dtype=lane)
-    notes: wp.array(dtype=lane)
+
+_ROOM = (
+    "grid_line_gain", "grid_line_pull", "grid_line_inverse", "grid_line_goal", "cell_sum", "triangle_sum", "scalars",
+    "notes",
+)  # fmt: skip
+SimdElements = make_struct(
+    "SimdElements", __name__, {"particles": int} | _element_fields() | dict.fromkeys(_ROOM, _LANES)
+)
+"""The elements by groups of sixteen, under the names that `Topology` has for them; room for the grid lines."""
 
 
 @wp.func
@@ -127,14 +105,11 @@ def pack_topology(topology: Any, arrays: Any) -> Any:
         table = np.ascontiguousarray(table, dtype=np.int32 if whole else np.float32)
         return wp.array(table, dtype=lane_int if whole else lane, device="cpu")
 
-    kinds = {"cell": ("scale", "compliance"), "line": ("scale", "compliance"), "twist": ("scale", "compliance")}
-    kinds["triangle"] = ("u", "v", "area", "compliance")
-    kinds["patch"] = ("weight", "rest", "curved", "compliance")
-    for name, columns in kinds.items():
-        elements = topology.patches if name == "patch" else getattr(topology, name + "s")
+    for kind in ELEMENT_KINDS:
+        elements = getattr(topology, kind.elements)
         rows, starts = groups(elements.offsets)
-        setattr(simd, name + "_colour", wp.array(starts, dtype=int, device="cpu"))
-        for full in (name, *(f"{name}_{column}" for column in columns)):
+        setattr(simd, f"{kind.name}_colour", wp.array(starts, dtype=int, device="cpu"))
+        for full in (kind.name, *(f"{kind.name}_{column}" for column in (*kind.columns, "compliance"))):
             values = getattr(arrays, full).numpy()
             # a flat table has the elements' rows one after the other
             setattr(simd, full, gathered(values.reshape(len(elements), -1) if len(elements) else values[:0], rows))

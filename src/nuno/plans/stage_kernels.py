@@ -19,18 +19,18 @@ from nuno.contact.self.group_search import Lists
 from nuno.numbers.block_group import BlockGroup, grid_barrier
 from nuno.numbers.crew import barrier
 from nuno.numbers.lanes import subarray
-from nuno.plans.cloth_elastic import bend_patches
+from nuno.plans.cloth_elastic import solve_plain
 from nuno.plans.grid_lines_by_block import stretch_grid_lines_of_block
 from nuno.state.cloth_state import Settings, Topology
 from nuno.state.integrate import predict
 from nuno.topology.barrier_stages import Colour, Stages, make_stages
-from nuno.topology.cloth_topology import ClothTopology, Elements
+from nuno.topology.cloth_topology import PLAIN_KINDS, ClothTopology, Elements
 from nuno.topology.grid_lines import find_grid_lines
 
-PARTICLES, PATCHES, TWISTS, LINES, CELLS, SWEPT_CELLS, TRIANGLES, GRID_LINES = range(8)
-"""Kinds of elements in the order in which they are solved; particles are predicted first. Those in the cloth's plane
-may be swept several times."""
-KINDS = 8
+PARTICLES, TWISTS, LINES, CELLS, SWEPT_CELLS, TRIANGLES, GRID_LINES, PLAIN = range(8)
+"""Kinds of elements; particles are predicted first, then come plain kinds, one number each from `PLAIN` on, then the
+others in this order. Those in the cloth's plane may be swept several times."""
+KINDS = PLAIN + len(PLAIN_KINDS)
 """A step's kind is one of these, plus so many times the number of its sweep."""
 SORTED = (TWISTS, LINES, CELLS)
 """Kinds whose elements are copied into a table in the order of the blocks' shares."""
@@ -63,8 +63,10 @@ def divide(topology: ClothTopology, blocks: int, sweeps: int = 0) -> Stages:
                 owner = np.repeat(np.arange(last - first), vertices.shape[1])
                 colours.append(Colour(kind, int(first), int(last - first), owner, vertices.ravel()))
 
-    for kind, elements in ((PATCHES, topology.patches), (TWISTS, topology.twists), (LINES, topology.lines)):
-        add(kind, elements)
+    for k, plain in enumerate(PLAIN_KINDS):
+        add(PLAIN + k, getattr(topology, plain.elements))
+    add(TWISTS, topology.twists)
+    add(LINES, topology.lines)
     order, starts, kinds = find_grid_lines(topology.edges)
     ends = topology.edges.vertices[order]
     for sweep in range(max(1, sweeps)):
@@ -83,9 +85,9 @@ def make_work(topology: ClothTopology, compliances: Compliances, stages: Stages,
     """A cloth's `Work` on a device."""
     quarter = topology.cells.extra["quarter"] if len(topology.cells) else topology.cells.scale
     columns = {
-        TWISTS: (topology.twists.vertices, topology.twists.scale, compliances.twist, compliances.bend),
-        LINES: (topology.lines.vertices, topology.lines.scale, compliances.line, compliances.bend),
-        CELLS: (topology.cells.vertices, quarter, compliances.cell, compliances.shear),
+        TWISTS: (topology.twists.vertices, topology.twists.scale, compliances.place["twist"], compliances.bend),
+        LINES: (topology.lines.vertices, topology.lines.scale, compliances.place["line"], compliances.bend),
+        CELLS: (topology.cells.vertices, quarter, compliances.place["cell"], compliances.shear),
     }
     count = len(stages.row)
     corner, scale = np.zeros((count, 4), dtype=np.int32), np.zeros(count, dtype=np.float32)
@@ -242,8 +244,8 @@ def go_through(
                     now = read(work, t.group, what, k, last)
         elif what == PARTICLES:
             set_out(t, run, grips, first, last, rank, size)
-        elif what == PATCHES:
-            bend_patches(t, topo, run, first, last, rank, size)
+        elif what >= PLAIN and what < KINDS:
+            solve_plain(t, topo, run, what - PLAIN, first, last, rank, size)
         else:
             sweep_share(t, topo, run, what % KINDS, what / KINDS, first, last, rank, size)
         if step + 1 < end:

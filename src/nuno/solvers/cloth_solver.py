@@ -177,9 +177,9 @@ class ClothSolver(ClothLaunches):
         self.stretch_table: wp.array = wp.array(
             np.asarray(found.stretch, dtype=np.float32), dtype=float, device=self.device
         )
-        for kind in ("edge", "cell", "line", "twist", "patch"):
-            setattr(topo, f"{kind}_compliance", wp.array(getattr(found, kind), dtype=int, device=self.device))
-        topo.triangle_compliance = wp.array(found.triangle, dtype=wp.vec3i, device=self.device)
+        for kind, place in found.place.items():
+            dtype = int if place.ndim == 1 else wp.vec3i
+            setattr(topo, f"{kind}_compliance", wp.array(place, dtype=dtype, device=self.device))
         self.mass = vertex_masses(topology, values["area_density"])
         self._inverse_mass = (1.0 / self.mass).astype(np.float32)
         own = (

@@ -6,6 +6,7 @@ import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
 from nuno.numbers.lanes import lane, lane_int, subarray
+from nuno.topology.cloth_topology import ELEMENT_KINDS, ElementKind
 
 # Per-world scalars in `State.scalars`.
 DRAG, FRICTION, DAMPING, THICKNESS, ORIGIN = 0, 1, 2, 3, 4
@@ -87,9 +88,13 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
     return fields | {"group": int, "worlds": int, "spare_blocks": int}
 
 
+def make_struct(name: str, module: str, fields: dict[str, Any], doc: str | None = None) -> Any:
+    """Make a struct of kernels with these fields."""
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": module, "__doc__": doc}))
+
+
 def _make(name: str, number: type, integer: type, place: type) -> Any:
-    fields = _state_fields(number, integer, place)
-    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+    return make_struct(name, __name__, _state_fields(number, integer, place))
 
 
 StateFloat = _make("StateFloat", float, int, float)
@@ -106,65 +111,49 @@ StateDouble, StateDoubleLanes = (
 what looks for what is near is content with these."""
 
 
-@wp.struct
-class Topology:
-    """The cloth's elements, the same in every world."""
+def vertex_type(kind: ElementKind) -> Any:
+    """Return the type of a table's vertices: a vector for an element, or of many corners one number after the other."""
+    return {2: wp.vec2i, 3: wp.vec3i, 4: wp.vec4i}.get(kind.corners, int)
 
-    particles: int
-    edge: wp.array(dtype=wp.vec2i)
-    edge_rest: wp.array(dtype=float)
-    edge_scale: wp.array(dtype=float)
-    edge_compliance: wp.array(dtype=int)
-    grid_line: wp.array(dtype=int)
-    grid_line_kind: wp.array(dtype=int)
-    cell: wp.array(dtype=wp.vec4i)
-    cell_scale: wp.array(dtype=float)
-    cell_compliance: wp.array(dtype=int)
-    cell_colour: wp.array(dtype=int)
-    triangle: wp.array(dtype=wp.vec3i)
-    triangle_u: wp.array(dtype=wp.vec3)
-    triangle_v: wp.array(dtype=wp.vec3)
-    triangle_area: wp.array(dtype=float)
-    triangle_compliance: wp.array(dtype=wp.vec3i)
-    triangle_colour: wp.array(dtype=int)
-    line: wp.array(dtype=wp.vec3i)
-    line_scale: wp.array(dtype=float)
-    line_compliance: wp.array(dtype=int)
-    line_colour: wp.array(dtype=int)
-    twist: wp.array(dtype=wp.vec4i)
-    twist_scale: wp.array(dtype=float)
-    twist_compliance: wp.array(dtype=int)
-    twist_colour: wp.array(dtype=int)
-    # six vertices, three rows of six weights and three rest vectors of three numbers each
-    patch: wp.array(dtype=int)
-    patch_weight: wp.array(dtype=float)
-    patch_rest: wp.array(dtype=float)
-    patch_curved: wp.array(dtype=float)
-    patch_compliance: wp.array(dtype=int)
-    patch_colour: wp.array(dtype=int)
+
+def column_type(size: int) -> Any:
+    """Return the type of a column of so many numbers an element, as `vertex_type`."""
+    return wp.vec3 if size == 3 else float
+
+
+def compliance_type(kind: ElementKind) -> Any:
+    """Return the type of the places in tables of compliances: one of an element, or three of a triangle."""
+    return wp.vec3i if len(kind.stiffness) == 3 else int
+
+
+def _element_fields() -> dict[str, Any]:
+    edge: dict[str, Any] = {"edge": wp.vec2i, "edge_rest": float, "edge_scale": float, "edge_compliance": int}
+    types = edge | {"grid_line": int, "grid_line_kind": int}
+    for kind in ELEMENT_KINDS:
+        types[kind.name] = vertex_type(kind)
+        types |= {f"{kind.name}_{name}": column_type(size) for name, (_, size) in kind.columns.items()}
+        types |= {f"{kind.name}_compliance": compliance_type(kind), f"{kind.name}_colour": int}
+    return {name: wp.array(dtype=own) for name, own in types.items()}
+
+
+_INTS, _PAIRS = wp.array(dtype=int), wp.array(dtype=wp.vec2i)
+
+Topology = make_struct("Topology", __name__, {
+    "particles": int,
+    **_element_fields(),
     # self-contact: elements sorted by block of neighbouring vertices
-    leaves: int
-    leaf_vertex: wp.array(dtype=int)
-    leaf_vertex_start: wp.array(dtype=int)
-    leaf_face: wp.array(dtype=wp.vec3i)
-    leaf_face_start: wp.array(dtype=int)
-    leaf_edge: wp.array(dtype=wp.vec2i)
-    leaf_edge_start: wp.array(dtype=int)
-    leaf_corner: wp.array(dtype=int)
-    leaf_corner_start: wp.array(dtype=int)
-    crease: wp.array(dtype=wp.vec4i)
+    "leaves": int,
+    "leaf_vertex": _INTS, "leaf_vertex_start": _INTS,
+    "leaf_face": wp.array(dtype=wp.vec3i), "leaf_face_start": _INTS,
+    "leaf_edge": _PAIRS, "leaf_edge_start": _INTS,
+    "leaf_corner": _INTS, "leaf_corner_start": _INTS,
+    "crease": wp.array(dtype=wp.vec4i),
     # contact with sharp shapes: all edges of the triangles, then the triangles, by colour; where each colour starts,
     # how many of these are edges', and how long an edge may become [m]
-    side: wp.array(dtype=wp.vec2i)
-    face: wp.array(dtype=wp.vec3i)
-    feature_colour: wp.array(dtype=int)
-    side_colours: int
-    longest: float
-    region_corner: wp.array(dtype=int)
-    region_start: wp.array(dtype=int)
-    columns: int
-    leaf_span: wp.array(dtype=int)
-    crease_corner: wp.array(dtype=int)
+    "side": _PAIRS, "face": wp.array(dtype=wp.vec3i), "feature_colour": _INTS, "side_colours": int, "longest": float,
+    "region_corner": _INTS, "region_start": _INTS, "columns": int, "leaf_span": _INTS, "crease_corner": _INTS,
+})  # fmt: skip
+"""The cloth's elements, the same in every world: those of `nuno.topology.cloth_topology.ELEMENT_KINDS`, and edges."""
 
 
 @wp.struct

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from nuno.topology.cloth_topology import ClothTopology
+from nuno.state.cloth_state import column_type, vertex_type
+from nuno.topology.cloth_topology import ELEMENT_KINDS, ClothTopology
 from nuno.topology.grid_lines import find_grid_lines
 from nuno.topology.leaves import Leaves
 
@@ -21,7 +22,7 @@ there."""
 
 
 def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
-    """The topology's arrays on a device, made once."""
+    """The topology's arrays on a device, made once; which compliance an element takes is for its material to say."""
     found = topology.device_arrays.get(device)
     if found is not None:
         return found
@@ -33,22 +34,15 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
     order, starts, kinds = find_grid_lines(t.edges)
     made = dict(
         edge=put(t.edges.vertices[order], wp.vec2i), edge_rest=put(t.edges.extra["rest"][order], float),
-        edge_scale=put(t.edges.scale[order], float), edge_compliance=put(t.edges.axis[order], int),
+        edge_scale=put(t.edges.scale[order], float),
         grid_line=put(starts, int), grid_line_kind=put(kinds, int),
-        cell=put(t.cells.vertices, wp.vec4i), cell_scale=put(t.cells.extra["quarter"], float),
-        cell_colour=put(t.cells.offsets, int), cell_compliance=put(t.cells.axis, int),
-        triangle=put(t.triangles.vertices, wp.vec3i), triangle_u=put(t.triangles.extra["u"], wp.vec3),
-        triangle_v=put(t.triangles.extra["v"], wp.vec3), triangle_area=put(t.triangles.extra["area"], float),
-        triangle_colour=put(t.triangles.offsets, int),
-        triangle_compliance=put(np.zeros((len(t.triangles), 3)), wp.vec3i),
-        line=put(t.lines.vertices, wp.vec3i), line_scale=put(t.lines.scale, float),
-        line_colour=put(t.lines.offsets, int), line_compliance=put(t.lines.axis, int),
-        twist=put(t.twists.vertices, wp.vec4i), twist_scale=put(t.twists.scale, float),
-        twist_colour=put(t.twists.offsets, int), twist_compliance=put(t.twists.axis, int),
-        patch=put(t.patches.vertices.ravel(), int), patch_weight=put(t.patches.extra["weight"].ravel(), float),
-        patch_rest=put(t.patches.extra["rest"].ravel(), float), patch_curved=put(t.patches.extra["curved"], float),
-        patch_colour=put(t.patches.offsets, int), patch_compliance=put(t.patches.axis, int),
     )  # fmt: skip
+    for kind in ELEMENT_KINDS:
+        elements = getattr(topology, kind.elements)
+        made[kind.name] = put(elements.vertices, vertex_type(kind))
+        made[f"{kind.name}_colour"] = put(elements.offsets, int)
+        for name, (column, size) in kind.columns.items():
+            made[f"{kind.name}_{name}"] = put(elements.column(column), column_type(size))
     made |= _upload_blocks(topology.leaves, device)
     topology.device_arrays[device] = made
     return made
@@ -75,4 +69,5 @@ def _upload_blocks(leaves: Leaves, device: str) -> dict[str, wp.array]:
 
 def _put(values: np.ndarray, dtype: Any, device: str) -> wp.array:
     kind = np.int32 if dtype in (int, wp.vec2i, wp.vec3i, wp.vec4i) else np.float32
-    return wp.array(np.ascontiguousarray(values, dtype=kind), dtype=dtype, device=device)
+    flat = values.ravel() if dtype in (int, float) else values
+    return wp.array(np.ascontiguousarray(flat, dtype=kind), dtype=dtype, device=device)

@@ -42,6 +42,59 @@ class Elements:
     def __len__(self) -> int:
         return len(self.vertices)
 
+    def column(self, name: str) -> np.ndarray:
+        """Return the column of a name: ``scale``, or one of ``extra``."""
+        return self.scale if name == "scale" else self.extra[name]
+
+
+@dataclass(frozen=True)
+class ElementKind:
+    """A kind of constraint, as the tables of kernels have it.
+
+    They have its vertices under ``name``, its columns as ``name_column``, where each colour starts as ``name_colour``,
+    and which compliance each element takes as ``name_compliance``.
+
+    Attributes:
+        name: As above.
+        elements: The attribute of `ClothTopology` that has them.
+        corners: Vertices of an element.
+        columns: By name, the column of `Elements` and how many numbers it has for an element.
+        compliance: The state's table of compliances: "stretch", "shear" or "bend".
+        stiffness: The material's numbers of which these are the inverse. Where there are two, along warp and weft,
+            `Elements.axis` says which of them or of their geometric mean an element takes.
+        plain: Whether every plan solves it colour by colour by `nuno.plans.cloth_elastic.solve_plain`, and before the
+            others, for which some have methods of their own.
+    """
+
+    name: str
+    elements: str
+    corners: int
+    columns: dict[str, tuple[str, int]]
+    compliance: str
+    stiffness: tuple[str, ...]
+    plain: bool = True
+
+
+SHEAR, RIGIDITY = ("shear_stiffness",), ("bending_rigidity_warp", "bending_rigidity_weft")
+STIFFNESS = ("stretch_stiffness_warp", "stretch_stiffness_weft")
+ELEMENT_KINDS = (
+    ElementKind("cell", "cells", 4, {"scale": ("quarter", 1)}, "shear", SHEAR, plain=False),
+    ElementKind(
+        "triangle", "triangles", 3, {"u": ("u", 3), "v": ("v", 3), "area": ("area", 1)}, "stretch", STIFFNESS + SHEAR,
+        plain=False,
+    ),
+    ElementKind("line", "lines", 3, {"scale": ("scale", 1)}, "bend", RIGIDITY, plain=False),
+    ElementKind("twist", "twists", 4, {"scale": ("scale", 1)}, "bend", RIGIDITY, plain=False),
+    # three rows of six weights and three rest vectors of three numbers each
+    ElementKind(
+        "patch", "patches", 6, {"weight": ("weight", 18), "rest": ("rest", 9), "curved": ("curved", 1)}, "bend",
+        RIGIDITY,
+    ),
+)  # fmt: skip
+"""All but the edges, which are solved by grid lines. A new kind has its elements here and a row, a file in
+`nuno.constraints`, and its place in `nuno.plans.cloth_elastic`."""
+PLAIN_KINDS = tuple(kind for kind in ELEMENT_KINDS if kind.plain)
+
 
 def _elements(
     vertices: np.ndarray, scale: Any, axis: Any, faces: np.ndarray, colours: np.ndarray, **extra: np.ndarray
