@@ -88,9 +88,9 @@ def _state_fields(number: type, integer: type, place: type) -> dict[str, Any]:
     return fields | {"group": int, "worlds": int, "spare_blocks": int}
 
 
-def make_struct(name: str, module: str, fields: dict[str, Any], doc: str | None = None) -> Any:
+def make_struct(name: str, module: str, fields: dict[str, Any]) -> Any:
     """Make a struct of kernels with these fields."""
-    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": module, "__doc__": doc}))
+    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": module}))
 
 
 def _make(name: str, number: type, integer: type, place: type) -> Any:

@@ -90,10 +90,10 @@ class Background:
         if not self.is_current_thread:
             self._thread.join()
 
-    def wait_for_frame(self, timeout: float = 0.1) -> None:
-        """Sleep until a frame is done, or for ``timeout`` [s]."""
+    def wait_for_frame(self) -> None:
+        """Sleep until a frame is done, or for 0.1 s."""
         with self._frame:
-            self._frame.wait(timeout)
+            self._frame.wait(0.1)
 
     def _loop(self, reference: weakref.ref[Advancing], lock: FrameLock, pace: Pace, factor: float) -> None:
         due = time.perf_counter()

@@ -38,7 +38,7 @@ ORIGIN = 3
 UNITS = {"length": "m", "mass": "kg", "time": "s", "force": "N", "quaternion": "wxyz", "up": "+z"}
 
 
-def _kinds_of(root: type) -> list[type]:
+def _kinds_of(root: Any) -> list[Any]:
     """Return the classes below one, at any depth."""
     return [each for kind in root.__subclasses__() for each in (kind, *_kinds_of(kind))]
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from nuno.engines.mujoco.mujoco_elements import SpecElements
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics, velocity_of
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
@@ -64,14 +65,12 @@ class SphericalJoint:
     tendon: int = -1
 
 
-class Balls:
+class Balls(SpecElements):
     """All driven ball joints of a world."""
 
     def __init__(self) -> None:
-        self._made = 0
+        super().__init__()
         self._all: list[SphericalJoint] = []
-        self._elements: list[Any] = []
-        self._spec: Any = None
         self._batch: Any = None
         self._kinematics: Any = None
         self._slips = False
@@ -88,9 +87,8 @@ class Balls:
 
     def clear(self) -> None:
         """Take all out of the spec."""
-        for element in reversed(self._elements):
-            self._spec.delete(element)
-        self._all, self._elements = [], []
+        super().clear()
+        self._all = []
 
     def add(self, spec: Any, joint: Any, body: Any, other: Any) -> SphericalJoint:
         """Add the helper and the cone of a joint to a spec, between a body and another in it."""

@@ -16,6 +16,7 @@ from nuno.engines.mujoco.mujoco_bushing import (
     is_limited,
     limited,
 )
+from nuno.engines.mujoco.mujoco_elements import SpecElements
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.shapes import quaternion as quat
@@ -32,14 +33,12 @@ KEPT = "bushings"
 """Of a body's state, `Bushing.last` of all (worlds, n, 12)."""
 
 
-class Bushings:
+class Bushings(SpecElements):
     """All bushings of a world."""
 
     def __init__(self) -> None:
-        self._made = 0
+        super().__init__()
         self._all: list[Bushing] = []
-        self._elements: list[Any] = []
-        self._spec: Any = None
         self._batch: Any = None
         self._kinematics: Any = None
 
@@ -52,9 +51,8 @@ class Bushings:
 
     def clear(self) -> None:
         """Take all bushings out of the spec."""
-        for element in reversed(self._elements):
-            self._spec.delete(element)
-        self._all, self._elements = [], []
+        super().clear()
+        self._all = []
 
     def add(
         self, spec: Any, bodies: tuple[Any, Any], frames: Sequence[np.ndarray], of: Any, mass: float, step: float,

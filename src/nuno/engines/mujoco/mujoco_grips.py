@@ -21,6 +21,7 @@ from nuno.engines.mujoco.mujoco_balls import Balls, is_driven_spherical
 from nuno.engines.mujoco.mujoco_blends import add_blend, find_blend, place_blend
 from nuno.engines.mujoco.mujoco_bushing import is_loose
 from nuno.engines.mujoco.mujoco_bushings import Bushings
+from nuno.engines.mujoco.mujoco_elements import SpecElements
 from nuno.engines.mujoco.mujoco_held import Held, is_spring
 from nuno.engines.mujoco.mujoco_leaders import LEADER, send
 from nuno.engines.mujoco.mujoco_package import mujoco_package
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from nuno.world.simulation import Simulation
 
 
-class Holds:
+class Holds(SpecElements):
     """All grips of a world, and its ball and fixed joints.
 
     Args:
@@ -49,20 +50,17 @@ class Holds:
     """
 
     def __init__(self, world: Simulation, bushings: Bushings, balls: Balls) -> None:
+        super().__init__()
         self._world, self._bushings, self._balls = world, bushings, balls
         self._held: list[Held] = []
-        self._elements: list[Any] = []
-        self._spec: Any = None
         self._step = 0.0
-        self._made = 0
 
     # The spec
 
     def clear(self) -> None:
-        """Take all grips out of the spec; bodies go after them, as MuJoCo deletes what refers to them too."""
-        for element in reversed(self._elements):
-            self._spec.delete(element)
-        self._held, self._elements = [], []
+        """Take all grips out of the spec; bodies go after them."""
+        super().clear()
+        self._held = []
 
     def add(self, spec: Any, placed: dict[str, Any], step: float) -> None:
         """Put all present grips into the spec, for substeps so long [s]."""

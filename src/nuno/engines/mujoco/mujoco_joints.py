@@ -20,6 +20,7 @@ import numpy as np
 
 from nuno.engines.mujoco.mujoco_bushing import Bushing, is_limited
 from nuno.engines.mujoco.mujoco_bushings import Bushings
+from nuno.engines.mujoco.mujoco_elements import SpecElements
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 from nuno.engines.mujoco.mujoco_stiff import CLOSING, STIFF
 from nuno.engines.mujoco.mujoco_tree import (
@@ -88,7 +89,7 @@ def _add_joint(made: Any, name: str, joint: Joint, place: Any, axis: Any) -> Non
     made.add_site(name=name, pos=place)
 
 
-class Joints:
+class Joints(SpecElements):
     """All hinges and sliders of a world.
 
     Args:
@@ -101,11 +102,9 @@ class Joints:
     """
 
     def __init__(self, world: Simulation, bushings: Bushings) -> None:
+        super().__init__()
         self._world, self._bushings = world, bushings
         self._joined: list[Jointed] = []
-        self._elements: list[Any] = []
-        self._spec: Any = None
-        self._made = 0
         self.states: Any = None
         self.qpos = self.dof = self.number = np.zeros(0, dtype=int)
         self._step = 0.0
@@ -129,9 +128,8 @@ class Joints:
 
     def clear(self) -> None:
         """Take what belongs to joints, but for those of bodies themselves, out of the spec."""
-        for element in reversed(self._elements):
-            self._spec.delete(element)
-        self._joined, self._elements = [], []
+        super().clear()
+        self._joined = []
 
     def add(self, spec: Any, placed: dict[str, Any], tree: dict[str, Joint], step: float) -> None:
         """Put all into the spec, as the bodies of the tree are in it, for substeps so long [s]."""
