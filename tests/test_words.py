@@ -35,6 +35,13 @@ REPLACED = {
     "led": "kinematic", "meet": "overlap", "turn": "rank, rotation", "turns": "slices, rotations",
 }  # fmt: skip
 
+# Of those the ones that have no plain sense, which documentation may not begin with either.
+NOUNS = (
+    "actors?", "awake", "convoys?", "crumpled", "drum", "gate", "ghosts?", "haste", "heed", "helping", "idle",
+    "lessened", "onlooker", "part(y|ies)", "pulls", "rod", "rounds", "soonest", "stars?", "swift", "teams?", "verdict",
+    "wardrobe", "yarns?",
+)  # fmt: skip
+
 # Words with a plain sense that named something else in kernels: where, and what it is called now.
 IN_KERNELS = {"near": "shape list, floats, mean", "those": "crew"}
 KERNELS = ("state", "constraints", "plans", "numbers")
@@ -106,6 +113,19 @@ def test_replaced_words_name_no_concept():
     assert not found(("viewer",), IN_VIEWER)
     assert not found(KERNELS, IN_KERNELS)
     assert not found(("rigid",), {"those": IN_KERNELS["those"]})
+
+
+def test_docstrings_begin_without_replaced_nouns():
+    """No docstring's first line has one of the words that have no plain sense beside the one that was replaced."""
+    word = re.compile(rf"\b({'|'.join(NOUNS)})\b")
+    found = [
+        f"{path.relative_to(PACKAGE).as_posix()}: {line}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and word.search(line := (ast.get_docstring(node) or "").partition("\n")[0].lower())
+    ]
+    assert not found
 
 
 def test_every_exception_is_used():

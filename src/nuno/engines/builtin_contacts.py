@@ -71,7 +71,7 @@ def _coupled(world: Simulation) -> list[Any]:
 
 
 def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
-    """Return what a cloth's layers would do to its particles in the next substep."""
+    """Return what a cloth's contacts with itself would do to its particles in the next substep."""
     from nuno.solvers.self_forces import self_contact_forces
 
     dynamics.set_self_contact(rules_of(world).touches_itself(body))

@@ -1,4 +1,4 @@
-"""Grips: points of a body that are led along a path, by another body, or held in place."""
+"""Grips: points of a body that follow a path or another body, or stay in place."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class GripSpec:
     max_force: np.ndarray | None = None
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return where the points are led at ``times`` (n,) [s]: (worlds, k, n, 3) float64 [m]."""
+        """Return where the points are to be at ``times`` (n,) [s]: (worlds, k, n, 3) float64 [m]."""
         worlds, k, m = self.positions.shape[:3]
         path = object.__new__(Path)  # its numbers were checked when the grip was made: this runs every tick
         keys = self.positions.reshape(worlds * k, m, 3)

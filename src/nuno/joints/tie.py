@@ -52,7 +52,7 @@ class TieSpec:
 
 @dataclass(frozen=True, eq=False)
 class HoldSpec:
-    """A rigid body whose frame is led by key poses, or by another body's frame.
+    """A rigid body whose frame follows key poses, or another body's frame.
 
     Attributes:
         times: (m,) float64 [s] of the world's clock.

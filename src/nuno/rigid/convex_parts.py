@@ -27,7 +27,7 @@ class RigidPart:
     Attributes:
         kind: One of the numbers of `nuno.rigid.convex`.
         half: (3,) float [m], half sides of a box; of round ones the radius and half the height.
-        rim: Radius [m] around ball, rod and open mesh.
+        rim: Radius [m] around sphere, capsule and open mesh.
         low, high: (3,) float [m], bounds in the part's frame.
         position: (3,) float [m], where the part's frame is.
         quaternion: (4,) float, (w, x, y, z).
@@ -190,7 +190,7 @@ def _faces(corners: np.ndarray, hull: Any, size: float) -> tuple[np.ndarray, tup
 
 
 def _inner_sphere(planes: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of the largest ball inside of planes (n, 4) with outward normals."""
+    """Centre and radius of the largest sphere inside of planes (n, 4) with outward normals."""
     from scipy.optimize import linprog
 
     sides = np.column_stack([planes[:, :3], np.ones(len(planes))])

@@ -19,7 +19,7 @@ NOTES = 4
 speed of any surface [m/s], how often it was listed."""
 ENTRIES, OVERFLOW, LEFT, COLOURS, WAITING = range(5)
 COUNTS = 5
-"""Per world: entries with points, whether a row was too short, substeps that are left of a run, rounds, entries that
+"""Per world: entries with points, whether a row was too short, substeps that are left of a run, colours, entries that
 wait for theirs."""
 
 FAR = wp.constant(1.0e6)

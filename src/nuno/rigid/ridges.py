@@ -48,7 +48,7 @@ class Ridges:
 
 
 def ridges_of(part: RigidPart, rim_points: int) -> Ridges:
-    """Return the ridges of a convex part, in its own frame; of a ball or rod, none: they meet others as balls.
+    """Return the ridges of a convex part, in its own frame; of a sphere or capsule, none: they touch others as spheres.
 
     Args:
         part: A part of a rigid body that moves.

@@ -1,7 +1,7 @@
-"""The order in which manifolds are solved: one after the other, or in rounds that many threads share.
+"""The order in which manifolds are solved: one after the other, or by colours that many threads share.
 
 One after the other, what is lower comes first, so that in one pass the ground carries the lowest body, that the next,
-and so on up. A round is a set of manifolds of which no two move the same body, so that the order within it does not
+and so on up. A colour is a set of manifolds of which no two move the same body, so that the order within it does not
 matter.
 """
 
@@ -76,7 +76,7 @@ def sift(c: Contacts, base: int, root: int, end: int):
 
 @wp.func
 def line_up(s: RigidState, parts: Parts, c: Contacts, world: int, up: wp.vec3):
-    """One round of all entries with points, the lowest first (a heap sort)."""
+    """One pass over all entries with points, the lowest first (a heap sort)."""
     base = world * c.parts * c.row
     count = int(0)
     for local in range(parts.count * c.row):
@@ -104,7 +104,7 @@ def line_up(s: RigidState, parts: Parts, c: Contacts, world: int, up: wp.vec3):
 def priority(c: Contacts, world: int, e: int):
     """A number for each manifold, like a die's but always the same, and no two alike (Jones and Plassmann 1993).
 
-    By height it would take as many rounds as the heap is deep, several times as many.
+    By height it would take as many colours as the heap is deep, several times as many.
     """
     local = e - world * c.parts * c.row
     mixed = wp.uint32(local / c.row) * wp.uint32(0x1E3779B1)
@@ -116,9 +116,9 @@ def priority(c: Contacts, world: int, e: int):
 
 @wp.func
 def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int, size: int, crew: Any):
-    """Bring the entries with points into rounds, by all threads of ``crew``, of a block or a block group.
+    """Sort the entries with points by colour, by all threads of ``crew``, of a block or a block group.
 
-    In each round every entry bids its priority for its two bodies, and those that win both are the round.
+    For each colour every entry bids its priority for its two bodies, and those that win both have it.
     """
     base = world * c.parts * c.row
     count = world * COUNTS

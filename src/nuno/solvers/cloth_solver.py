@@ -39,7 +39,7 @@ from nuno.state.cloth_state import (
     Topology,
 )
 from nuno.state.double_positions import DoublePositions
-from nuno.state.upload import upload, upload_blocks
+from nuno.state.upload import upload, upload_leaves
 from nuno.topology.cloth_topology import ClothTopology
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ class ClothSolver(ClothLaunches):
         if not self.self_contact or not len(self.topology.cells) or diagonals == self._all_edges:
             return
         self._all_edges = diagonals
-        for name, array in upload_blocks(self.topology, diagonals, self.device).items():
+        for name, array in upload_leaves(self.topology, diagonals, self.device).items():
             setattr(self.device_topology, name, array)
         room = self._listing_numbers()
         if room > self._size.middle:

@@ -10,7 +10,7 @@ from nuno.state.cloth_state import COMPLIANT_GRIPS, FRICTION, MOTION, SELF_CONTA
 
 
 def self_contact_forces(solver: ParticleSolver, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return what layers would do to each other in the substep that comes next; nothing is changed.
+    """Return what contacts of a cloth with itself would do in the substep that comes next; nothing is changed.
 
     Args:
         solver: A cloth's.

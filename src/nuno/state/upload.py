@@ -10,7 +10,7 @@ from nuno.topology.cloth_topology import ELEMENT_KINDS, ClothTopology
 from nuno.topology.grid_lines import find_grid_lines
 from nuno.topology.leaves import Leaves
 
-BLOCK_ARRAYS = {
+LEAF_ARRAYS = {
     "leaf_vertex": "vertex", "leaf_vertex_start": "vertex_start", "leaf_face": "face",
     "leaf_face_start": "face_start", "leaf_edge": "edge", "leaf_edge_start": "edge_start",
     "leaf_corner": "corner", "leaf_corner_start": "corner_start", "crease": "crease",
@@ -43,28 +43,26 @@ def upload(topology: ClothTopology, device: str) -> dict[str, wp.array]:
         made[f"{kind.name}_colour"] = put(elements.offsets, int)
         for name, (column, size) in kind.columns.items():
             made[f"{kind.name}_{name}"] = put(elements.column(column), column_type(size))
-    made |= _upload_blocks(topology.leaves, device)
+    made |= _upload_leaves(topology.leaves, device)
     topology.device_arrays[device] = made
     return made
 
 
-def upload_blocks(topology: ClothTopology, guarded: bool, device: str) -> dict[str, wp.array]:
-    """The arrays of `ClothTopology.leaves`, or of ``guarded_blocks``, on a device, made once."""
+def upload_leaves(topology: ClothTopology, guarded: bool, device: str) -> dict[str, wp.array]:
+    """The arrays of `ClothTopology.leaves`, or of ``guarded_leaves``, on a device, made once."""
     if not guarded or not len(topology.cells):
         made = upload(topology, device)
-        return {name: made[name] for name in BLOCK_ARRAYS}
+        return {name: made[name] for name in LEAF_ARRAYS}
     key = f"guarded on {device}"
     if key not in topology.device_arrays:
-        topology.device_arrays[key] = _upload_blocks(topology.guarded_blocks, device)
+        topology.device_arrays[key] = _upload_leaves(topology.guarded_leaves, device)
     found: dict[str, wp.array] = topology.device_arrays[key]
     return found
 
 
-def _upload_blocks(leaves: Leaves, device: str) -> dict[str, wp.array]:
+def _upload_leaves(leaves: Leaves, device: str) -> dict[str, wp.array]:
     kinds = {"face": wp.vec3i, "edge": wp.vec2i, "crease": wp.vec4i}
-    return {
-        name: _put(getattr(leaves, column), kinds.get(column, int), device) for name, column in BLOCK_ARRAYS.items()
-    }
+    return {name: _put(getattr(leaves, column), kinds.get(column, int), device) for name, column in LEAF_ARRAYS.items()}
 
 
 def _put(values: np.ndarray, dtype: Any, device: str) -> wp.array:

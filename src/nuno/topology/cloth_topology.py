@@ -153,7 +153,7 @@ class ClothTopology:
         return len(self.rest)
 
     @cached_property
-    def guarded_blocks(self) -> Leaves:
+    def guarded_leaves(self) -> Leaves:
         """`leaves` in which a sheet's diagonals collide with all edges: see `nuno.world.impacts`."""
         if not len(self.cells):
             return self.leaves

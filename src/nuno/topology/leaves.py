@@ -17,26 +17,26 @@ LEAF_VERTICES = 4
 REGION = 16
 """Consecutive leaves whose displacements are looked at together, to tell how long a list is good."""
 FLAT_SIDE = 5
-"""Vertices along a side of the windows of a sheet's grid that are found to be flat enough to be passed over."""
+"""Vertices along a side of the regions of a sheet's grid that are found to be flat enough to be passed over."""
 
 
 @dataclass(frozen=True, eq=False)
 class Leaves:
-    """Vertices, triangles and edges sorted by block; each belongs to one leaf.
+    """Vertices, triangles and edges sorted by leaf; each belongs to one.
 
     Attributes:
-        vertex: (n,) int, vertex indices sorted by block.
+        vertex: (n,) int, vertex indices sorted by leaf.
         vertex_start: (count + 1,) int, where each leaf's vertices start.
-        face: (m, 3) int, triangles sorted by block.
+        face: (m, 3) int, triangles sorted by leaf.
         face_start: (count + 1,) int.
-        edge: (e, 2) int, edges sorted by block.
+        edge: (e, 2) int, edges sorted by leaf.
         edge_start: (count + 1,) int.
-        corner: (k,) int, all vertices that a leaf's own elements have, sorted by block.
+        corner: (k,) int, all vertices that a leaf's own elements have, sorted by leaf.
         corner_start: (count + 1,) int.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
         region_corner: (r,) int, all vertices of the elements of each region of `REGION` consecutive leaves.
         region_start: (regions + 1,) int.
-        columns: Vertices in a row of a sheet's grid, if the grid has windows of `FLAT_SIDE` vertices a side; else 0.
+        columns: Vertices in a row of a sheet's grid, if the grid has regions of `FLAT_SIDE` vertices a side; else 0.
         span: (4 w,) int, the first and last column and the first and last row of each leaf's corners on that grid,
             each of the four for all leaves, in a row of whole sixteens.
         crease_corner: (c,) int, the lowest vertex of the window of 3 by 3 vertices that holds each crease.
@@ -71,14 +71,14 @@ def make_leaves(
     size: int = LEAF_VERTICES,
     columns: int = 0,
 ) -> Leaves:
-    """Halve the rest shape again and again along its axes until at most ``size`` vertices are left in a block.
+    """Halve the rest shape again and again along its axes until at most ``size`` vertices are left in a leaf.
 
     Args:
         rest: (n, 3) float, rest shape [m].
         faces: (m, 3) int, triangles.
         edges: (e, 2) int, the edges that collide.
         crease: (c, 4) int, further pairs of edges that collide, with each other only.
-        size: Vertices of a block, at most.
+        size: Vertices of a leaf, at most.
         columns: Vertices in a row of a sheet's grid; 0 for what is no sheet.
     """
     count = len(rest)

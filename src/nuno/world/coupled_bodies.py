@@ -186,7 +186,7 @@ class CoupledBodies(CoupledTables):
     # -- what leads them in a frame
 
     def _lead_ties(self, time: float, duration: float) -> None:
-        """Tell where the points of grips with a limit are led when the frame begins and ends."""
+        """Tell where the points of grips with a limit are to be when the frame begins and ends."""
         specs: list[Any] = [grip.spec for grip in self._point_ties]
         if any(isinstance(spec, GripSpec) for spec in specs):
             times, worlds = np.array([time, time + duration]), self._world.world_count

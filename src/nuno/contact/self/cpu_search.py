@@ -354,7 +354,7 @@ def make_inner_list_of_world(t: Any, far: float, which: int, lanes: int):
 
 @wp.func
 def reach_world(t: Any, far: float, which: int, lanes: int):
-    """Find the picked pairs of world ``which`` nearer than ``far`` [m]: those that this substep may bring together.
+    """Find the pairs of world ``which`` in its inner list that are nearer than ``far`` [m], and so may touch now.
 
     It takes the worlds of a vector together, as many pairs as the one of them has that has the most.
     """

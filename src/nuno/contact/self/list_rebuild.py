@@ -89,7 +89,7 @@ def max_approach(t: Any, topo: Topology, far: Any):
 
 @wp.func
 def look_ahead(t: Any, run: Settings, approach: Any):
-    """Return how far beyond its thickness a pair is picked [m]: for a few substeps, at the speed of the moment."""
+    """Return how far beyond its thickness a pair is in the inner list [m]: for a few substeps, at this speed."""
     return approach + sqrt(t.notes[SPEED]) * (2.0 * INNER_AHEAD * run.dt) + 0.1 * run.reach
 
 
