@@ -2,7 +2,8 @@
 
 The energy density 1/2 B (k_xx^2 + k_yy^2 + 2 k_xy^2) is taken literally: it is isotropic and without Poisson effect.
 On a sheet's grid, second differences along grid lines give k_xx and k_yy, the twist of a cell gives k_xy. On a general
-mesh a triangle and its neighbours, up to six vertices, give all three (`nuno.topology.patches`).
+mesh a triangle and its neighbours, up to six vertices, give all three (`nuno.topology.patches`). For what a cloth's
+energy comes to see `nuno.bodies.cloth_measures`.
 
 All are vector constraints c = sum k_i x_i of zero target, whose XPBD update needs neither a root nor a branch:
 dx_i = -w_i k_i c / (sum w_i k_i^2 + alpha / dt^2), its denominator as in `bend_stiffness`.

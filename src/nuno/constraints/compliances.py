@@ -11,8 +11,8 @@ from nuno.topology.grid_lines import find_grid_lines
 
 SOFTEST = 1.0e-12
 """The least stiffness [N/m] and rigidity [N m], so that a cloth without any has a finite compliance."""
-UNIFORM_BENDS = 3 * sum(kind.compliance == "bend" for kind in ELEMENT_KINDS)
-"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each of its kinds."""
+UNIFORM_BENDS = sum(2 * len(kind.stiffness) - 1 for kind in ELEMENT_KINDS if kind.compliance == "bend")
+"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each that has directions."""
 
 
 @dataclass(frozen=True)

@@ -86,15 +86,14 @@ class SoftSphere(SoftShape):
 
 
 @dataclass(frozen=True)
-class SoftCylinder(SoftShape):
-    """A cylinder of ``radius`` and ``height`` [m] along z, from voxels of at most ``cell`` [m]."""
+class _Upright(SoftShape):
+    """Root of round shapes along z."""
 
     radius: float
     height: float
     cell: float
     tetrahedraliser: str = LATTICE
     mean_strain: bool = False
-    kind: ClassVar[str] = "soft_cylinder"
 
     def __post_init__(self) -> None:
         _set_lengths(self, "radius", "height", "cell")
@@ -102,19 +101,17 @@ class SoftCylinder(SoftShape):
 
 
 @dataclass(frozen=True)
-class SoftCapsule(SoftShape):
+class SoftCylinder(_Upright):
+    """A cylinder of ``radius`` and ``height`` [m] along z, from voxels of at most ``cell`` [m]."""
+
+    kind: ClassVar[str] = "soft_cylinder"
+
+
+@dataclass(frozen=True)
+class SoftCapsule(_Upright):
     """A capsule, ``height`` [m] along z between half spheres, from voxels of at most ``cell`` [m]."""
 
-    radius: float
-    height: float
-    cell: float
-    tetrahedraliser: str = LATTICE
-    mean_strain: bool = False
     kind: ClassVar[str] = "soft_capsule"
-
-    def __post_init__(self) -> None:
-        _set_lengths(self, "radius", "height", "cell")
-        _filled(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,7 +141,9 @@ class ClothLaunches(ParticleSolver):
         return run_blocks_partly if n <= SHARED_PARTICLES else run_blocks
 
     def _block_group_pays(self) -> bool:
-        """Return True if a block group is quicker for a world beyond a block's memory."""
+        """Return True if a world fits no block, or a block group is quicker for one beyond a block's memory."""
+        if self.particle_count > BLOCK_PARTICLES:
+            return True
         share = cores_of(self.device) // self.world_count
         doubles = self.frame_rate * self.substeps >= self._double_rate
         return doubles and DOUBLE_PARTICLES < self.particle_count <= GROUP_PARTICLES * share

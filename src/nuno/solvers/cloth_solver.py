@@ -17,7 +17,7 @@ from nuno.contact.self.narrow_phase import GROUP
 from nuno.numbers.lanes import LANES
 from nuno.plans.group_plan import GridPlan, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
-from nuno.solvers.cloth_launches import BLOCK_PARTICLES, ClothLaunches
+from nuno.solvers.cloth_launches import ClothLaunches
 from nuno.solvers.cloth_substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
 from nuno.solvers.coloured_sides import put_sides
 from nuno.solvers.pair_capacity import find_missed, lengthen_lists, size_lists
@@ -120,11 +120,7 @@ class ClothSolver(ClothLaunches):
         # see `nuno.world.impacts`: frames for which the cloth is guarded, and vain attempts to take it apart
         self.guarded, self.tangled = np.zeros((2, self.world_count), dtype=np.int32)
         self.shared_memory = True
-        if plan == "auto":
-            plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
-            if self._cuda and (self.particle_count > BLOCK_PARTICLES or self._block_group_pays()):
-                plan = "grid"
-        self.plan = plan
+        self.plan = self._choose_plan(plan)
         self._grid: GridPlan | None = None
         self._left_out = self._crowded = False
         self._simd: Any = None

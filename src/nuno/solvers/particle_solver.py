@@ -48,6 +48,18 @@ class ParticleSolver(ParticleState):
     _damped: bool
     cell_size: float
 
+    def _choose_plan(self, plan: str) -> str:
+        """Return the plan that is asked for, or of "auto" the quickest for this device, body and number of worlds."""
+        if plan != "auto":
+            return plan
+        if self._cuda:
+            return "grid" if self._block_group_pays() else "fused"
+        return "vector" if self.world_count == 1 else "fused"
+
+    def _block_group_pays(self) -> bool:
+        """Return True if worlds by block groups are quicker than by a block each, or if they fit no block."""
+        raise NotImplementedError
+
     def _start(self, positions: np.ndarray, velocities: np.ndarray) -> None:
         """Set the first state; nothing acts yet."""
         self.last_dt: Any = 1.0  # of the last run [s], one or (worlds,)

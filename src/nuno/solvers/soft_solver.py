@@ -124,11 +124,7 @@ class SoftSolver(ParticleSolver):
         self.resolution = Resolution(self.substeps, bool(substeps), wanted, capped, 1, share, share, share)
         self.self_contact = self_contact
         self.shared_memory = True
-        if plan == "auto":
-            plan = "vector" if not self._cuda and self.world_count == 1 else "fused"
-            if self._cuda and self._block_group_pays():
-                plan = "grid"
-        self.plan = plan
+        self.plan = self._choose_plan(plan)
         self._grid: GridPlan | None = None
         self._simd: SimdClusters | None = None
         self._build(values, friction)

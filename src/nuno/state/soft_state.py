@@ -6,7 +6,7 @@ import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
 from nuno.numbers.lanes import lane, lane_int, subarray
-from nuno.state.cloth_state import INNER_REACH, LISTINGS, LOADS, NOTES, PARTICLE_ARRAYS, PLACES
+from nuno.state.cloth_state import INNER_REACH, LISTINGS, LOADS, NOTES, PARTICLE_ARRAYS, PLACES, make_struct
 
 INVERTED, SEEN = LISTINGS, INNER_REACH
 """Notes in the place of two that only lists of pairs need: whether an element was inside out in the last substep, and
@@ -29,7 +29,7 @@ def _make(name: str, number: type, integer: type, place: type) -> Any:
         name: wp.array(dtype=int)
         for name in ("shape_list", "feature_shapes", "feature_list", "feature_asleep", "reached", "moved")
     }
-    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+    return make_struct(name, __name__, fields)
 
 
 SoftFloat = _make("SoftFloat", float, int, float)
@@ -90,28 +90,14 @@ class SimdClusters:
     notes: wp.array(dtype=lane)
 
 
-@wp.struct
-class Sides:
-    """A soft body's surface, under the names that `nuno.state.cloth_state.Topology` has for a cloth's."""
-
-    particles: int
-    side: wp.array(dtype=wp.vec2i)
-    face: wp.array(dtype=wp.vec3i)
-    feature_colour: wp.array(dtype=int)
-    side_colours: int
-    longest: float
-
-
-@wp.struct
-class FarSides:
-    """`Sides` in kernels that go on for as long as nothing sharp is near."""
-
-    particles: int
-    side: wp.array(dtype=wp.vec2i)
-    face: wp.array(dtype=wp.vec3i)
-    feature_colour: wp.array(dtype=int)
-    side_colours: int
-    longest: float
+_SIDES = {
+    "particles": int, "side": wp.array(dtype=wp.vec2i), "face": wp.array(dtype=wp.vec3i),
+    "feature_colour": wp.array(dtype=int), "side_colours": int, "longest": float,
+}  # fmt: skip
+Sides = make_struct("Sides", __name__, _SIDES)
+"""A soft body's surface, under the names that `nuno.state.cloth_state.Topology` has for a cloth's."""
+FarSides = make_struct("FarSides", __name__, _SIDES)
+"""`Sides` in kernels that go on for as long as nothing sharp is near."""
 
 
 @wp.struct
