@@ -41,9 +41,7 @@ class Reading(Saving):
         from nuno.world.contact_points import contact_points
 
         with self._call():
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; ask for the contacts of what touches it")
+            own, _ = self._own_dynamics(body, "ask for the contacts of what touches it")
             return contact_points(self, own, flag("itself", itself))
 
     def contact_force(self, body: Body | str) -> DeviceArray:

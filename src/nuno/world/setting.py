@@ -43,13 +43,10 @@ class Setting(Reading):
                 that there are not.
         """
         with self._change("set_velocity"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; attach it with a velocity")
-            is_rigid = own._dynamics.is_rigid
-            given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
+            own, dynamics = self._own_dynamics(body, "attach it with a velocity")
+            given = given_velocity(own, dynamics.is_rigid, velocity, angular_velocity, self.world_count)
             chosen = None if worlds is None else checked_worlds(worlds, self.world_count)
-            own._dynamics.set_velocity(own, given, chosen)
+            dynamics.set_velocity(own, given, chosen)
 
     def set_vertices(
         self, body: Body | str, vertices: ArrayLike, velocities: ArrayLike | None = None, *, worlds: Any = None

@@ -183,6 +183,13 @@ class Simulation:
             raise BodyStateError(f"{body.name!r} is in {where}, not in this one")
         return own
 
+    def _own_dynamics(self, body: Body | str, instead: str) -> tuple[Body, Dynamics]:
+        """Return this world's body and its dynamics; a static one is refused, and told what to do ``instead``."""
+        own = self._own(body)
+        if own._dynamics is None:
+            raise BodyStateError(f"{own.name!r} is static; {instead}")
+        return own, own._dynamics
+
     def _pair(self, a: Body | str, b: Body | str) -> frozenset[str]:
         first, second = self._own(a), self._own(b)
         if first is second:

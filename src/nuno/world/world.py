@@ -193,9 +193,7 @@ class World(Setting):
             BodyStateError: it has none.
         """
         with self._change("detach"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; there is nothing to detach")
+            own, _ = self._own_dynamics(body, "there is nothing to detach")
             self._detach(own)
         return own
 
@@ -232,11 +230,9 @@ class World(Setting):
             InvalidInputError: the material does not fit the shape or the batch.
         """
         with self._change("set_material"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; attach it with the material")
-            if type(material) is not type(own._dynamics.material):
-                kinds = f"{type(own._dynamics.material).__name__}, not {type(material).__name__}"
+            own, dynamics = self._own_dynamics(body, "attach it with the material")
+            if type(material) is not type(dynamics.material):
+                kinds = f"{type(dynamics.material).__name__}, not {type(material).__name__}"
                 raise BodyStateError(f"{own.name!r} moves as {kinds}; detach it to attach it as another kind")
             chosen: Any = material
             check_material(own.shape, chosen, self.world_count)
@@ -273,15 +269,13 @@ class World(Setting):
             InvalidInputError: a vertex out of range, a target that cannot be used, or a limit that is not positive.
         """
         with self._change("grip"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; attach it before it is gripped")
+            own, dynamics = self._own_dynamics(body, "attach it before it is gripped")
             target = self._own(to) if isinstance(to, Body) else None
             if ignore is not None and (isinstance(ignore, str) or not isinstance(ignore, Sequence)):
                 raise InvalidInputError(f"ignore must be a sequence of bodies or names, got {ignore!r}")
             if target is own:
                 raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
-            if own._dynamics.is_rigid and target is not None and target._dynamics is not None:
+            if dynamics.is_rigid and target is not None and target._dynamics is not None:
                 if not target._dynamics.is_rigid:
                     raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
             grip = make_grip(
@@ -331,10 +325,8 @@ class World(Setting):
             BodyStateError: the body is static.
         """
         with self._change("push"):
-            own = self._own(body)
-            if own._dynamics is None:
-                raise BodyStateError(f"{own.name!r} is static; attach it before it is pushed")
-            own._dynamics.add_push(make_push(own, force, torque, duration, self))
+            own, dynamics = self._own_dynamics(body, "attach it before it is pushed")
+            dynamics.add_push(make_push(own, force, torque, duration, self))
 
     def set_friction(self, a: Body | str, b: Body | str, mu: Any) -> None:
         """Give a pair of bodies its own friction coefficient, a number or (worlds,); None takes it back.
