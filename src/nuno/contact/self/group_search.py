@@ -1,8 +1,8 @@
 """The phases in which many blocks of a CUDA device list the self-contact pairs of one world together.
 
 What `nuno.contact.self.list_rebuild` does, in phases between which all threads of a block group wait
-(`nuno.numbers.block_group`). First pairs of blocks are noted, a block of vertices by a warp, which passes over far
-regions at a comparison each. Then a thread looks at two elements of a noted pair at a time.
+(`nuno.numbers.block_group`). First pairs of leaves are noted, a leaf by a warp, which passes over far regions at a
+comparison each. Then a thread looks at two elements of a noted pair at a time.
 """
 
 from typing import Any

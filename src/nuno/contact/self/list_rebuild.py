@@ -1,4 +1,7 @@
-"""Rebuilding neighbour lists when their skin is used up: on the CPU for each world by itself, on CUDA by a block."""
+"""Rebuilding neighbour lists when their skin is used up: on the CPU for each world by itself, on CUDA by a block.
+
+A block's way is in `nuno.contact.self.block_rebuild`, that of several blocks in `nuno.contact.self.group_search`.
+"""
 
 from typing import Any
 
