@@ -180,8 +180,8 @@ class ClothSolver(ClothLaunches):
         for kind in ("edge", "cell", "line", "twist", "patch"):
             setattr(topo, f"{kind}_compliance", wp.array(getattr(found, kind), dtype=int, device=self.device))
         topo.triangle_compliance = wp.array(found.triangle, dtype=wp.vec3i, device=self.device)
-        self.mass = vertex_masses(topology, values["area_density"])
-        self._inverse_mass = (1.0 / self.mass).astype(np.float32)
+        density = values["area_density"]
+        self._set_masses(vertex_masses(topology, density[:1] if (density == density[:1]).all() else density))
         own = (
             values["friction"]
             if friction is None
