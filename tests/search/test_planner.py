@@ -162,3 +162,40 @@ def test_a_plan_that_is_imagined_roughly_has_floats():
         nuno.plan(world, act, cost, start=[[0.01, 0.0, 0.02]], spread=0.01, horizon=0.1, samples=2, iterations=1,
                   thorough=thorough)  # fmt: skip
         assert np.array_equal(found[0], found[0].astype(np.float32)) is not thorough
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+def test_each_iteration_begins_where_the_world_is(thorough):
+    """To the bit, a moving cloth, a soft body that is held and a box: what futures go back to is the world itself."""
+    world = nuno.World(device="cpu")
+    world.attach(world.add(nuno.sheet((0.2, 0.2), cells=(4, 4), name="cloth")), velocity=(0.0, 0.1, 0.0))
+    soft = world.add(nuno.soft_box((0.1, 0.1, 0.1), cells=(1, 1, 1), name="soft", position=(0.5, 0.0, 0.0)))
+    world.attach(soft)
+    world.grip(soft, [0], to=soft.vertices[0])
+    world.attach(world.add(nuno.box((0.1, 0.1, 0.1), name="box", position=(-0.5, 0.0, 0.0))))
+    world.run(0.02)
+    state = [world.find(name).vertices for name in ("cloth", "soft", "box")]
+    state += [world.find(name).velocities for name in ("cloth", "soft", "box")]
+    begun = []
+
+    def act(futures, knots):
+        begun.append(
+            [futures.find(name).vertices for name in ("cloth", "soft", "box")]
+            + [futures.find(name).velocities for name in ("cloth", "soft", "box")]
+        )
+        futures.push("box", knots[:, 0], duration=0.02)
+
+    def cost(futures):
+        return -futures.find("box").position[:, 2]
+
+    options = {"start": np.ones((1, 3)), "spread": 1.0, "horizon": 0.04, "thorough": thorough}
+    found = nuno.plan(world, act, cost, samples=17, iterations=3, **options)
+    assert len(begun) == 3
+    for own in begun:
+        for now, expected in zip(own, state, strict=True):
+            assert np.array_equal(now, np.broadcast_to(expected, now.shape))
+    futures = world.imagine(2, thorough=thorough)
+    futures.push("box", found.knots[0], duration=0.02)
+    futures.run(0.04)
+    if thorough:  # else coordinates of the plan's cloth are floats
+        assert cost(futures)[0] == found.cost

@@ -361,3 +361,23 @@ def test_some_worlds_of_a_batch_go_on_as_in_it():
     for wrong in ([1], [0, 3], [0.0, 1.0], 3, True, "all"):
         with pytest.raises(InvalidInputError):
             futures.save().pick(wrong)
+
+
+def test_copies_of_one_world_and_of_equal_worlds_are_alike():
+    """A batch that one world was spread to, and one that has each world's own numbers, go on with the same bits."""
+    world = nuno.World(device="cpu")
+    cloth = world.add(nuno.sheet((0.2, 0.2), cells=(4, 4), name="cloth", position=(0.0, 0.0, 0.1)))
+    soft = world.add(nuno.soft_box((0.1, 0.1, 0.1), cells=(1, 1, 1), name="soft", position=(0.5, 0.0, 0.1)))
+    world.attach(cloth, velocity=(0.0, 0.3, 0.0))
+    world.attach(soft)
+    world.grip(cloth, [0], to=cloth.vertices[0])
+    world.run(0.02)
+    spread = world.imagine(18)  # more than a vector's lanes
+    equal = nuno.World(device="cpu")
+    equal.restore(spread.save())
+    for batch in (spread, equal):
+        batch.grip("cloth", batch.find("cloth").at([0.3], [0.6]), to=(0.0, 0.0, 0.1), compliance=1e-3)
+        batch.run(0.05)
+    for name in ("cloth", "soft"):
+        assert np.array_equal(spread.find(name).vertices, equal.find(name).vertices)
+        assert np.array_equal(spread.find(name).velocities, equal.find(name).velocities)

@@ -76,8 +76,8 @@ class Dynamics:
         """Return what the substeps make of the material, or None where there is nothing to say."""
         return None
 
-    def vertices(self, body: Body) -> np.ndarray:
-        """Return (worlds, n, 3) float64 [m]."""
+    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+        """Return (worlds, n, 3) float64 [m], of all vertices or of ``some``, (worlds, n) int."""
         raise NotImplementedError
 
     def velocities(self, body: Body) -> np.ndarray:
@@ -192,9 +192,9 @@ class ParticleDynamics(Dynamics):
         found: Resolution = self.solver.resolution
         return found
 
-    def vertices(self, body: Body) -> np.ndarray:
+    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
-        return self.solver.positions()
+        return self.solver.positions(some)
 
     def velocities(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s]."""

@@ -26,8 +26,11 @@ def make_dynamics(body: Body, material: Material, state: State, friction: Any, w
         from nuno.bodies.rigid_dynamics import RigidDynamics
 
         return RigidDynamics(body, material, friction, world, state)
-    positions = state["local"].astype(np.float64) + state["origin"][:, None]
-    made = ParticleDynamics(body.shape, material, positions, state["velocities"], friction, world)
+    local, origin, velocities = state["local"], state["origin"], state["velocities"]
+    alike = local.strides[0] == 0 and origin.strides[0] == 0
+    positions = (local[:1] if alike else local).astype(np.float64) + (origin[:1] if alike else origin)[:, None]
+    positions = np.broadcast_to(positions, local.shape)
+    made = ParticleDynamics(body.shape, material, positions, velocities, friction, world)
     made.load_state(state)
     return made
 

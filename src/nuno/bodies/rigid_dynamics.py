@@ -245,10 +245,11 @@ class RigidDynamics(Dynamics):
         place = middle - quat.rotate(turn, np.broadcast_to(self.centre, middle.shape))
         return (place[0], turn[0]) if self.world_count == 1 else (place, turn)
 
-    def vertices(self, body: Body) -> np.ndarray:
+    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
         vertices = body._rigid_vertices(self.pose(body))
-        return np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+        vertices = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+        return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
 
     def velocities(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s] of the vertices."""

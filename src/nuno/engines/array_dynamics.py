@@ -98,9 +98,10 @@ class ArrayParticles(ArrayDynamics):
             self.mass = np.asarray(vertex_masses(self.topology, values_of["area_density"]), dtype=np.float64)
         self.mass = np.broadcast_to(self.mass, (world.world_count, self.mass.shape[-1]))
 
-    def vertices(self, body: Body) -> np.ndarray:
+    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
-        return self.values["positions"]
+        places = self.values["positions"]
+        return places if some is None else np.take_along_axis(places, some[..., None], axis=1)
 
     def velocities(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s]."""
@@ -185,10 +186,11 @@ class ArrayRigid(ArrayDynamics):
         turn = self.values["turn"]
         return self.values["place"] + quat.rotate(turn, np.broadcast_to(self.centre, (len(turn), 3)))
 
-    def vertices(self, body: Body) -> np.ndarray:
+    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
         vertices = body._rigid_vertices(self.pose(body))
-        return np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+        vertices = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
+        return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
 
     def velocities(self, body: Body) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s] of the vertices."""

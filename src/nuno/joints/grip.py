@@ -28,6 +28,8 @@ log = logging.getLogger(__name__)
 
 KEY_BYTES = 40
 """Of each coordinate of a key of a grip's path, while it is made: five doubles."""
+SHORTEST = 1.0e-5
+"""[m] That a grip leads points at once unsaid in any case: edges are longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +244,12 @@ def warn_shared(grip: Grip) -> None:
             )  # fmt: skip
 
 
-def _tell_jump(body: Body, places: np.ndarray, jump: float) -> None:
-    """Warn where a stiff grip leads points farther at once [m] than edges are long, by the vertices' ``places``."""
-    corners = places[body.faces]
+def _tell_jump(body: Body, jump: float) -> None:
+    """Warn where a stiff grip leads points farther at once [m] than edges are long in the first world."""
+    if jump < SHORTEST:
+        return
+    vertices, faces = body.surface()
+    corners = vertices.reshape(-1, *vertices.shape[-2:])[0][faces]
     edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean())
     if jump > edge:
         log.warning(
@@ -288,15 +293,13 @@ def make_grip(
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
     limits = None if max_force is None else force_limit(max_force, worlds)
-    present = body.surface()[0]
-    vertices, corners, weights = chosen_points(where, present.shape[-2], body.faces, worlds)
-    positions = np.broadcast_to(present, (worlds, *present.shape[-2:]))
-    rows = np.arange(worlds)[:, None]
+    vertices, corners, weights = chosen_points(where, len(body.shape.mesh()[0]), body.faces, worlds)
     if vertices is not None:
-        held, valid = positions[rows, vertices], vertices >= 0
+        held, valid = body._dynamics.vertices(body, vertices), vertices >= 0
     else:
         assert corners is not None and weights is not None
-        held = np.einsum("wkc,wkcx->wkx", weights, positions[rows[..., None], corners])
+        places = body._dynamics.vertices(body, corners.reshape(worlds, -1)).reshape(*corners.shape, 3)
+        held = np.einsum("wkc,wkcx->wkx", weights, places)
         valid = corners[..., 0] >= 0
     number = np.maximum(valid.sum(axis=1), 1)[:, None]
     mean = np.where(valid[..., None], held, 0.0).sum(axis=1) / number
@@ -318,7 +321,7 @@ def make_grip(
         jump = goal - mean
     if compliance == 0.0 and limits is None:
         jumps = np.linalg.norm(np.where(valid.any(axis=1, keepdims=True), jump, 0.0), axis=-1)
-        _tell_jump(body, positions[0], float(jumps.max()))
+        _tell_jump(body, float(jumps.max()))
     spec = GripSpec(vertices, corners, weights, times, np.array(keys), interpolation, compliance, limits)
     return Grip(body, spec, target, local)
 

@@ -111,10 +111,12 @@ def plan(
         raise InvalidInputError(f"samples must be at least 2 and as many as the elites, got {n} and {best_of}")
     heat = number("temperature", temperature, above=0.0)
     random, floor = np.random.default_rng(count("seed", seed, low=0)), SMALLEST * sigma
-    futures = world.imagine(n, device, thorough=thorough)
+    with world.lock:  # what futures go back to is the world as they were made of it
+        futures = world.imagine(n, device, thorough=thorough)
+        # of a robot's copies each has a state; all else is alike in all futures
+        saved = None if rounds == 1 else futures.save() if futures.drivers else world.save().spread(n)
     if not thorough:
         _have_floats(futures)
-    saved = futures.save() if rounds > 1 else None
     found, lowest, failed, history = mean, np.inf, 0, []
     hurried: list[str] = []  # what was too fast in the future that is kept
     for k in range(rounds):

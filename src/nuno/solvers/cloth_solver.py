@@ -176,8 +176,8 @@ class ClothSolver(ClothLaunches):
         for kind, place in found.place.items():
             dtype = int if place.ndim == 1 else wp.vec3i
             setattr(topo, f"{kind}_compliance", wp.array(place, dtype=dtype, device=self.device))
-        self.mass = vertex_masses(topology, values["area_density"])
-        self._inverse_mass = (1.0 / self.mass).astype(np.float32)
+        density = values["area_density"]
+        self._set_masses(vertex_masses(topology, density[:1] if (density == density[:1]).all() else density))
         own = (
             values["friction"]
             if friction is None

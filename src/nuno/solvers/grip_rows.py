@@ -61,7 +61,8 @@ def grip_rows(grips: Sequence[GripSpec], origin: np.ndarray, inverse_mass: np.nd
     weight = np.zeros((worlds, count, 3), dtype=np.float32)
     place = np.zeros((worlds, count, keys, 3), dtype=np.float32)
     times = np.zeros((count, keys))
-    mass, held_inverse_mass = inverse_mass.copy(), np.ones((worlds, count), dtype=np.float32)
+    mass = np.array(inverse_mass) if any(e["fixed"] for e in entries) else inverse_mass
+    held_inverse_mass = np.ones((worlds, count), dtype=np.float32)
     for g, e in enumerate(entries):
         corner[:, g], weight[:, g] = e["corners"], e["weights"]
         m = len(e["times"])

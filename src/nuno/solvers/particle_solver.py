@@ -78,7 +78,7 @@ class ParticleSolver(ParticleState):
     def load_state(self, state: dict[str, np.ndarray]) -> None:
         """Set the state that `save_state` gave; leading axes of 1 are spread over the worlds."""
         super().load_state(state)
-        if hasattr(self, "_grips"):
+        if getattr(self, "_grips", ()):  # whose places are relative to the origin
             self.set_grips(self._grips)
 
     # -- what acts on the particles
@@ -146,7 +146,7 @@ class ParticleSolver(ParticleState):
             self._put(rows.held_inverse_mass),
             self._put(np.zeros((self.world_count, LOADS * count))),
         )
-        wp.copy(s.w, self._put(rows.mass))
+        self.fill(s.w, rows.mass)
         self.grip_count, self._grip_keys = rows.count, keys
         self._compliant_grips = int((rows.fixed == 0).any())
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.numbers.doubles import double_lane, float64
 from nuno.numbers.lanes import LANES, lane, lane_int
 from nuno.solvers.array_memory import HOST_COPIES, array_bytes
 from nuno.state.cloth_state import FASTEST, NOTES, ORIGIN, PARTICLE_ARRAYS, SPEED, TRAVEL
@@ -71,11 +72,34 @@ class ParticleState:
         self._counts: wp.array | None = None  # read on CUDA along with `finite`, so that nobody waits twice
         self._counted: np.ndarray | None = None
 
+    def _set_masses(self, mass: np.ndarray) -> None:
+        """Take the particles' masses (worlds, n) [kg], or (1, n) where all worlds have the same."""
+        shape = (self.world_count, self.particle_count)
+        self.mass = np.broadcast_to(mass, shape)
+        self._inverse_mass = np.broadcast_to((1.0 / mass).astype(np.float32), shape)
+
     def _put(self, values: np.ndarray, integer: bool = False) -> wp.array:
         """A device array of (worlds, k) numbers, k elements per world or per group of lanes."""
         values = np.asarray(values, dtype=np.int32 if integer else np.float32)
         dtype = self._integer if integer else self._number
         return wp.array(self._arranged(values), dtype=dtype, device=self.device)
+
+    def fill(self, into: wp.array, values: np.ndarray) -> None:
+        """Write (worlds, ...) numbers to a device array; of worlds that are alike (stride 0) one is sent there."""
+        if self.world_count == 1 or values.strides[0] != 0:
+            kind = np.float64 if into.dtype in (float64, double_lane) else np.float32
+            into.assign(self._arranged(np.asarray(values, dtype=kind)))
+            return
+        one = np.asarray(values[0]).reshape(-1)
+        if self._cuda:
+            row: Any = wp.array(one, dtype=into.dtype, device=self.device)
+            shape = (self.world_count, len(one))
+            alike: Any = wp.array(
+                ptr=row.ptr, shape=shape, strides=(0, row.strides[0]), dtype=into.dtype, device=self.device
+            )
+            wp.copy(into.reshape(shape), alike)
+        else:
+            into.numpy().reshape(self.group_count, -1, self.lanes)[...] = one[:, None]
 
     def _arranged(self, values: np.ndarray) -> np.ndarray:
         """(worlds, k) numbers in a device array's order."""
@@ -120,11 +144,13 @@ class ParticleState:
             state.feature_asleep = self._empty(self._size.feature_list, int)
         state.worlds = self.world_count
 
-    def positions(self) -> np.ndarray:
-        """(worlds, n, 3) float64, a copy [m]."""
-        places = np.empty((self.world_count, self.particle_count, 3))
+    def positions(self, some: np.ndarray | None = None) -> np.ndarray:
+        """(worlds, n, 3) float64, a copy [m], of all particles or of ``some``, (worlds, n) int."""
+        rows = np.arange(self.world_count)[:, None]
+        places = np.empty((self.world_count, self.particle_count if some is None else some.shape[1], 3))
         for k, array in enumerate(self.doubles.arrays):
-            np.add(self.download(array, self.particle_count), self.origin[:, k : k + 1], out=places[..., k])
+            own = self.download(array, self.particle_count)
+            np.add(own if some is None else own[rows, some], self.origin[:, k : k + 1], out=places[..., k])
         return places
 
     def local_positions(self) -> np.ndarray:
@@ -177,14 +203,14 @@ class ParticleState:
         local = np.broadcast_to(state["local"], (worlds, n, 3))
         velocities = np.broadcast_to(state["velocities"], (worlds, n, 3))
         for k, (a, b, c) in enumerate((("x", "px", "vx"), ("y", "py", "vy"), ("z", "pz", "vz"))):
-            wp.copy(getattr(s, a), self._put(local[..., k]))
-            wp.copy(getattr(s, b), self._put(local[..., k]))
-            wp.copy(getattr(s, c), self._put(velocities[..., k]))
+            self.fill(getattr(s, a), local[..., k])
+            wp.copy(getattr(s, b), getattr(s, a))
+            self.fill(getattr(s, c), velocities[..., k])
         self.doubles.count = False
         if local.dtype == np.float64:
             self.doubles.put(local)
         notes = np.broadcast_to(state["notes"], (worlds, FASTEST))
-        wp.copy(s.notes, self._put(np.pad(notes, ((0, 0), (0, NOTES - FASTEST)))))
+        self.fill(s.notes, np.pad(notes, ((0, 0), (0, NOTES - FASTEST))))
         self.scalars[:, ORIGIN : ORIGIN + 3] = state["origin"]
         s.scalars = self._put(self.scalars)
 

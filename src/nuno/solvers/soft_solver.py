@@ -167,8 +167,8 @@ class SoftSolver(ParticleSolver):
             put_sides(surface, topology, self.device, STRETCHED)
         # of a cube whose face's diagonal is the longest edge
         self._side = self._surface.longest / (STRETCHED * np.sqrt(2.0))
-        self.mass = np.repeat(topology.masses(values["density"]), worlds // len(values["density"]), axis=0)
-        self._inverse_mass = (1.0 / self.mass).astype(np.float32)
+        density = values["density"]
+        self._set_masses(topology.masses(density[:1] if (density == density[:1]).all() else density))
         own = values["friction"] if friction is None else np.asarray(friction, float).reshape(-1, 1)
         self.scalars = np.zeros((worlds, SCALARS), dtype=np.float32)
         for column, value in enumerate((values["air_drag"], own, values["damping"], np.zeros((1, 1)))):

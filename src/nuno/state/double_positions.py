@@ -72,9 +72,8 @@ class DoublePositions:
     def put(self, local: np.ndarray) -> None:
         """Set positions (worlds, n, 3) float64 [m], relative to the origins; the floats are set already."""
         for k, name in enumerate(("x", "y", "z")):
-            values = self._solver._arranged(local[..., k].astype(np.float64))
-            self.array(name).assign(values)
-            self.array("p" + name).assign(values)
+            self._solver.fill(self.array(name), local[..., k])
+            wp.copy(self.array("p" + name), self.array(name))
         self.count = True
 
     def _made(self) -> Any:

@@ -17,7 +17,7 @@ from nuno.errors import InvalidInputError
 from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec
 from nuno.joints.tie import HoldSpec, TieSpec, batched_spec
-from nuno.materials import Material
+from nuno.materials import Material, Rigid
 from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path, path_as_it_is
 from nuno.shapes.shape import Shape
@@ -119,7 +119,12 @@ class Snapshot:
         def repeated(array: Any) -> Any:
             return None if array is None else np.repeat(array, world_count, axis=0)
 
-        return self._mapped(repeated, lambda value, _: value, lambda material: material, lambda path: path, world_count)
+        def alike(array: np.ndarray) -> np.ndarray:  # a solver sends one world of these to its device
+            return np.broadcast_to(array, (world_count, *array.shape[1:]))
+
+        return self._mapped(
+            repeated, lambda value, _: value, lambda material: material, lambda path: path, world_count, alike
+        )
 
     @checked
     def pick(self, world: ArrayLike) -> Snapshot:
@@ -152,15 +157,21 @@ class Snapshot:
 
         return self._mapped(batched, chosen, of_worlds, path, np.size(own))
 
-    def _mapped(self, batched: Any, single: Any, material: Any, path: Any, world_count: int) -> Snapshot:
-        """Map arrays that have a world axis, values that may (beside ``axes`` others), materials and paths."""
+    def _mapped(
+        self, batched: Any, single: Any, material: Any, path: Any, world_count: int, particles: Any = None
+    ) -> Snapshot:  # fmt: skip
+        """Map arrays that have a world axis, values that may (beside ``axes`` others), materials and paths.
+
+        Arrays of the state of cloth and soft bodies are mapped by ``particles``, or as all others.
+        """
         bodies = []
         for body in self.bodies:
             dynamics = body.dynamics
             if dynamics is not None:
+                rows = batched if particles is None or isinstance(dynamics.material, Rigid) else particles
                 dynamics = DynamicsRecord(
                     material(dynamics.material), _plain(single(dynamics.friction, 0)),
-                    {name: batched(array) for name, array in dynamics.state.items()},
+                    {name: rows(array) for name, array in dynamics.state.items()},
                     tuple(Push(batched(p.force), p.end) for p in dynamics.pushes),
                 )  # fmt: skip
             bodies.append(replace(
