@@ -131,12 +131,12 @@ _LATER = SHEARING[::2] + _MISTAKES
 
 DISCRETISATIONS = (
     Discretisation(15, 10, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
-    Discretisation(20, 14, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=16),
+    Discretisation(15, 10, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=16),
     Discretisation(
         15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, all_if_poor=True
     ),
     Discretisation(
-        15, 10,
+        20, 14,
         (_loose(3e-4, 0.25), _firm(8e-4, 0.5, hand=_HIGHER), _loose(1e-3, 0.25), _firm(1e-4, 0.5, hand=_LOWER)),
         best=16, any_way=True,
     ),
