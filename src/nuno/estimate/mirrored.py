@@ -26,7 +26,7 @@ REFLECTIONS = ((True, False), (False, True), (True, True))
 """Whether u, and v, are reflected."""
 NEAR = 0.02
 """[m] A vertex that is no higher above the table lies on it."""
-LYING = 0.06
+LYING = 0.05
 """Share of the cloth that may lie on the table where it hangs free."""
 ALIKE = 0.1
 """[m] Ways of the hand that differ by less are alike."""
@@ -41,13 +41,15 @@ class Mirrored(Futures):
     """Futures that were reflected.
 
     Attributes:
-        chosen: (k,) int, the numbers of the candidates that they are of.
+        chosen: (k,) int, the numbers of the candidates that they are of; one may be there several times.
         weights: (hypotheses, k) float, how much each counts.
+        kinds: (k,) int, numbers of their `REFLECTIONS`.
         moved: (hypotheses * k, n) of vec3, the cloths' vertices [m].
     """
 
     chosen: np.ndarray
     weights: np.ndarray
+    kinds: np.ndarray
     moved: wp.array
 
     @property
@@ -64,8 +66,8 @@ class Mirrored(Futures):
 def mirrored(
     futures: Futures, chosen: np.ndarray, uv: np.ndarray, rectangle: ClothRectangle, table: Table, hand: np.ndarray,
     hand_std: float,
-) -> list[Mirrored]:  # fmt: skip
-    """Return the reflections of what was imagined that count for other candidates, those of each kind together.
+) -> Mirrored | None:  # fmt: skip
+    """Return the reflections of what was imagined that count for candidates which it is not of; None where none does.
 
     Args:
         futures: What was imagined.
@@ -84,27 +86,29 @@ def mirrored(
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     ends = hand + hand_std * np.array([h.hand for h in futures.discretisation.hypotheses])
     away = 2.0 * (ends - rectangle.centre) @ axes.T
-    found: list[Mirrored] = []
-    for along in REFLECTIONS:
-        to = counterparts(uv, along)[chosen]
+    moved, to, weights, kinds = [], [], [], []
+    for kind, along in enumerate(REFLECTIONS):
+        there = counterparts(uv, along)[chosen]
         other_way = np.linalg.norm(away * along, axis=1)[:, None]
         counts = (lying <= LYING) | ((other_way <= ALIKE) & (lying <= LYING_ALIKE))
-        counts &= futures.finite & (to >= 0) & (to != chosen)
+        counts &= futures.finite & (there >= 0) & ~np.isin(there, chosen)
         columns = counts.any(axis=0)
-        if not columns.any():
-            continue
-        moved = points[:, columns].astype(float)
+        at = points[:, columns].astype(float)
         for axis in axes[list(along)]:
-            moved -= 2.0 * ((moved - ends[:, None, None]) @ axis)[..., None] * axis
-        flat = np.ascontiguousarray(moved.reshape(-1, points.shape[2], 3), dtype=np.float32)
-        on_device: wp.array = wp.array(flat, dtype=wp.vec3, device=futures.positions.device)
-        found.append(
-            Mirrored(
-                futures.world, futures.body, futures.origin, int(columns.sum()), futures.discretisation, to[columns],
-                WEIGHT * counts[:, columns], on_device,
-            )
-        )  # fmt: skip
-    return found
+            at -= 2.0 * ((at - ends[:, None, None]) @ axis)[..., None] * axis
+        moved.append(at)
+        to.append(there[columns])
+        weights.append(WEIGHT * counts[:, columns])
+        kinds.append(np.full(columns.sum(), kind))
+    together = np.concatenate(to)
+    if not len(together):
+        return None
+    flat = np.concatenate(moved, axis=1).reshape(-1, points.shape[2], 3).astype(np.float32)
+    on_device: wp.array = wp.array(flat, dtype=wp.vec3, device=futures.positions.device)
+    return Mirrored(
+        futures.world, futures.body, futures.origin, len(together), futures.discretisation, together,
+        np.concatenate(weights, axis=1), np.concatenate(kinds), on_device,
+    )  # fmt: skip
 
 
 def counterparts(uv: np.ndarray, along: tuple[bool, bool]) -> np.ndarray:

@@ -17,7 +17,7 @@ from nuno.estimate.hand_error import GROSS_SHARE
 from nuno.estimate.hypotheses import Discretisation
 from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
-from nuno.estimate.mirrored import mirrored
+from nuno.estimate.mirrored import Mirrored, mirrored
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import Comparison, Ranked
@@ -129,10 +129,8 @@ def try_picks(
         if k == 0 and settings.learned and settings.with_evidence:
             outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
         comparisons.append(_compared(futures, chosen, seen, settings, outline))
-        others = mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std) if is_open else []
-        reflected.append([
-            replace(_compared(f, f.chosen, seen, settings, outline), weights=f.weights) for f in others
-        ])  # fmt: skip
+        others = mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std) if is_open else None
+        reflected.append([] if others is None else _of_each_kind(others, seen, settings, outline))
         batches.append(futures)
         ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)
         stages.end("compare")
@@ -154,6 +152,12 @@ def try_picks(
 def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> list[Comparison]:
     """What was imagined, and what it tells of other candidates."""
     return [*comparisons, *(comparison for of_mesh in reflected for comparison in of_mesh)]
+
+
+def _of_each_kind(others: Mirrored, seen: Seen, settings: PickSettings, outline: Outline | None) -> list[Comparison]:
+    """Compare reflected futures, those of each reflection by themselves."""
+    together = replace(_compared(others, others.chosen, seen, settings, outline), weights=others.weights)
+    return [together.part(others.kinds == kind) for kind in np.unique(others.kinds)]
 
 
 def _compared(

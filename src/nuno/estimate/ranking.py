@@ -16,7 +16,7 @@ the mean over the guesses of each way counts by the way's own prior: so it does 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,6 +74,13 @@ class Comparison:
     log_priors: np.ndarray | None = None
     up_first: np.ndarray | None = None
     weights: np.ndarray | None = None
+
+    def part(self, columns: np.ndarray) -> Comparison:
+        """The same of some candidates, by ``columns`` (c,) bool."""
+        names = ("chamfer", "iou", "eq1", "finite", "pattern", "correction", "weights")
+        arrays = {name: getattr(self, name) for name in names}
+        changed = {name: array[..., columns] for name, array in arrays.items() if array is not None}
+        return replace(self, candidates=self.candidates[columns], **changed)
 
     def error(self, score: str) -> np.ndarray:
         """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
