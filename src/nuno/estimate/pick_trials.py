@@ -150,7 +150,7 @@ def try_picks(
 
 
 def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> list[Comparison]:
-    """What was imagined, and what it tells of other candidates."""
+    """Return all comparisons, those of reflected futures too."""
     return [*comparisons, *(comparison for of_mesh in reflected for comparison in of_mesh)]
 
 
