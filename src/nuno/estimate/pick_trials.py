@@ -14,7 +14,7 @@ from nuno.errors import EstimationError
 from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
-from nuno.estimate.hypotheses import Discretisation
+from nuno.estimate.hypotheses import DISCRETISATIONS, OF_OUTLINES, Discretisation
 from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
 from nuno.estimate.mirrored import Mirrored, mirrored
@@ -103,10 +103,12 @@ def try_picks(
     ranked: Ranked | None = None
     outline: Outline | None = None
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
-    meshes = list(settings.discretisations)
+    is_outline = isinstance(rectangle, ClothOutline)
+    usual = settings.discretisations is DISCRETISATIONS
+    meshes = list(OF_OUTLINES if is_outline and usual else settings.discretisations)
     path_given = settings.hand_path is not None
     # an outline's triangles take several times as long as a rectangle's grid, and it is no image of itself
-    is_open = settings.with_evidence and not path_given and not isinstance(rectangle, ClothOutline)
+    is_open = settings.with_evidence and not path_given and not is_outline
     for k in with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"):
         if meshes[k].any_way and ranked is not None and not path_given:
             # once for all that follow, so that a device may imagine them together
