@@ -65,13 +65,13 @@ def ended(case: Evidence) -> Ended:
     """Go through a case's stages as an estimate does."""
     comparisons = case.comparisons
     for k in range(1, len(comparisons) + 1):
-        if doubted(comparisons[:k], "evidence", COUNT, case.prior).settled(SURE):
+        seen = [*comparisons[:k], *case.reflected(k)]
+        if doubted(seen, "evidence", COUNT, case.prior).settled(SURE):
             break
-    seen = comparisons[:k]
     ranked = rank(seen, "evidence", COUNT, case.prior)
     best = int(ranked.order[0])
     found: list[tuple[float, int, int]] = []
-    for n, comparison in enumerate(seen):
+    for n, comparison in enumerate(comparisons[:k]):
         at = np.flatnonzero(comparison.candidates == best)
         if len(at):
             error = comparison.error("evidence")[..., at[0]]

@@ -54,6 +54,14 @@ class Evidence:
             for k, way in enumerate(ways)
         ]
 
+    def reflected(self, stages: int) -> list[Comparison]:
+        """Of the first stages, what their futures tell of other candidates once they are reflected."""
+        found = []
+        for k in range(stages):
+            names = {key.split(".", 1)[0] for key in self.arrays if key.startswith(f"mirror{k}-")}
+            found += [replace(self.comparison(n), up_first=self.comparisons[k].up_first) for n in sorted(names)]
+        return found
+
     def comparison(self, name: str) -> Comparison:
         """A comparison as it was dumped."""
         value = {key[len(name) + 1 :]: array for key, array in self.arrays.items() if key.startswith(name + ".")}
@@ -62,6 +70,7 @@ class Evidence:
         return Comparison(
             value["candidates"].astype(int), value["turns"], chamfer, value["iou"].astype(float),
             np.zeros(chamfer.shape), value["finite"], pattern, added, log_priors=value["log_priors"],
+            weights=value.get("weights"),
         )  # fmt: skip
 
     @cached_property

@@ -32,6 +32,7 @@ WHAT_IFS = (("focal", 0.9), ("focal", 0.95), ("focal", 1.05), ("focal", 1.1), ("
 LOOKED_AT = 6  # candidates of a what-if
 ASKED = ("ordinary", "sideways", "focal_off", "table_off", "tilt_off", "hand_off")
 """Kinds of which what-ifs are asked."""
+EARLY = 2  # stages that were imagined on the finer mesh
 CHUNK = 14_000_000  # [bytes] of an npz file
 
 
@@ -50,12 +51,17 @@ class Kept:
         return self.trials
 
 
-def rounds(number: int, seed: int, device: str) -> Iterator[tuple[str, str, dict[str, Any], list[int], dict[str, Any]]]:
-    """One round's cases: name, kind, arguments of `nuno.estimate_pick`, the true candidate, what else is true."""
+def rounds(
+    number: int, seed: int, device: str, only: tuple[str, ...] = ()
+) -> Iterator[tuple[str, str, dict[str, Any], list[int], dict[str, Any]]]:
+    """One round's cases: name, kind, arguments of `nuno.estimate_pick`, the true candidate, what else is true.
+
+    With ``only`` it is one scene with these departures.
+    """
     from generated_cases import SIDEWAYS, generate
     from varied_cases import ONE_SCENE, OWN_SCENE, make_cases
 
-    if number % 2 == 0:
+    if number % 2 == 0 and not only:
         far = number % 4 == 2
         for k, case in enumerate(generate(1, 10, seed + number, device, (0.1, 0.35) if far else SIDEWAYS)):
             arguments = dict(
@@ -67,13 +73,24 @@ def rounds(number: int, seed: int, device: str) -> Iterator[tuple[str, str, dict
             yield f"{seed + number}-{k}-{kind}", kind, arguments, list(case.true_ij), {"material": case.material}
         return
     kinds = ONE_SCENE if number % 4 == 1 else (*ONE_SCENE, OWN_SCENE[number // 4 % len(OWN_SCENE)])
-    for name, told, truth, before, after in make_cases(1, seed + number, "nuno", device, kinds):
+    made = make_cases(1, seed + number, "nuno", device, only or kinds)
+    for n, (name, told, truth, before, after) in enumerate(made):
         arguments = dict(
             before=before, after=after, camera=told["camera"], table_height=told["table_height_m"],
             hand=told["hand_position_m"], table_half_extents=told["table_half_extents_xy_m"],
             table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
         )  # fmt: skip
-        yield name, truth["kind"], arguments, truth["true_ij"], truth
+        yield f"{name}-{n}" if only else name, truth["kind"], arguments, truth["true_ij"], truth
+
+
+def fine_stages() -> tuple[Any, ...]:
+    """The stages as they were before: the early ones on the mesh of the later ones, and all ten weaves."""
+    from nuno.estimate.hypotheses import DISCRETISATIONS, hypotheses_with
+
+    early = tuple(replace(stage, cells=20, substeps=14) for stage in DISCRETISATIONS[:EARLY])
+    weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
+    later = tuple(replace(s, hypotheses=weaves) if s.cells == 25 else s for s in DISCRETISATIONS[EARLY:])
+    return early + later
 
 
 def judged(
@@ -100,6 +117,8 @@ def judged(
         "up_first": [[h.up_first for h in batch.discretisation.hypotheses] for batch in trials.batches],
     }  # fmt: skip
     arrays = {f"stage{k}": packed(c) for k, c in enumerate(trials.comparisons)}
+    for k, of_stage in enumerate(getattr(trials, "reflected", ())):
+        arrays |= {f"mirror{k}-{n}": packed(c) for n, c in enumerate(of_stage)}
     for name, mask in (("before", result.mask_before), ("after", result.mask_after)):
         arrays[f"mask_{name}"] = np.packbits(mask)
     if ask and not result.by_position:
@@ -125,6 +144,8 @@ def packed(comparison: Any) -> dict[str, np.ndarray]:
             found[name] = value.astype(np.float16)
     if comparison.correction is not None:
         found["correction"] = comparison.correction.astype(np.float32)
+    if getattr(comparison, "weights", None) is not None:
+        found["weights"] = comparison.weights
     found["turns"], found["log_priors"] = comparison.turns, comparison.log_priors
     return found
 
@@ -200,12 +221,18 @@ def work(
     logging.disable(logging.WARNING)
     cv2.setNumThreads(1)
     kept, deadline = Kept(), started + options.limit
+    if options.no_reflections:
+        from nuno.estimate import pick_trials
+
+        pick_trials.mirrored = lambda *_: None
     sure = SURE if options.stop else 1.0
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:
                 job = jobs.get(timeout=1.0)
-                for name, kind, arguments, true, truth in rounds(job, options.seed, device):
+                for name, kind, arguments, true, truth in rounds(job, options.seed, device, tuple(options.kinds)):
+                    if options.fine:
+                        arguments["discretisations"] = fine_stages()
                     row = {"case": name, "round": job, "kind": kind, "device": device, "true": true}
                     row |= {"material": truth["material"], "at": time.time() - started}
                     try:
@@ -264,6 +291,9 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first round")
     parser.add_argument("--seed", type=int, default=50_000)
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
+    parser.add_argument("--kinds", nargs="+", default=[], help="of varied_cases.py: each round is a scene with these")
+    parser.add_argument("--fine", action="store_true", help="early stages on the finer mesh, as before")
+    parser.add_argument("--no-reflections", action="store_true", help="take no future for one of another candidate")
     parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
     parser.add_argument("--stop", action="store_true", help="end the stages as users' estimates do, for true seconds")
     options = parser.parse_args()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from nuno.estimate.hand_error import GROSS
-from nuno.estimate.hypotheses import DISCRETISATIONS, FRICTIONS, cell_counts
+from nuno.estimate.hypotheses import DISCRETISATIONS, FRICTIONS, OF_OUTLINES, cell_counts
 
 
 def test_no_guess_is_made_twice() -> None:
@@ -62,3 +62,10 @@ def test_cells_are_multiples_of_the_grid() -> None:
     assert cell_counts(0.8, 0.4, 20, (6, 6)) == (20, 10)
     assert cell_counts(0.45, 0.41, 25, (6, 6)) == (25, 25)
     assert cell_counts(0.8, 0.1, 20, (6, 6)) == (20, 5)
+
+
+def test_outlines_are_looked_at_on_finer_meshes_by_the_same_guesses():
+    """All but the stages of hands that went up first have 20 cells at least, and every stage its guesses."""
+    assert [stage.hypotheses for stage in OF_OUTLINES] == [stage.hypotheses for stage in DISCRETISATIONS]
+    for stage in OF_OUTLINES:
+        assert stage.cells >= 20 or all(guess.up_first for guess in stage.hypotheses)

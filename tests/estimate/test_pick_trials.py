@@ -48,6 +48,7 @@ def looked_at(monkeypatch: pytest.MonkeyPatch, chamfer: float, **changes: Any) -
 
     monkeypatch.setattr(pick_trials, "compare", compare)
     monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
+    monkeypatch.setattr(pick_trials, "mirrored", lambda *_: None)
     given = settings(discretisations=STAGES, turns=(0.0,), learned=False, sideways=None, **changes)
     seen: Any = SimpleNamespace(warnings=())
     pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))

@@ -26,6 +26,29 @@ def test_the_evidence_is_the_mean_over_the_guesses_that_looked():
     np.testing.assert_allclose(np.exp(rank([first, second], "evidence", 3).scores), expected, rtol=1e-12)
 
 
+def test_a_guess_counts_by_its_weight():
+    """Half a guess of likelihood 1 beside one of 1/32: (1/32 + 1/2) / 1.5; without this best, 1/32. No other score."""
+    first = looked_at([0, 1], [[1.0, 1.0]])
+    half = replace(looked_at([0], [[0.0]]), weights=np.full((1, 1), 0.5))
+    found = rank([first, half], "evidence", 2)
+    np.testing.assert_allclose(np.exp(found.scores), ((2.0**-5 + 0.5) / 1.5, 2.0**-5), rtol=1e-12)
+    np.testing.assert_array_equal(found.eq1, rank([first], "evidence", 2).eq1)
+    without = rank([first, half], "evidence", 2, without_best=True)
+    np.testing.assert_allclose(np.exp(without.scores), 2.0**-5, rtol=1e-12)
+    nothing = replace(half, weights=np.zeros((1, 1)), finite=np.zeros((1, 1), dtype=bool))
+    np.testing.assert_array_equal(rank([first, nothing], "evidence", 2).scores, rank([first], "evidence", 2).scores)
+
+
+def test_a_part_is_of_some_candidates():
+    """Columns of every array that there is."""
+    both = replace(looked_at([3, 5], [[1.0, 2.0], [3.0, 4.0]]), weights=np.array([[0.5, 0.0], [0.5, 0.5]]))
+    part = both.part(np.array([False, True]))
+    np.testing.assert_array_equal(part.candidates, [5])
+    np.testing.assert_array_equal(part.chamfer[0], [[2.0], [4.0]])
+    np.testing.assert_array_equal(part.weights, [[0.0], [0.5]])
+    assert part.pattern is None
+
+
 def test_a_prior_multiplies_the_evidence_alone():
     """Twice as likely before is twice the evidence; other scores, and eq. (1), do not ask for it."""
     comparisons = [looked_at([0, 1, 2], [[0.0, 1.0, 3.0], [1.0, 1.0, 3.0]])]

@@ -45,9 +45,12 @@ BREADTH = 6.0
 
 
 def misfit(comparisons: Sequence[Comparison], candidate: int) -> float:
-    """Return -log likelihood of the silhouette of a candidate's best future, its pose's prior left out."""
+    """Return -log likelihood of the silhouette of a candidate's best future, its pose's prior left out.
+
+    It is of those that were imagined of the candidate itself.
+    """
     found = [np.inf]
-    for comparison in comparisons:
+    for comparison in (c for c in comparisons if c.weights is None):
         at = comparison.candidates == candidate
         chamfer, missed = comparison.chamfer[..., at], 1.0 - comparison.iou[..., at]
         error = CONTOUR_WEIGHT * np.log1p(chamfer) + OVERLAP_WEIGHT * missed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,9 +14,10 @@ from nuno.errors import EstimationError
 from nuno.estimate.doubt import FAIRLY, doubted, misfit, oddities
 from nuno.estimate.futures import Futures, imagine_picks
 from nuno.estimate.hand_error import GROSS_SHARE
-from nuno.estimate.hypotheses import Discretisation
+from nuno.estimate.hypotheses import DISCRETISATIONS, OF_OUTLINES, Discretisation
 from nuno.estimate.learned import Outline, correction, outline_of
 from nuno.estimate.lift_prior import log_prior_of_start, log_priors_of_ways
+from nuno.estimate.mirrored import Mirrored, mirrored
 from nuno.estimate.pick_settings import PickSettings
 from nuno.estimate.pick_sight import masks_of_turned, score_futures
 from nuno.estimate.ranking import Comparison, Ranked
@@ -37,6 +38,7 @@ class PickTrials:
         seen: The image after.
         warnings: What is odd about how the futures fit.
         trusted: How likely the best candidate is, as far as the evidence may be trusted.
+        reflected: What the futures of each mesh, reflected, tell of other candidates (`nuno.estimate.mirrored`).
     """
 
     comparisons: list[Comparison]
@@ -45,6 +47,7 @@ class PickTrials:
     seen: Seen
     warnings: tuple[str, ...] = ()
     trusted: float = 1.0
+    reflected: Sequence[list[Comparison]] = ()
 
     def best_match(self, candidate: int, score: str) -> tuple[int, int, int]:
         """Return the batch, the world in it, and its turn's number, in which a candidate looks most like the image."""
@@ -95,14 +98,17 @@ def try_picks(
     )  # fmt: skip
     prior = _prior(settings, rectangle)
     comparisons: list[Comparison] = []
+    reflected: list[list[Comparison]] = []
     batches: list[Futures] = []
     ranked: Ranked | None = None
     outline: Outline | None = None
     ahead = Ahead(uv, **arguments) if has_room(settings.device) else None
-    meshes = list(settings.discretisations)
+    is_outline = isinstance(rectangle, ClothOutline)
+    usual = settings.discretisations is DISCRETISATIONS
+    meshes = list(OF_OUTLINES if is_outline and usual else settings.discretisations)
     path_given = settings.hand_path is not None
-    # an outline's triangles take several times as long as a rectangle's grid
-    may_look_at_all = settings.with_evidence and not path_given and not isinstance(rectangle, ClothOutline)
+    # an outline's triangles take several times as long as a rectangle's grid, and it is no image of itself
+    is_open = settings.with_evidence and not path_given and not is_outline
     for k in with_bar(range(len(meshes)), "imagining", settings.progress, "mesh"):
         if meshes[k].any_way and ranked is not None and not path_given:
             # once for all that follow, so that a device may imagine them together
@@ -111,7 +117,7 @@ def try_picks(
             ]
         discretisation = meshes[k]
         chosen = np.arange(len(uv))
-        looks_at_all = discretisation.all_if_poor and may_look_at_all and _fits_poorly(comparisons, ranked)
+        looks_at_all = discretisation.all_if_poor and is_open and _fits_poorly(comparisons, ranked)
         if ranked is not None and discretisation.best is not None and not looks_at_all:
             chosen = ranked.plausible(discretisation.best)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
@@ -122,15 +128,13 @@ def try_picks(
         stages.end("imagine")
         seen = wait_for_seen()
         stages.end("see")
-        comparison = compare(futures, chosen, seen, settings)
-        if settings.learned and settings.with_evidence:
-            if k == 0:
-                outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
-            if outline is not None:
-                comparison = replace(comparison, correction=correction(outline, futures, comparison, table, hand))
-        comparisons.append(_weighed(comparison, discretisation))
+        if k == 0 and settings.learned and settings.with_evidence:
+            outline = outline_of(seen.mask, seen.hidden, settings.camera, hand)
+        comparisons.append(_compared(futures, chosen, seen, settings, outline))
+        others = mirrored(futures, chosen, uv, rectangle, table, hand, settings.hand_std) if is_open else None
+        reflected.append([] if others is None else _of_each_kind(others, seen, settings, outline))
         batches.append(futures)
-        ranked = doubted(comparisons, settings.score, len(uv), prior)
+        ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior)
         stages.end("compare")
         if ranked.settled(settings.sure):
             break
@@ -142,9 +146,31 @@ def try_picks(
     guess = meshes[batch].hypotheses[world // len(comparisons[batch].candidates)]
     odd = oddities(comparisons, best, settings.score, guess)
     reported = (*rectangle.warnings, *seen.warnings, *odd)
-    ranked = doubted(comparisons, settings.score, len(uv), prior, reported)
+    ranked = doubted(_all(comparisons, reflected), settings.score, len(uv), prior, reported)
     trusted = 1.0 if ranked.likely is None else float(ranked.likely[best])
-    return PickTrials(comparisons, batches, ranked, seen, odd, trusted)
+    return PickTrials(comparisons, batches, ranked, seen, odd, trusted, reflected)
+
+
+def _all(comparisons: list[Comparison], reflected: list[list[Comparison]]) -> list[Comparison]:
+    """Return all comparisons, those of reflected futures too."""
+    return [*comparisons, *(comparison for of_mesh in reflected for comparison in of_mesh)]
+
+
+def _of_each_kind(others: Mirrored, seen: Seen, settings: PickSettings, outline: Outline | None) -> list[Comparison]:
+    """Compare reflected futures, those of each reflection by themselves."""
+    together = replace(_compared(others, others.chosen, seen, settings, outline), weights=others.weights)
+    return [together.part(others.kinds == kind) for kind in np.unique(others.kinds)]
+
+
+def _compared(
+    futures: Futures, chosen: np.ndarray, seen: Seen, settings: PickSettings, outline: Outline | None
+) -> Comparison:
+    """Compare futures of chosen candidates, with the network's correction, if it has a say, and unlikely mistakes."""
+    comparison = compare(futures, chosen, seen, settings)
+    if outline is not None:
+        added = correction(outline, futures, comparison, settings.table, settings.hand)
+        comparison = replace(comparison, correction=added)
+    return _weighed(comparison, futures.discretisation)
 
 
 def _fits_poorly(comparisons: list[Comparison], ranked: Ranked | None) -> bool:

@@ -16,7 +16,7 @@ the mean over the guesses of each way counts by the way's own prior: so it does 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,9 @@ class Comparison:
         log_priors: (turns,) float, logarithms of the priors of turns and shifts, which add up to 1; None is
             `nuno.estimate.rotations.log_prior` of the turns.
         up_first: (guesses,) bool, of which the hand went up first; None is of none.
+        weights: (guesses, c) float, how much each counts in the mean over the guesses; None is 1 of all. They are given
+            of futures that were not imagined of these candidates (`nuno.estimate.mirrored`), which count as evidence
+            alone.
     """
 
     candidates: np.ndarray
@@ -70,6 +73,14 @@ class Comparison:
     shifts: np.ndarray | None = None
     log_priors: np.ndarray | None = None
     up_first: np.ndarray | None = None
+    weights: np.ndarray | None = None
+
+    def part(self, columns: np.ndarray) -> Comparison:
+        """The same of some candidates, by ``columns`` (c,) bool."""
+        names = ("chamfer", "iou", "eq1", "finite", "pattern", "correction", "weights")
+        arrays = {name: getattr(self, name) for name in names}
+        changed = {name: array[..., columns] for name, array in arrays.items() if array is not None}
+        return replace(self, candidates=self.candidates[columns], **changed)
 
     def error(self, score: str) -> np.ndarray:
         """(turns, guesses, c) float, lower is better; infinite where the future is not finite.
@@ -148,9 +159,9 @@ def rank(
 ) -> Ranked:  # fmt: skip
     """Combine the comparisons of all meshes.
 
-    The evidence of a candidate is the mean likelihood over all guesses that looked at it, times its prior where there
-    is one; of two ways of the hand, the sum of this by both. The other scores take the best guess of each mesh and
-    average over the meshes that looked at the candidate.
+    The evidence of a candidate is the weighted mean likelihood over all guesses that looked at it, times its prior
+    where there is one; of two ways of the hand, the sum of this by both. The other scores take the best guess of each
+    mesh and average over the meshes that looked at the candidate.
 
     Args:
         comparisons: One for each mesh.
@@ -164,6 +175,8 @@ def rank(
     """
     looked, similar, errors = np.zeros(count), np.zeros(count), np.zeros(count)
     for comparison in comparisons:
+        if comparison.weights is not None:
+            continue
         at = comparison.candidates
         looked[at] += 1
         similar[at] += 1.0 - np.minimum(comparison.error("eq1").min(axis=(0, 1)), 1.0)
@@ -187,27 +200,34 @@ def _evidence(
     priors = np.zeros((1, count)) if log_priors is None else np.atleast_2d(log_priors)
     shares = np.ones(1) if len(priors) == 1 else np.array((1.0 - UP_FIRST, UP_FIRST))
     total, guesses, best = (np.zeros(priors.shape) for _ in range(3))
+    weight_of_best = np.ones(priors.shape)
     # scaled by the best of all, for exp would underflow far from it
     offset = min((e[np.isfinite(e)].min(initial=np.inf) for e in (c.error(score) for c in comparisons)), default=0.0)
     offset = offset if np.isfinite(offset) else 0.0
     for comparison in comparisons:
         likelihood = np.exp(offset - comparison.error(score)).sum(axis=0)
         up_first = np.zeros(len(likelihood), dtype=bool) if comparison.up_first is None else comparison.up_first
+        counts = np.ones(likelihood.shape) if comparison.weights is None else comparison.weights
         for way in range(len(priors)):
-            of = likelihood if len(priors) == 1 else likelihood[up_first == bool(way)]
-            at = comparison.candidates
+            its = np.ones(len(likelihood), dtype=bool) if len(priors) == 1 else up_first == bool(way)
+            of, weight, at = (counts * likelihood)[its], counts[its], comparison.candidates
             total[way, at] += of.sum(axis=0)
-            guesses[way, at] += len(of)
-            best[way, at] = np.maximum(best[way, at], of.max(axis=0, initial=0.0))
+            guesses[way, at] += weight.sum(axis=0)
+            if len(of):
+                top = of.argmax(axis=0), np.arange(len(at))
+                better = of[top] > best[way, at]
+                best[way, at] = np.where(better, of[top], best[way, at])
+                weight_of_best[way, at] = np.where(better, weight[top], weight_of_best[way, at])
     weights = priors + np.log(shares)[:, None]
     if without_best:
         highest = np.where(guesses > 0, np.log(best / guesses) + weights, -np.inf)
         way, every = np.argmax(highest, axis=0), np.arange(count)
-        of, several = best[way, every], guesses[way, every] > 1
+        of, one = best[way, every], weight_of_best[way, every]
+        several = guesses[way, every] > one
         # no less than rounding leaves of a sum without its largest part
         left = np.maximum(total[way, every] - of, 1e-12 * of)
         total[way, every] = np.where(several, left, total[way, every])
-        guesses[way, every] -= several
+        guesses[way, every] -= several * one
     known = guesses > 0
     logs = np.where(known, np.log(total / guesses) - offset + weights, -np.inf)
     scores = np.logaddexp.reduce(logs, axis=0) - np.log((known * shares[:, None]).sum(axis=0))
