@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.constraints.taut_lines import is_taut, tautness, turn_grid_line, turns_with_lines
 from nuno.numbers.element_access import at, corner, put
 from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
@@ -113,6 +114,7 @@ def stretch_grid_line(
         before = direction
     # pull is now the last edge's lambda, and a the last vertex
     force = vec3(zero, zero, zero)
+    taut = zero
     for back in range(last - first):
         k = last - 1 - back
         i = corner(table.edge, k, 0, 2)
@@ -120,11 +122,21 @@ def stretch_grid_line(
         if back > 0:
             pull = at(forces, k) + at(gains, k) * pull
         b = position(t, i)
-        own = (b - a) * (pull * at(inverses, k))
-        put_position(t, j, a + between_forces(at(t.w, j), force, own))
+        inverse = at(inverses, k)
+        own = (b - a) * (pull * inverse)
+        wb = at(t.w, j)
+        put_position(t, j, a + between_forces(wb, force, own))
+        if turns_with_lines(t):
+            taut = maximum(taut, tautness(pull, inverse, at(t.w, i), wb))
+            put(gains, k, own.x)
+            put(forces, k, own.y)
+            put(inverses, k, own.z)
         a = b
         force = own
     move(t, head, force * at(t.w, head))
+    if turns_with_lines(t):
+        if is_taut(taut):
+            turn_grid_line(t, table, gains, forces, inverses, first, last)
 
 
 @wp.func
