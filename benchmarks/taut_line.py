@@ -151,9 +151,11 @@ def main() -> None:
     for way in WAYS:
         s = limit(way)
         row = {"way": way, "s": s, "tension": s * RHO * H**2 / (4 * STEP**2)}
-        row["pitch"] = [pitch(way, at, mode) if at < s else (np.nan, np.nan) for at, mode in ((0.5, 1), (0.5, 4), (2.0, 1))]
+        kinds = ((0.5, 1), (0.5, 4), (2.0, 1))
+        row["pitch"] = [pitch(way, at, mode) if at < s else (np.nan, np.nan) for at, mode in kinds]
         rows.append(row)
-        print(f"{way:14}{s:7.2f}{row['tension']:8.0f} | " + "  ".join(f"{f:6.4f} {d:7.4f}" for f, d in row["pitch"]), flush=True)
+        found = "  ".join(f"{f:6.4f} {d:7.4f}" for f, d in row["pitch"])
+        print(f"{way:14}{s:7.2f}{row['tension']:8.0f} | {found}", flush=True)
     if out:
         with open(out, "w") as file:
             json.dump(rows, file, indent=1)

@@ -16,8 +16,9 @@ from nuno.plans.grid_lines_by_warp import stretch_double_grid_lines
 from nuno.state.cloth_state import StateDouble, StateFloat, Topology
 from played_lanes import SUBSTEP, keep_moved, launch, played_lane, put_back, wrinkled_sheet
 
-PASSES = 16
-"""Exchanges that follow each other: of the first rows, of up to nine steps of the reduction, of the pulls."""
+PASSES = 18
+"""Exchanges that follow each other: of the first rows, of up to nine steps of the reduction, of the pulls
+before and after they turn."""
 DIGITS = 2.0e-6
 """Of the longest move, what another order of elimination may round otherwise: rows are floats, of up to 256 a line."""
 

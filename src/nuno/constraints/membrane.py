@@ -10,9 +10,9 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.taut_lines import is_taut, tautness, turn_grid_line, turns_with_lines
+from nuno.constraints.taut_lines import excess, turn_grid_line, turns_with_lines
 from nuno.numbers.element_access import at, corner, put
-from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
+from nuno.numbers.lanes import add, anywhere, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
 
 MAX_RELAXATION = wp.constant(1.45)
@@ -127,7 +127,7 @@ def stretch_grid_line(
         wb = at(t.w, j)
         put_position(t, j, a + between_forces(wb, force, own))
         if turns_with_lines(t):
-            taut = maximum(taut, tautness(pull, inverse, at(t.w, i), wb))
+            taut = maximum(taut, excess(pull, at(t.w, i) + wb, rest[k]))
             put(gains, k, own.x)
             put(forces, k, own.y)
             put(inverses, k, own.z)
@@ -135,8 +135,8 @@ def stretch_grid_line(
         force = own
     move(t, head, force * at(t.w, head))
     if turns_with_lines(t):
-        if is_taut(taut):
-            turn_grid_line(t, table, gains, forces, inverses, first, last)
+        if anywhere(taut):
+            turn_grid_line(t, table, rest, gains, forces, inverses, first, last)
 
 
 @wp.func

@@ -16,7 +16,7 @@ from typing import Any
 import warp as wp
 
 from nuno.numbers.element_access import at, corner
-from nuno.numbers.lanes import add, anywhere, full_like, maximum, minimum, mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.lanes import add, choose, div, full_like, maximum, minimum, mul, sqrt, sub  # noqa: F401 (the operators)
 from nuno.numbers.vec3 import dot, position, put_position, vec3
 from nuno.state.cloth_state import StateDouble, StateDoubleLanes
 
@@ -44,29 +44,29 @@ def turns_with_lines(t: StateDoubleLanes):
 
 
 @wp.func
-def tautness(pull: Any, inverse: Any, wa: Any, wb: Any):
-    """Half of an edge's s by its multiplier ``pull`` and one over its length; negative where it is pressed."""
-    return (wa + wb) * (pull * inverse) * -1.0
+def excess(pull: Any, light: Any, rest: Any):
+    """How far an edge is beyond the onset: by its multiplier ``pull``, its ends' inverse masses and its rest length."""
+    return light * pull * -1.0 - rest * ONSET
 
 
 @wp.func
-def is_taut(taut: Any):
-    """Whether the largest of edges' `tautness`, in any lane, has a share of a force turn."""
-    return anywhere(taut - ONSET)
-
-
-@wp.func
-def turned(force: Any, edge: Any, wa: Any, wb: Any):
+def turned(force: Any, edge: Any, light: Any, rest: Any):
     """The change of an edge's ``force`` as a share of it turns to the vector ``edge``: what it loses across it."""
-    inverse = 1.0 / (dot(edge, edge) + 1.0e-20)
-    along = dot(force, edge) * inverse
-    taut = (wa + wb) * along * -1.0
-    share = minimum(maximum((taut - ONSET) * RISE, 0.0), TURNED)
+    along = dot(force, edge) / (dot(edge, edge) + 1.0e-20)
+    size = sqrt(dot(force, force))
+    pull = choose(along, size, size * -1.0)
+    share = minimum(maximum(excess(pull, light, rest) / rest * RISE, 0.0), TURNED)
     return (edge * along - force) * share
 
 
 @wp.func
-def turn_grid_line(t: Any, table: Any, force_x: Any, force_y: Any, force_z: Any, first: int, last: int):
+def turned_among(edge: Any, before: Any, force: Any, after: Any, wa: Any, wb: Any, rest: Any):
+    """`turned` by the vector ``edge`` that the forces of the edge and of its neighbours are yet to move."""
+    return turned(force, edge + (force - before) * wa - (after - force) * wb, wa + wb, rest)
+
+
+@wp.func
+def turn_grid_line(t: Any, table: Any, rest: Any, force_x: Any, force_y: Any, force_z: Any, first: int, last: int):
     """Turn a share of the forces of a grid line's taut edges, first to last, once these have moved its vertices."""
     i = corner(table.edge, first, 0, 2)
     a = position(t, i)
@@ -77,7 +77,7 @@ def turn_grid_line(t: Any, table: Any, force_x: Any, force_y: Any, force_z: Any,
         j = corner(table.edge, k, 1, 2)
         b = position(t, j)
         wb = at(t.w, j)
-        change = turned(vec3(at(force_x, k), at(force_y, k), at(force_z, k)), a - b, wa, wb)
+        change = turned(vec3(at(force_x, k), at(force_y, k), at(force_z, k)), a - b, wa + wb, rest[k])
         put_position(t, i, a + (change - before) * wa)
         i = j
         a = b
