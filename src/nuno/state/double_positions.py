@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy as np
 import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
@@ -53,6 +54,10 @@ class DoublePositions:
     def begin_at(self, rate: float) -> None:
         """Let doubles count from so many substeps a second [1/s] on, or from where they did if that is more."""
         self._rate = max(self._rate, rate)
+
+    def count_in(self, step: np.ndarray) -> np.ndarray:
+        """Whether doubles count in substeps of so many seconds, elementwise."""
+        return 1.0 >= (1.0 - 1e-9) * self._rate * step
 
     def bring(self, run: Settings) -> Any:
         """The state with doubles that count from now on, or None where a run has so few substeps that floats do."""
