@@ -10,7 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from nuno.constraints.taut_lines import excess, turn_grid_line, turns_with_lines
+from nuno.constraints.taut_lines import excess, redirects_forces, turn_grid_line
 from nuno.numbers.element_access import at, corner, put
 from nuno.numbers.lanes import add, anywhere, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
@@ -126,7 +126,7 @@ def stretch_grid_line(
         own = (b - a) * (pull * inverse)
         wb = at(t.w, j)
         put_position(t, j, a + between_forces(wb, force, own))
-        if turns_with_lines(t):
+        if redirects_forces(t):
             taut = maximum(taut, excess(pull, at(t.w, i) + wb, rest[k]))
             put(gains, k, own.x)
             put(forces, k, own.y)
@@ -134,7 +134,7 @@ def stretch_grid_line(
         a = b
         force = own
     move(t, head, force * at(t.w, head))
-    if turns_with_lines(t):
+    if redirects_forces(t):
         if anywhere(taut):
             turn_grid_line(t, table, rest, gains, forces, inverses, first, last)
 

@@ -28,24 +28,24 @@ RISE = wp.constant(8.0 * 2.0 / 9.0)
 
 
 @wp.func
-def turns_with_lines(t: Any):
-    """Whether forces turn with the edges of taut lines."""
+def redirects_forces(t: Any):
+    """Return True where forces turn with the edges of taut lines: where coordinates are doubles."""
     return False
 
 
 @wp.func
-def turns_with_lines(t: StateDouble):
+def redirects_forces(t: StateDouble):
     return True
 
 
 @wp.func
-def turns_with_lines(t: StateDoubleLanes):
+def redirects_forces(t: StateDoubleLanes):
     return True
 
 
 @wp.func
 def excess(pull: Any, light: Any, rest: Any):
-    """How far an edge is beyond the onset: by its multiplier ``pull``, its ends' inverse masses and its rest length."""
+    """The excess of an edge over the onset, by its multiplier, its ends' inverse masses and its rest length."""
     return light * pull * -1.0 - rest * ONSET
 
 

@@ -17,7 +17,7 @@ from nuno.constraints.membrane import (
     stretch_alpha,
     stretch_grid_line,
 )
-from nuno.constraints.taut_lines import excess, turned_among, turns_with_lines
+from nuno.constraints.taut_lines import excess, redirects_forces, turned_among
 from nuno.numbers.crew import barrier, shares_work
 from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import add, mul, sub  # noqa: F401 (the operators)
@@ -105,7 +105,7 @@ def stretch_edges(
         follows = corner(table.edge, e + 1, 0, 2) == b
     if not follows:
         onto = onto * 0.0
-    if turns_with_lines(t):
+    if redirects_forces(t):
         if any_of_block(excess(right, wa + wb, goal) > 0.0):
             before = vec3(r[0], r[1], r[2])
             if not linked:

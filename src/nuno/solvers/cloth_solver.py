@@ -154,7 +154,7 @@ class ClothSolver(ClothLaunches):
         """(worlds,) [N/m], the tension that a sheet bears in substeps as long as the last were."""
         density = (self.mass / self.topology.area).min(axis=1)
         step = np.reshape(self.last_dt, -1)
-        plain, turned = (bearable_tension(self.topology, 1.0, 1.0, turns) for turns in (False, True))
+        plain, turned = (bearable_tension(self.topology, 1.0, 1.0, doubles) for doubles in (False, True))
         return density * np.where(self.doubles.count_in(step), turned, plain) / step**2
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:

@@ -68,7 +68,7 @@ def wanted_substeps(
     return max(1, math.ceil(frame / step - 1e-9))
 
 
-def bearable_tension(topology: ClothTopology, step: float, density: float, turns: bool = True) -> float:
+def bearable_tension(topology: ClothTopology, step: float, density: float, doubles: bool = True) -> float:
     """The tension [N/m] from which on a sheet may flutter in substeps of ``step`` [s]: rho h^2 / dt^2, or a third.
 
     A taut grid line is a string, whose bends tension pulls straight along the predicted directions of its edges. That
@@ -79,9 +79,9 @@ def bearable_tension(topology: ClothTopology, step: float, density: float, turns
         topology: The sheet's elements.
         step: Length of a substep [s].
         density: Its density [kg/m2].
-        turns: Whether forces turn, as they do where coordinates are doubles.
+        doubles: Whether coordinates are doubles: forces turn there alone.
     """
-    return density * (topology.cell_size / step) ** 2 / (1.0 if turns else 3.0)
+    return density * (topology.cell_size / step) ** 2 / (1.0 if doubles else 3.0)
 
 
 def bending_share(topology: ClothTopology, step: float, density: float, rigidity: float) -> float:

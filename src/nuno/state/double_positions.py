@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy as np
 import warp as wp
 
 from nuno.numbers.doubles import double_lane, float64
@@ -56,7 +55,7 @@ class DoublePositions:
         self._rate = max(self._rate, rate)
 
     def count_in(self, step: np.ndarray) -> np.ndarray:
-        """Whether doubles count in substeps of so many seconds, elementwise."""
+        """Return True, elementwise, where doubles count in substeps of so many seconds."""
         return 1.0 >= (1.0 - 1e-9) * self._rate * step
 
     def bring(self, run: Settings) -> Any:
