@@ -147,7 +147,7 @@ class Cloth(Material):
         damping: Time constant of the internal damping [s].
         air_drag: Rate at which still air takes the velocity away [1/s].
         max_tension: Tension [N/m] that a sheet is to bear: where ``World(substeps=None)`` chooses its substeps, as many
-            as this needs. With 0 it bears that of 10 % of strain, up to 300 N/m. Cloth meshes have no such bound.
+            as this needs. With 0 it bears that of 30 % of strain, up to 900 N/m. Cloth meshes have no such bound.
 
     Raises:
         InvalidInputError: a value is not finite, negative, or zero where it must be positive.

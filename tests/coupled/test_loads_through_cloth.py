@@ -188,20 +188,17 @@ def test_a_drawn_towel_takes_along_heavier_things(mass, cell):
     assert box.position[0] - start == pytest.approx(0.1 - stretched, abs=1e-3)
 
 
-BEYOND = "5 kg need 153 N/m where 100 are resolved: the towel is 3.0 mm ahead of the box for 2.56"
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("mass", "borne"),
+    ("mass", "cell"),
     [
-        pytest.param(1.0, 0.0, marks=pytest.mark.slow),
-        (2.0, 0.0),
-        pytest.param(5.0, 0.0, marks=[pytest.mark.slow, pytest.mark.xfail(strict=True, reason=BEYOND)]),
-        pytest.param(5.0, 250.0, marks=pytest.mark.slow),
+        pytest.param(1.0, 0.02, marks=pytest.mark.slow),
+        (2.0, 0.02),
+        (5.0, 0.02),
+        pytest.param(5.0, 0.01, marks=pytest.mark.slow),
     ],
 )
-def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass, borne):
+def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass, cell):
     """What a load lags behind a drawn towel is the towel's own stretch, under friction of the table F = mu (m + m_t) g.
 
     L of free towel stretch by F L / (k w). Under the box, which is as wide as the towel, tension falls to nothing over
@@ -210,7 +207,7 @@ def test_a_drawn_towel_stretches_under_a_load_as_hooke_says(mass, borne):
     size, length, free, mu = (0.2, 0.16), 0.1, 0.04, 0.5
     world = nuno.World(device="cpu")
     table(world, mu)
-    cloth = towel(world, size, max_tension=borne)
+    cloth = towel(world, size, cell)
     box = load(world, mass, nuno.box((length, size[1], 0.05)))
     world.run(0.3, progress=False)
     rest, start = cloth.vertices, box.position[0]

@@ -109,7 +109,7 @@ def test_a_mesh_in_plain_passes_stretches_as_much_too_far_as_the_resolution_says
 
 @pytest.mark.parametrize(("share", "bears"), [(0.7, True), (1.3, False)])
 def test_a_sheet_bears_the_tension_that_the_resolution_says(share, bears):
-    """Derived: a grid line pulled along predicted directions is stable up to a tension of rho h^2 / (3 dt^2)."""
+    """Derived: with a share of forces that turn a grid line is stable up to 9/8 rho h^2 / dt^2, an eighth more."""
     length, cells, stiffness = 0.3, 30, 5000.0
     sheet = nuno.sheet((length, 0.03), cells=(cells, 3), position=(0, 0, 1))
     material = nuno.Cloth(stretch_stiffness=stiffness, bending_rigidity=5e-6)
@@ -144,25 +144,25 @@ def borne(stiffness, tension, h, substeps=None):
 
 
 @pytest.mark.parametrize("h", [0.01, 0.02])
-@pytest.mark.parametrize(("stiffness", "tension"), [(1000.0, 100.0), (2000.0, 200.0), (5000.0, 200.0)])
+@pytest.mark.parametrize(("stiffness", "tension"), [(1000.0, 200.0), (1000.0, 300.0), (5000.0, 800.0)])
 def test_a_drawn_strip_bears_its_load_at_default_substeps(stiffness, tension, h):
-    """Closed form T = E strain: up to 10 % of strain and 300 N/m the rule promises all of it, 0.3 % less was found."""
+    """Closed form T = E strain: up to 30 % of strain and 900 N/m the rule promises all of it."""
     found, resolution = borne(stiffness, tension, h)
     assert found == pytest.approx(1.0, abs=0.01) and resolution.tension >= tension
 
 
-@pytest.mark.parametrize("h", [0.01, 0.02])
-def test_a_load_beyond_the_rule_is_borne_with_as_many_substeps_as_the_resolution_says(h):
-    """Closed form T = E strain at 20 %: the tension that is borne goes with the square of the substeps."""
-    found, resolution = borne(1000.0, 200.0, h)
-    assert resolution.tension < 200.0 and found < 0.8  # this is what is told
-    enough = int(np.ceil(resolution.substeps * np.sqrt(200.0 / resolution.tension)))
-    assert borne(1000.0, 200.0, h, enough)[0] == pytest.approx(1.0, abs=0.01)
+@pytest.mark.parametrize(("h", "substeps"), [(0.01, 40), (0.02, 25)])
+def test_a_load_beyond_is_borne_with_as_many_substeps_as_the_resolution_says(h, substeps):
+    """Closed form T = E strain of 1.7 times what is borne, 4 and 6 %: that goes with the square of the substeps."""
+    load = 1.7 * borne(5000.0, 10.0, h, substeps)[1].tension
+    assert borne(5000.0, load, h, substeps)[0] < 0.95  # this is what is told
+    enough = int(np.ceil(substeps * np.sqrt(1.7)))
+    assert borne(5000.0, load, h, enough)[0] == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tension", [40.0, 100.0])
-def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):
+@pytest.mark.parametrize(("tension", "stiffness"), [(40.0, 5000.0), (200.0, 5000.0), (100.0, 1000.0)])
+def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension, stiffness):
     """Closed form T2 / T0 = exp(mu pi) of half a turn, R = 50 mm, mu = 0.3, at default substeps."""
     radius, h, mu, across, free, width = 0.052, 0.01, 0.3, 3, 0.08, 0.03
     drum = nuno.cylinder(0.05, 0.2, friction=mu)
@@ -170,7 +170,7 @@ def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):
     half = np.pi * radius / 2 + free
     cells = 2 * round(half / h)
     sheet = nuno.sheet((2 * half, width), cells=(cells, across), position=(0, 0, radius))
-    material = nuno.Cloth(stretch_stiffness=5000.0, friction=mu, bending_rigidity=5e-6, air_drag=2.0)
+    material = nuno.Cloth(stretch_stiffness=stiffness, friction=mu, bending_rigidity=5e-6, air_drag=2.0)
     world, body = attached(sheet, material, drum, gravity=(0, 0, 0))
     world.ignore_contact(body, body)
     world.set_friction(body, drum, 0.02)
@@ -193,7 +193,8 @@ def test_a_strip_slips_over_a_drum_by_the_capstan_equation(tension):
         world.run(0.05)
     end = rows(body)[0][right].mean(axis=0)
     held.release()
-    down = nuno.Path([world.time, world.time + 0.8], [end, end - [0, 0, 0.04]])
+    way = 0.04 + 0.8 * tension / stiffness  # what is free on this side stretches by 0.3 m T2 / k, too
+    down = nuno.Path([world.time, world.time + 0.8], [end, end - [0, 0, way]])
     grip = world.grip(body, right, to=down)
     pulls = []
     for _ in range(48):

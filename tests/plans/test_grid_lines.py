@@ -16,8 +16,9 @@ from nuno.plans.grid_lines_by_warp import stretch_double_grid_lines
 from nuno.state.cloth_state import StateDouble, StateFloat, Topology
 from played_lanes import SUBSTEP, keep_moved, launch, played_lane, put_back, wrinkled_sheet
 
-PASSES = 16
-"""Exchanges that follow each other: of the first rows, of up to nine steps of the reduction, of the pulls."""
+PASSES = 18
+"""Exchanges that follow each other: of the first rows, of up to nine steps of the reduction, of the pulls
+before and after they turn."""
 DIGITS = 2.0e-6
 """Of the longest move, what another order of elimination may round otherwise: rows are floats, of up to 256 a line."""
 
@@ -127,12 +128,17 @@ def _by_block(
         line = int(stop)
 
 
-def solved(method, plain, cells, differ, doubles, flag=None):
-    """Return the moves by a method and by one thread, of grid lines along the rows and then along the columns."""
+def solved(method, plain, cells, differ, doubles, flag=None, strain=0.0):
+    """Return the moves by a method and by one thread, of grid lines along the rows and then along the columns.
+
+    A ``strain`` has most edges so taut that their forces turn (`nuno.constraints.taut_lines`).
+    """
     number = np.random.default_rng(5)
     count = cells[0] * cells[1]
     stiffness = number.uniform(100.0, 5000.0, count) if differ else 800.0
+    stiffness = 0.1 * stiffness if strain else stiffness
     state, table, start = wrinkled_sheet(cells, nuno.Cloth(stretch_stiffness=stiffness), doubles=doubles)
+    start *= 1.0 + strain
     kinds, rate = table.grid_line_kind.numpy(), 1.0 / SUBSTEP**2
     for first, last in ((kinds[0], kinds[1]), (kinds[1], kinds[2])):
         numbers = int(first), int(last), rate, differ if flag is None else flag
@@ -172,10 +178,21 @@ def test_a_block_solves_grid_lines_side_by_side(cells):
         np.testing.assert_allclose(found, expected, rtol=0, atol=DIGITS * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(
+    ("cells", "pairs"), [((5, 8), False), ((5, 8), True), pytest.param((40, 5), False, marks=pytest.mark.long)]
+)
+def test_taut_lines_turn_alike(cells, pairs):
+    """The same as one thread, where forces turn: it takes places that have moved, the others what moves them."""
+    for method in (_by_warp, _by_block):
+        for found, expected in solved(method, _plain_doubles, cells, True, True, pairs, 0.8):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=DIGITS * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("strain", [0.0, 0.8])
 @pytest.mark.parametrize("cells", [(5, 8), (31, 12), (40, 5)])
-def test_a_warp_and_a_block_give_the_same_bits(cells):
+def test_a_warp_and_a_block_give_the_same_bits(cells, strain):
     """Promise: a world by a block and one by a group of blocks do the same arithmetic, row by row."""
-    warp = [found for found, _ in solved(_by_warp, _plain_doubles, cells, True, True, False)]
-    block = [found for found, _ in solved(_by_block, _plain_doubles, cells, True, True)]
+    warp = [found for found, _ in solved(_by_warp, _plain_doubles, cells, True, True, False, strain)]
+    block = [found for found, _ in solved(_by_block, _plain_doubles, cells, True, True, None, strain)]
     for one, other in zip(warp, block, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -100,6 +100,31 @@ def test_sweeps_give_the_same_bits_in_all_plans(kind, stretch):
         np.testing.assert_array_equal(found, expected, err_msg=f"{plan}, {worlds} worlds")
 
 
+@pytest.mark.parametrize("plan", ["lanes", pytest.param("scalar", marks=pytest.mark.long)])
+@pytest.mark.parametrize("substeps", [None, pytest.param(DOUBLES, marks=pytest.mark.long)])
+def test_taut_lines_have_the_same_bits_in_all_plans(substeps, plan):
+    """Promise: forces that turn with taut edges do so alike; a world of slack lines beside keeps its own."""
+
+    def made(kind, worlds, strain):
+        cloth = solver("sheet", kind, worlds, substeps=substeps)
+        x = cloth.positions() * np.stack([1.0 + strain, np.ones_like(strain), np.ones_like(strain)], axis=-1)
+        cloth.set_state(x, np.zeros_like(x))
+        return cloth
+
+    def taut(cloth):  # the largest (omega dt)^2 along warp
+        return 4.0 * 1000.0 * 0.25 / (0.2 * (0.03 * 60.0 * cloth.substeps) ** 2)
+
+    expected = outcome(made("vector", 1, np.array(0.25)), 0.1)
+    slack = outcome(made("vector", 1, np.array(0.0)), 0.1)
+    strain = np.array([[0.25], [0.0], [0.0]])
+    several = made("fused", 3, strain) if plan == "lanes" else made("fused", 1, strain[0])
+    assert 1.0 < taut(several) < 4.0  # beyond the onset in the first substeps
+    np.testing.assert_array_equal(outcome(several, 0.1), expected)
+    if plan == "lanes":
+        for world in (1, 2):
+            np.testing.assert_array_equal(several.local_positions()[world], slack[0])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_the_grid_plan_lists_the_pairs_of_the_fused_one(worlds, monkeypatch):

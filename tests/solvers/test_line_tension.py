@@ -83,10 +83,10 @@ def test_a_load_beyond_what_is_borne_is_told_once_with_the_cure(caplog):
     That material makes no less of its other stiffnesses, so that no other warning sends one back.
     """
     with caplog.at_level(logging.WARNING, logger="nuno"):
-        _, strip = pulled(85.0, name="light")
-        assert 85.0 < strip.resolution.tension < 110.0
+        _, strip = pulled(255.0, name="light")
+        assert 255.0 < strip.resolution.tension < 330.0
         assert not warnings_in(caplog)
-        world, strip = pulled(150.0, name="heavy")
+        world, strip = pulled(450.0, name="heavy")
         world.run(0.5)
         futures = world.imagine(2)
         futures.run(0.5)
@@ -94,21 +94,21 @@ def test_a_load_beyond_what_is_borne_is_told_once_with_the_cure(caplog):
     (text,) = warnings_in(caplog)
     assert "'heavy'" in text and "'heavy'.resolution.tension" in text
     enough = int(text.partition("Cloth(max_tension=")[2].partition(")")[0])
-    needed = strip.resolution.substeps * np.sqrt(150.0 / strip.resolution.tension)
+    needed = strip.resolution.substeps * np.sqrt(450.0 / strip.resolution.tension)
     caplog.clear()
     with caplog.at_level(logging.WARNING, logger="nuno"):
-        world, strip = pulled(150.0, name="cured", max_tension=enough)
+        world, strip = pulled(450.0, name="cured", max_tension=enough)
         world.run(0.5)
     assert needed < strip.resolution.substeps < 1.1 * needed and strip.resolution.tension >= enough
     assert not caplog.records
     x = strip.vertices[:, 0]
-    assert np.ptp(x) / LENGTH == pytest.approx(1.0 + 150.0 / 1000.0, abs=0.005)  # T = k e
+    assert np.ptp(x) / LENGTH == pytest.approx(1.0 + 450.0 / 1000.0, abs=0.005)  # T = k e
 
 
 def test_given_substeps_are_told_how_many_bear_a_load(caplog):
     """Promise: where substeps were given the cure is their number, for a load and for a tension that is asked for."""
     with caplog.at_level(logging.WARNING, logger="nuno"):
-        pulled(50.0, substeps=40, name="few")
+        pulled(150.0, substeps=40, name="few")
         asked = pulled(1.0, substeps=40, name="asked", max_tension=200.0)[1].resolution
     (text,) = warnings_in(caplog)
     assert "World(substeps=" in text and "max_tension" not in text
@@ -121,9 +121,9 @@ def test_given_substeps_are_told_how_many_bear_a_load(caplog):
 def test_a_load_in_one_world_of_a_batch_is_told(caplog):
     """Promise: the world that bears most counts; a batch in which none has too much stays silent."""
     with caplog.at_level(logging.WARNING, logger="nuno"):
-        pulled(np.linspace(10.0, 80.0, 5), worlds=5, name="all light")
+        pulled(np.linspace(30.0, 240.0, 5), worlds=5, name="all light")
         assert not warnings_in(caplog)
-        pulled(np.array([10.0, 20.0, 200.0, 30.0, 40.0]), worlds=5, name="one heavy")
+        pulled(np.array([30.0, 60.0, 600.0, 90.0, 120.0]), worlds=5, name="one heavy")
     (text,) = warnings_in(caplog)
     assert "'one heavy'" in text
 

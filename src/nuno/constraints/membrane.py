@@ -10,8 +10,9 @@ from typing import Any
 
 import warp as wp
 
+from nuno.constraints.taut_lines import excess, redirects_forces, turn_grid_line
 from nuno.numbers.element_access import at, corner, put
-from nuno.numbers.lanes import add, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
+from nuno.numbers.lanes import add, anywhere, div, full_like, maximum, minimum, mul, product, sqrt, sub  # noqa: F401
 from nuno.numbers.vec3 import dot, move, offset, position, put_position, vec3
 
 MAX_RELAXATION = wp.constant(1.45)
@@ -113,6 +114,7 @@ def stretch_grid_line(
         before = direction
     # pull is now the last edge's lambda, and a the last vertex
     force = vec3(zero, zero, zero)
+    taut = zero
     for back in range(last - first):
         k = last - 1 - back
         i = corner(table.edge, k, 0, 2)
@@ -120,11 +122,21 @@ def stretch_grid_line(
         if back > 0:
             pull = at(forces, k) + at(gains, k) * pull
         b = position(t, i)
-        own = (b - a) * (pull * at(inverses, k))
-        put_position(t, j, a + between_forces(at(t.w, j), force, own))
+        inverse = at(inverses, k)
+        own = (b - a) * (pull * inverse)
+        wb = at(t.w, j)
+        put_position(t, j, a + between_forces(wb, force, own))
+        if redirects_forces(t):
+            taut = maximum(taut, excess(pull, at(t.w, i) + wb, rest[k]))
+            put(gains, k, own.x)
+            put(forces, k, own.y)
+            put(inverses, k, own.z)
         a = b
         force = own
     move(t, head, force * at(t.w, head))
+    if redirects_forces(t):
+        if anywhere(taut):
+            turn_grid_line(t, table, rest, gains, forces, inverses, first, last)
 
 
 @wp.func

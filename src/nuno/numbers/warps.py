@@ -159,6 +159,30 @@ def anyone(yes: bool) -> bool:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+return __any_sync(0xffffffffu, yes);
+#else
+return true;
+#endif
+""")
+def any_of_warp(yes: bool) -> bool:
+    """Return True if one of the 32 threads says yes; on the CPU, where they are played in turn, always."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+return __syncthreads_or(yes);
+#else
+return true;
+#endif
+""")
+def any_of_block(yes: bool) -> bool:
+    """The same of the block's threads; all wait for each other."""
+    ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
 __syncwarp();
 #endif
 """)

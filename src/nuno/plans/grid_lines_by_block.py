@@ -17,11 +17,13 @@ from nuno.constraints.membrane import (
     stretch_alpha,
     stretch_grid_line,
 )
+from nuno.constraints.taut_lines import excess, redirects_forces, turned_among
 from nuno.numbers.crew import barrier, shares_work
 from nuno.numbers.element_access import at, corner
-from nuno.numbers.lanes import mul, sub  # noqa: F401 (mul, sub: the operators)
+from nuno.numbers.lanes import add, mul, sub  # noqa: F401 (the operators)
 from nuno.numbers.tridiagonal import free_row
 from nuno.numbers.vec3 import move, position, vec3
+from nuno.numbers.warps import any_of_block
 from nuno.plans.cloth_elastic import lengths_of, stretch_grid_lines
 from nuno.state.cloth_state import Settings, Topology
 
@@ -86,7 +88,8 @@ def stretch_edges(
     s = 1.0 / edge_diagonal(wa, wb, alpha)
     low = coupling * s
     high = r[3] * s
-    right = wp.where(mine, at(rest, e) - length, 0.0) * s
+    goal = at(rest, e)
+    right = wp.where(mine, goal - length, 0.0) * s
     turn = int(0)
     shift = int(1)
     while shift < longest:
@@ -96,13 +99,23 @@ def stretch_edges(
         shift = shift * 2
     pull = direction * right
     r = neighbours(exchanged, turn, k, pull.x, pull.y, pull.z, 1)
-    if mine:
-        onto = vec3(r[3], r[4], r[5])
-        if k + 1 < last - first:
-            if corner(table.edge, e + 1, 0, 2) != b:
+    onto = vec3(r[3], r[4], r[5])
+    follows = bool(False)
+    if mine and k + 1 < last - first:
+        follows = corner(table.edge, e + 1, 0, 2) == b
+    if not follows:
+        onto = onto * 0.0
+    if redirects_forces(t):
+        if any_of_block(excess(right, wa + wb, goal) > 0.0):
+            before = vec3(r[0], r[1], r[2])
+            if not linked:
+                before = before * 0.0
+            pull = pull + turned_among(position(t, a) - position(t, b), before, pull, onto, wa, wb, goal)
+            r = neighbours(exchanged, 1 - turn, k, pull.x, pull.y, pull.z, 1)
+            onto = vec3(r[3], r[4], r[5])
+            if not follows:
                 onto = onto * 0.0
-        else:
-            onto = onto * 0.0
+    if mine:
         move(t, b, between_forces(wb, onto, pull))
         if not linked:
             move(t, a, wa * pull)

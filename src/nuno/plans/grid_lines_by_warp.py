@@ -10,11 +10,13 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.membrane import between_forces, edge_coupling, edge_diagonal, edge_direction, stretch_alpha
+from nuno.constraints.taut_lines import excess, turned_among
 from nuno.numbers.element_access import at, corner
-from nuno.numbers.lanes import mul, sub  # noqa: F401 (the operators)
+from nuno.numbers.lanes import add, mul, sub  # noqa: F401 (the operators)
 from nuno.numbers.tridiagonal import free_row
 from nuno.numbers.vec3 import move, position, vec3
 from nuno.numbers.warp_lanes import SHUFFLES, Lane
+from nuno.numbers.warps import any_of_warp
 from nuno.state.cloth_state import Topology
 
 PAIR_EDGES = wp.constant(32)
@@ -96,6 +98,8 @@ def _solver(rows: int, apart: bool) -> Any:
         z = vector()
         right = vector()
         scale = vector()
+        light = vector()
+        goal = vector()
         for j in range(wp.static(rows)):
             k = own.lane + wp.static(0 if apart else 32) * j
             begin = wp.where(wp.static(apart) and j > 0, other, first)
@@ -104,11 +108,13 @@ def _solver(rows: int, apart: bool) -> Any:
             a = corner(table.edge, e, 0, 2)
             b = corner(table.edge, e, 1, 2)
             direction, length, _inverse = edge_direction(position(t, a), position(t, b))
+            light[j] = at(t.w, a) + at(t.w, b)
             x[j] = direction.x
             y[j] = direction.y
             z[j] = direction.z
             alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[e]), table.edge_scale[e], rate)
-            right[j] = wp.where(mine, at(rest, e) - length, 0.0)
+            goal[j] = at(rest, e)
+            right[j] = wp.where(mine, goal[j] - length, 0.0)
             scale[j] = 1.0 / edge_diagonal(at(t.w, a), at(t.w, b), alpha)
         bx = rows_before(own.exchanged, own.lane, x, 1, wp.static(apart))
         by = rows_before(own.exchanged, own.lane, y, 1, wp.static(apart))
@@ -142,13 +148,35 @@ def _solver(rows: int, apart: bool) -> Any:
                 low[j] = freed_low
                 high[j] = freed_high
                 right[j] = freed_right
+        taut = float(0.0)
         for j in range(wp.static(rows)):
+            taut = wp.max(taut, excess(right[j], light[j], goal[j]))
             x[j] = x[j] * right[j]
             y[j] = y[j] * right[j]
             z[j] = z[j] * right[j]
         nx = rows_after(own.exchanged, own.lane, x, 1, wp.static(apart))
         ny = rows_after(own.exchanged, own.lane, y, 1, wp.static(apart))
         nz = rows_after(own.exchanged, own.lane, z, 1, wp.static(apart))
+        if any_of_warp(taut > 0.0):
+            bx = rows_before(own.exchanged, own.lane, x, 1, wp.static(apart))
+            by = rows_before(own.exchanged, own.lane, y, 1, wp.static(apart))
+            bz = rows_before(own.exchanged, own.lane, z, 1, wp.static(apart))
+            for j in range(wp.static(rows)):
+                k = own.lane + wp.static(0 if apart else 32) * j
+                begin = wp.where(wp.static(apart) and j > 0, other, first)
+                if k < wp.where(wp.static(apart) and j > 0, more, count):
+                    a = corner(table.edge, begin + k, 0, 2)
+                    b = corner(table.edge, begin + k, 1, 2)
+                    change = turned_among(
+                        position(t, a) - position(t, b), vec3(bx[j], by[j], bz[j]), vec3(x[j], y[j], z[j]),
+                        vec3(nx[j], ny[j], nz[j]), at(t.w, a), at(t.w, b), goal[j],
+                    )  # fmt: skip
+                    x[j] = x[j] + change.x
+                    y[j] = y[j] + change.y
+                    z[j] = z[j] + change.z
+            nx = rows_after(own.exchanged, own.lane, x, 1, wp.static(apart))
+            ny = rows_after(own.exchanged, own.lane, y, 1, wp.static(apart))
+            nz = rows_after(own.exchanged, own.lane, z, 1, wp.static(apart))
         # all have read their ends before the first exchange, so that nothing is overwritten too soon
         for j in range(wp.static(rows)):
             k = own.lane + wp.static(0 if apart else 32) * j

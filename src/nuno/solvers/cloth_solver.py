@@ -38,7 +38,7 @@ from nuno.state.cloth_state import (
     StateLanes,
     Topology,
 )
-from nuno.state.double_positions import DoublePositions
+from nuno.state.double_positions import DOUBLE_RATE, DoublePositions
 from nuno.state.upload import upload, upload_leaves
 from nuno.topology.cloth_topology import ClothTopology
 
@@ -141,14 +141,17 @@ class ClothSolver(ClothLaunches):
             wanted = max(wanted, math.ceil(math.sqrt(self._softening / PLAIN) / self.frame_rate))
         tension = None
         if len(self.topology.edges):
-            tension = bearable_tension(self.topology, step, density)
+            doubles = not given or self.frame_rate * self.substeps >= DOUBLE_RATE
+            tension = bearable_tension(self.topology, step, density, doubles)
         parts = share["stretch"], share["shear"], bending
         return Resolution(self.substeps, given, wanted, capped, max(1, self.sweeps), *parts, tension)
 
     def bearable_tension(self) -> np.ndarray:
         """(worlds,) [N/m], the tension that a sheet bears in substeps as long as the last were."""
         density = (self.mass / self.topology.area).min(axis=1)
-        return density * bearable_tension(self.topology, 1.0, 1.0) / np.reshape(self.last_dt, -1) ** 2
+        step = np.reshape(self.last_dt, -1)
+        plain, turned = (bearable_tension(self.topology, 1.0, 1.0, doubles) for doubles in (False, True))
+        return density * np.where(self.doubles.count_in(step), turned, plain) / step**2
 
     def _build(self, values: dict[str, np.ndarray], friction: float | np.ndarray | None) -> None:
         topology, worlds, n = self.topology, self.world_count, self.particle_count

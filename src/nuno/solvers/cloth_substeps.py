@@ -11,7 +11,7 @@ BENDING_STEP = 1.8
 """The default number of substeps keeps B dt^2 / (rho h^4) of a sheet at or under one over this."""
 PATCH_STEP = 0.75
 """The same of a mesh's B dt^2 / rho times `ClothTopology.bend_rate`."""
-TAUT, MAX_TAUT = 0.1, 300.0
+TAUT, MAX_TAUT = 0.3, 900.0
 """The strain of a sheet, and the tension [N/m], of which the default number of substeps bears the smaller."""
 FEWEST, MAX_SUBSTEPS = 10, 240
 """Bounds of the default: contact is looked at every 1.7 ms at 60 frames a second; a stiff strip stays affordable."""
@@ -68,13 +68,20 @@ def wanted_substeps(
     return max(1, math.ceil(frame / step - 1e-9))
 
 
-def bearable_tension(topology: ClothTopology, step: float, density: float) -> float:
-    """The tension [N/m] from which on a sheet flutters in substeps of ``step`` [s]: a third of rho h^2 / dt^2.
+def bearable_tension(topology: ClothTopology, step: float, density: float, doubles: bool = True) -> float:
+    """The tension [N/m] from which on a sheet may flutter in substeps of ``step`` [s]: rho h^2 / dt^2, or a third.
 
     A taut grid line is a string, whose bends tension pulls straight along the predicted directions of its edges. That
-    is stable up to (omega dt)^2 = 4/3, and the swiftest wave has omega = 2 sqrt(T / rho) / h.
+    is stable up to (omega dt)^2 = 4/3, and the swiftest wave has omega = 2 sqrt(T / rho) / h. Where a share of the
+    forces turns with the edges (`nuno.constraints.taut_lines`) it is stable up to 9/2, of which an eighth is left over.
+
+    Args:
+        topology: The sheet's elements.
+        step: Length of a substep [s].
+        density: Its density [kg/m2].
+        doubles: Whether coordinates are doubles: forces turn there alone.
     """
-    return density * (topology.cell_size / step) ** 2 / 3.0
+    return density * (topology.cell_size / step) ** 2 / (1.0 if doubles else 3.0)
 
 
 def bending_share(topology: ClothTopology, step: float, density: float, rigidity: float) -> float:

@@ -40,7 +40,8 @@ class Resolution:
         shear: The share of a cloth's shear stiffness, of a soft body's modulus.
         bending: The share of a cloth's bending rigidity, of a soft body's modulus.
         tension: The tension [N/m] from which on a sheet flutters and bears no more, None where it is not known: for
-            cloth meshes and soft bodies. It goes with the square of the substeps.
+            cloth meshes and soft bodies. It goes with the square of the substeps, and is a third where so few
+            substeps were given that coordinates are floats.
     """
 
     substeps: int

@@ -54,6 +54,10 @@ class DoublePositions:
         """Let doubles count from so many substeps a second [1/s] on, or from where they did if that is more."""
         self._rate = max(self._rate, rate)
 
+    def count_in(self, step: np.ndarray) -> np.ndarray:
+        """Return True, elementwise, where doubles count in substeps of so many seconds."""
+        return 1.0 >= (1.0 - 1e-9) * self._rate * step
+
     def bring(self, run: Settings) -> Any:
         """The state with doubles that count from now on, or None where a run has so few substeps that floats do."""
         if self._solver.frame_rate * run.frame < self._rate:
