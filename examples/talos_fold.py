@@ -38,7 +38,8 @@ world.attach(towel, nuno.Cloth(area_density=0.25, bending_rigidity=3e-5, stretch
 
 talos = nuno.Humanoid("talos")
 hips = talos.frame_pose("base_link")
-assert talos.reach({"base_link": nuno.Coordinates(hips.position + np.array(HIPS), hips.quaternion), **READY})
+hips.translate(HIPS, wrt="world")
+assert talos.reach({"base_link": hips, **READY})
 robot = nuno.SimulatedRobot(talos, world)
 
 as_taught = taught.on(towel, forward=(1, 0))
