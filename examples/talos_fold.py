@@ -38,11 +38,12 @@ world.attach(towel, nuno.Cloth(area_density=0.25, bending_rigidity=3e-5, stretch
 
 talos = nuno.Humanoid("talos")
 hips = talos.frame_pose("base_link")
-assert talos.reach({"base_link": nuno.Coordinates(hips.position + np.array(HIPS), hips.quaternion), **READY})
+hips.translate(HIPS, wrt="world")
+assert talos.reach({"base_link": hips, **READY})
 robot = nuno.SimulatedRobot(talos, world)
 
 as_taught = taught.on(towel, forward=(1, 0))
-better = improve_fold(as_taught, towel, population=8, progress=False)
+better = improve_fold(as_taught, towel, generations=1, population=8, progress=False)
 
 look = FoldPictures(robot, towel)
 played = play_fold(robot, towel, better.motion, watch=look if asked.out else None)

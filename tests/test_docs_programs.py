@@ -1,5 +1,6 @@
 """The programs that README and docs show run as they stand, page by page, in one namespace."""
 
+import ast
 import os
 import re
 import subprocess
@@ -19,12 +20,14 @@ PAGES = {
 # pages whose programs take some three seconds of a core or more; `test_docs.py` looks for all names of all pages, and
 # runs the first program
 LONG = {
-    "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
-    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "teaching",
-    "tutorial", "viewer", "wire", "worlds",
+    "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
+    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "tutorial",
+    "viewer", "wire", "worlds",
 }  # fmt: skip
-# pages whose every call is made by an example, which tests run: examples/carry_mat.py and lift_soft_cube.py
-SLOW = {"carrying"}
+# pages whose every call is made by examples, as a test below holds: long tests run the examples, slow ones these pages
+OF_EXAMPLES = {
+    "carrying": ("carry_mat", "lift_soft_cube"), "closed-loop": ("closed_loop",), "teaching": ("talos_fold",),
+}  # fmt: skip
 
 
 def blocks(page):
@@ -36,25 +39,51 @@ def blocks(page):
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=pytest.mark.slow if name in SLOW else pytest.mark.long if name in LONG else ())
+        pytest.param(name, marks=pytest.mark.slow if name in OF_EXAMPLES else pytest.mark.long if name in LONG else ())
         for name in sorted(PAGES)
     ],
 )
-def test_a_page_runs(name, tmp_path):
+def test_a_page_runs(name, tmp_path, request):
     """All blocks of a page, one after the other, in a process of their own, where examples/ is as in a clone."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    folder = tmp_path / "here"
+    folder.mkdir()
+    (folder / "examples").symlink_to(ROOT / "examples")
     source = ""
     for block in blocks(PAGES[name]):
         file = re.match(r"# (\w+\.py)\n", block)
         if file:  # a block that names its file is that file
-            (tmp_path / file.group(1)).write_text(block, encoding="utf-8")
+            (folder / file.group(1)).write_text(block, encoding="utf-8")
         else:
             source += block
-    done = subprocess.run(  # with -c, as at a prompt: processes that a pool starts do not run it again
-        [sys.executable, "-c", source], cwd=tmp_path, capture_output=True, text=True, timeout=1800,
-        env=os.environ | {"MPLBACKEND": "agg", "BROWSER": "true"},
-    )  # fmt: skip
+    # with -c, as at a prompt: processes that a pool starts do not run it again
+    if name in LONG:
+        done = request.getfixturevalue("run_warm")(["-c", source], folder, tmp_path)
+    else:
+        done = subprocess.run(
+            [sys.executable, "-c", source], cwd=folder, capture_output=True, text=True, timeout=1800,
+            env=os.environ | {"MPLBACKEND": "agg", "BROWSER": "true"},
+        )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
+
+
+def calls(text):
+    """Yield what a program calls: the last part of its name, and the names of its keyword arguments."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call):
+            yield ast.unparse(node.func).rpartition(".")[2], frozenset(keyword.arg for keyword in node.keywords)
+
+
+@pytest.mark.parametrize("name", OF_EXAMPLES)
+def test_a_page_calls_what_its_examples_call(name):
+    """Each call of a page is one of its examples, with no argument's name that it does not have there."""
+    texts = [(ROOT / "examples" / f"{example}.py").read_text(encoding="utf-8") for example in OF_EXAMPLES[name]]
+    made = [call for text in texts for call in calls(text)]
+    unmade = [
+        (called, sorted(words))
+        for called, words in calls("".join(blocks(PAGES[name])))
+        if not any(called == other and words <= others for other, others in made)
+    ]
+    assert not unmade
 
 
 def test_few_blocks_are_not_run():

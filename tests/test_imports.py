@@ -3,11 +3,9 @@
 import ast
 import re
 from functools import cache
-from pathlib import Path
 
-import nuno
+from package_sources import PACKAGE, docstrings, identifiers, nodes_of
 
-PACKAGE = Path(nuno.__file__).parent
 DOOR = {"__init__", "__main__", "errors", "materials", "validation"}
 # From the bottom up: a folder imports from those before it, and from itself.
 LAYERS = (
@@ -29,13 +27,13 @@ REPLACED = {
 
 @cache
 def modules():
-    """Return each module's name below ``nuno`` and its tree."""
+    """Return each module's name below ``nuno`` and its file."""
     found = []
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
         if parts[-1] == "__init__" and len(parts) > 1:
             parts.pop()
-        found.append((".".join(parts), ast.parse(path.read_text(encoding="utf-8"))))
+        found.append((".".join(parts), path))
     return found
 
 
@@ -45,13 +43,13 @@ def layer_of(module):
     return ".".join(parts[:2]) if parts[0] == "contact" and len(parts) > 1 else parts[0]
 
 
-def imports_of(tree, names):
+def imports_of(path, names):
     """Yield the modules that run-time statements import; those for type checkers alone do not count."""
     aside = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+    for node in nodes_of(path):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             aside.update(id(inner) for inner in ast.walk(node))
-    for node in ast.walk(tree):
+    for node in nodes_of(path):
         if (
             isinstance(node, ast.ImportFrom)
             and node.module
@@ -68,7 +66,7 @@ def imports_of(tree, names):
 def edges():
     """Return which module imports which, by name below ``nuno``."""
     found = dict(modules())
-    return {name: set(imports_of(tree, found)) - {name} for name, tree in found.items()}
+    return {name: set(imports_of(path, found)) - {name} for name, path in found.items()}
 
 
 def test_folders_import_one_way():
@@ -118,13 +116,7 @@ def test_replaced_words_name_nothing():
     found = set()
     for path in sorted(PACKAGE.rglob("*.py")):
         place = path.relative_to(PACKAGE).as_posix()
-        names = {path.stem}
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            for field in ("id", "attr", "arg", "name"):
-                value = getattr(node, field, None)
-                if isinstance(value, str):
-                    names.add(value)
-        for name in names:
+        for name in identifiers(path):
             parts = {part.lower() for part in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z0-9]+", name)}
             found |= {f"{place}: {name}: {REPLACED[word]}" for word in parts & REPLACED.keys()}
     assert not sorted(found)
@@ -133,11 +125,5 @@ def test_replaced_words_name_nothing():
 def test_docstrings_begin_with_what_a_thing_is():
     """A docstring's first line names a thing or an action; it asks no question."""
     asking = re.compile(r"(What|How|Where|Whether|Which|When|Who|Whose|Return whether)\b")
-    found = [
-        f"{name}: {text}"
-        for name, tree in modules()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-        and asking.match(text := (ast.get_docstring(node) or "").partition("\n")[0])
-    ]
+    found = [f"{name}: {text}" for name, path in modules() for text in docstrings(path) if asking.match(text)]
     assert not found

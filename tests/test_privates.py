@@ -1,19 +1,17 @@
 """Private names: how often a module reaches into those of objects that another module declares."""
 
 import ast
-from pathlib import Path
 
-import nuno
+from package_sources import PACKAGE, nodes_of
 
-PACKAGE = Path(nuno.__file__).parent
 MOST = 536
 """So many are left, after branches that were counted apart; who makes them fewer lowers it, and nothing raises it."""
 
 
-def own_names(tree):
+def own_names(nodes):
     """Return the names that a module declares: functions, classes, fields, and what it sets on ``self``."""
     found = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
@@ -28,10 +26,10 @@ def is_own(node):
     return isinstance(node, ast.Name) and node.id in ("self", "cls")
 
 
-def reaches(tree):
+def reaches(nodes):
     """Yield line and text of each ``other._name`` whose name the module does not declare itself."""
-    own = own_names(tree)
-    for node in ast.walk(tree):
+    own = own_names(nodes)
+    for node in nodes:
         if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
             if not is_own(node.value) and node.attr not in own:
                 yield node.lineno, ast.unparse(node)
@@ -43,7 +41,7 @@ def test_modules_reach_into_few_privates():
         {
             f"{path.relative_to(PACKAGE).as_posix()}:{line} {text}"
             for path in PACKAGE.rglob("*.py")
-            for line, text in reaches(ast.parse(path.read_text(encoding="utf-8")))
+            for line, text in reaches(nodes_of(path))
         }
     )
     assert len(found) <= MOST, "\n".join(found)
@@ -52,4 +50,4 @@ def test_modules_reach_into_few_privates():
 def test_the_search_sees_what_it_looks_for():
     """A reach into another object counts; one's own names, those of the same module and dunders do not."""
     text = "class A:\n    def f(self, a, b):\n        self._x = a._x + b._y + self._z + b.__dict__\n"
-    assert [what for _, what in reaches(ast.parse(text))] == ["b._y"]
+    assert [what for _, what in reaches(list(ast.walk(ast.parse(text))))] == ["b._y"]

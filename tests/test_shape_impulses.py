@@ -202,7 +202,7 @@ def scenes(world):
     return (grip,)
 
 
-@pytest.mark.parametrize("build", [scenes, thrown])
+@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.long), thrown])
 @pytest.mark.parametrize("device", DEVICES)
 def test_asking_changes_no_bit(device, build):
     """Bodies that sum up go on, step by step or in one run, as they do without; so do those around them."""
@@ -247,7 +247,7 @@ def test_nothing_is_near():
     assert world.contacts(body).impulses == {}
 
 
-@pytest.mark.parametrize("build", [scenes, thrown])
+@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.long), thrown])
 def test_copies_sum_up_too(build, tmp_path):
     """Futures, restored worlds and files tell, after a frame, what the world does, to the bit; and nothing before."""
     world = nuno.World(device="cpu")

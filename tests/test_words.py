@@ -1,13 +1,9 @@
 """The field's words: none of those that this project once used instead names a thing, but in a plain sense."""
 
-import ast
 import re
-from functools import cache
-from pathlib import Path
 
-import nuno
+from package_sources import PACKAGE, docstrings, identifiers
 
-PACKAGE = Path(nuno.__file__).parent
 FOLDERS = (
     "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
     "numbers", "state", "constraints", "plans", "solvers", "topology", "rigid", "coupled", "bodies", "world",
@@ -74,21 +70,6 @@ ALLOWED = {
 }
 
 
-@cache
-def tree_of(path):
-    """Return a module's syntax tree."""
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def identifiers(path):
-    """Yield every identifier of a file, its own name among them."""
-    yield path.stem
-    for node in ast.walk(tree_of(path)):
-        for field in ("id", "attr", "arg", "name"):
-            if isinstance(value := getattr(node, field, None), str):
-                yield value
-
-
 def words_of(name):
     """Return the words of an identifier, in lower case."""
     return {part.lower() for part in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z0-9]+", name)}
@@ -101,7 +82,7 @@ def found(folders, replaced):
         f"{path.relative_to(PACKAGE).as_posix()}: {name}: {replaced[word]}"
         for folder in folders
         for path in sorted((PACKAGE / folder).rglob("*.py"))
-        for name in set(identifiers(path))
+        for name in identifiers(path)
         for word in words_of(name) & replaced.keys()
         if not allowed.fullmatch(name)
     )
@@ -148,8 +129,7 @@ def test_docstrings_begin_without_invented_words():
     lines = [
         f"{path.relative_to(PACKAGE).as_posix()}: {text}"
         for path in sorted(PACKAGE.rglob("*.py"))
-        for node in ast.walk(tree_of(path))
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-        and invented.search(text := (ast.get_docstring(node) or "").partition("\n")[0])
+        for text in docstrings(path)
+        if invented.search(text)
     ]
     assert not lines

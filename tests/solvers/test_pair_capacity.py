@@ -154,11 +154,13 @@ def test_every_plan_tells_that_its_lists_were_short(plan, scarce):
     assert not solver.missed.any()
 
 
-@pytest.mark.long
 def test_contacts_that_find_no_memory_are_told_of(monkeypatch, caplog, scarce):
-    """Where lists may not grow the run goes on, with one warning for the body and a flag."""
+    """Where lists may not grow the run goes on, with one warning for the body and a flag.
+
+    Of 12 cells, as finer cloth whose contacts are passed over crumples so that looking for them takes half a minute.
+    """
     monkeypatch.setattr(pair_capacity, "MAX_LIST_BYTES", 1.0e4)
-    world = folded("cpu", worlds=3)
+    world = folded("cpu", cells=12, worlds=3)
     cloth = world.find("cloth")
     assert not np.any(cloth.missed_contacts)
     with caplog.at_level(logging.WARNING, "nuno"):

@@ -10,12 +10,39 @@ from typing import Any
 
 import warp as wp
 
+from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.state.cloth_state import Settings
 
 PIECES = 12
 """Launches of a group of lanes in a run, between which threads may change groups."""
 
 _threads: ThreadPoolExecutor | None = None
+
+
+def launch_groups(
+    launches: RecordedLaunches, kernel: Any, before: list[Any], shapes: Any, groups: int, run: Settings, substeps: int
+) -> None:
+    """Run a kernel over every group of lanes.
+
+    A group by itself is a recorded launch: bodies that go together launch it at every substep.
+
+    Args:
+        launches: Where it is recorded.
+        kernel: Which; its arguments are ``before``, settings, ``shapes``, a group and a number of substeps.
+        before: Its first arguments.
+        shapes: What the bodies may touch.
+        groups: How many there are.
+        run: Settings of the run.
+        substeps: Its length.
+    """
+    if groups == 1:
+        launches.launch(kernel, 1, [*before, run, shapes, 0, substeps])
+        return
+
+    def launch(group: int, piece: Settings, count: int) -> None:
+        wp.launch(kernel, dim=1, inputs=[*before, piece, shapes, group, count], device="cpu")
+
+    run_groups(launch, kernel.module, groups, run, substeps)
 
 
 def run_groups(
@@ -33,9 +60,6 @@ def run_groups(
         run: Settings of the run.
         substeps: Its length.
     """
-    if groups == 1:
-        launch(0, run, substeps)
-        return
     wp.load_module(module, device="cpu")  # here, for every thread would compile it for itself
     pieces = [run] if substeps < 2 * PIECES else [_from(run, k * substeps // PIECES) for k in range(PIECES)]
     ends = [piece.first - run.first for piece in pieces[1:]] + [substeps]

@@ -30,7 +30,7 @@ from nuno.plans.cloth_worlds import (
     run_simd,
     run_worlds,
 )
-from nuno.plans.cpu_groups import run_groups
+from nuno.plans.cpu_groups import launch_groups
 from nuno.plans.group_figures import SHARED_FIGURES
 from nuno.plans.group_kernels import THREADS, run_double_grid, run_grid
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
@@ -101,12 +101,7 @@ class ClothLaunches(ParticleSolver):
             kernels = (run_lanes, run_double_lanes) if self.lanes > 1 else (run_worlds, run_double_worlds)
             kernel = kernels[doubles is not None]
             before = [*states, self.device_topology, self._size]
-
-            def launch(group: int, piece: Settings, count: int) -> None:
-                inputs = [*before, piece, self.shapes, group, count]
-                wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
-
-            run_groups(launch, kernel.module, self.group_count, run, substeps)
+            launch_groups(self._launches, kernel, before, self.shapes, self.group_count, run, substeps)
 
     def _launch_blocks(self, run: Settings, substeps: int, doubles: Any) -> None:
         """Launch a block for each world and each that helps, or as many as there is room for, which take turns."""

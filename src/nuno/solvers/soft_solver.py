@@ -13,7 +13,7 @@ from nuno.constraints.tetrahedron import COLUMNS
 from nuno.contact.particle.feature_lists import ROUND
 from nuno.contact.particle.feature_queue import QUEUE, ROOM
 from nuno.numbers.lanes import LANES, lane, lane_int
-from nuno.plans.cpu_groups import run_groups
+from nuno.plans.cpu_groups import launch_groups
 from nuno.plans.group_figures import SHARED_FIGURES
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
@@ -265,12 +265,7 @@ class SoftSolver(ParticleSolver):
             lanes, worlds = (run_soft_lanes, run_soft_double_lanes), (run_soft_worlds, run_soft_double_worlds)
             kernel = (lanes if self.lanes > 1 else worlds)[doubles is not None]
             before = [*states, self.device_topology, self._surface, self._size]
-
-            def launch(group: int, piece: Settings, count: int) -> None:
-                inputs = [*before, piece, self.shapes, group, count]
-                wp.launch(kernel, dim=1, inputs=inputs, device=self.device)
-
-            run_groups(launch, kernel.module, self.group_count, run, substeps)
+            launch_groups(self._launches, kernel, before, self.shapes, self.group_count, run, substeps)
 
     def _block_groups(self) -> tuple[int, int]:
         """Return how many worlds block groups go through at once, and the blocks of each."""
