@@ -19,8 +19,10 @@ from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.estimate.mask_threshold import cut, images_of, is_real
+from nuno.numbers.cpu_compiler import compile_quickly
 
 wp.set_module_options({"enable_backward": False})
+compile_quickly(__name__)
 
 SCORES = ("eq1", "iou", "chamfer")
 DISTANCE_STEPS = 1024  # a pixel; contours are a few thousand pixels, so sums stay far below 2**63

@@ -1,0 +1,24 @@
+"""How Warp's compiler for the CPU is told to compile Nuno's kernels: sooner, with the same bits, to as fast a run.
+
+Warp asks it to inline functions of any size, for which kernels as long as a substep take half as long again to compile,
+and are no faster (docs/reports/profiles.md).
+"""
+
+import warp as wp
+
+RAISED = ("-mllvm=-inline-", "-mllvm=-slp-")
+"""Beginnings of Warp's flags that are left out. Options of LLVM's (``-mllvm``) are the process's: a module that has
+others than one that is being compiled waits for it, so that an estimate's modules must all have the same."""
+
+
+def compile_quickly(*modules: str) -> None:
+    """Set the compiler's flags of Warp modules for the CPU: those of Warp's configuration, but what takes long.
+
+    Args:
+        modules: Their names. They may be declared later.
+    """
+    flags = "-march=native" if wp.config.cpu_compiler_flags is None else wp.config.cpu_compiler_flags
+    for name in modules:
+        wp.get_module(name).options["cpu_compiler_flags"] = " ".join(
+            flag for flag in flags.split() if not flag.startswith(RAISED)
+        )
