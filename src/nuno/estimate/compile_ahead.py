@@ -46,9 +46,8 @@ def compile_ahead(device: str) -> Callable[[], None]:
         load_ahead(((part, None) for part in parts), device, THREADS)
     else:
         parts.append(pack.find_broken.module)
-        batches = [
-            (kernel.module, block) for kernel, block in BATCHES if not is_cached(f"{kernel.module.name}_*", "meta")
-        ]
+        every = [(kernel.module, block) for kernel, block in BATCHES]
+        batches = [(each, block) for each, block in every if not is_cached(f"{each.name}_*", "ptx", "cubin")]
         if batches:
             log.warning(
                 "compiling the kernels of %s beside the estimate, for about a minute: they are kept for later runs",

@@ -33,7 +33,6 @@ from nuno.camera.image_region import Region
 from nuno.camera.rectangle import ClothRectangle
 from nuno.numbers.cpu_compiler import compile_quickly
 
-wp.set_module_options({"enable_backward": False})
 compile_quickly(__name__)
 
 SCALE = 0.25

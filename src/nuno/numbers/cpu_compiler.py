@@ -12,13 +12,13 @@ others than one that is being compiled waits for it, so that an estimate's modul
 
 
 def compile_quickly(*modules: str) -> None:
-    """Set the compiler's flags of Warp modules for the CPU: those of Warp's configuration, but what takes long.
+    """Leave out adjoints of Warp modules, and of the compiler's flags in Warp's configuration what takes long.
 
     Args:
         modules: Their names. They may be declared later.
     """
     flags = "-march=native" if wp.config.cpu_compiler_flags is None else wp.config.cpu_compiler_flags
     for name in modules:
-        wp.get_module(name).options["cpu_compiler_flags"] = " ".join(
-            flag for flag in flags.split() if not flag.startswith(RAISED)
-        )
+        options = wp.get_module(name).options
+        options["enable_backward"] = False
+        options["cpu_compiler_flags"] = " ".join(flag for flag in flags.split() if not flag.startswith(RAISED))
