@@ -30,7 +30,8 @@ def load_ahead(modules: Iterable[tuple[Any, int | None]], device: str, threads: 
     wp.init()  # once, before threads do
     pool = ThreadPoolExecutor(threads, thread_name_prefix="nuno-compile")
     for module, block in modules:
-        key, options = (module.name, device, block), {} if block is None else {"block_dim": block}
+        key = (module.name, device, block)
+        options: dict[str, Any] = {} if block is None else {"block_dim": block}
         if key not in _loads or _loads[key].done():
             _loads[key] = pool.submit(wp.load_module, module, device, **options)
     pool.shutdown(wait=False)

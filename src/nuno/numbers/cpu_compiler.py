@@ -1,8 +1,10 @@
-"""How Warp's compiler for the CPU is told to compile Nuno's kernels: sooner, with the same bits, to as fast a run.
+"""Flags of Warp's compiler for the CPU, by which Nuno's kernels compile sooner, with the same bits.
 
 Warp asks it to inline functions of any size, for which kernels as long as a substep take half as long again to compile,
-and are no faster (docs/reports/profiles.md).
+and run at most a twentieth faster (docs/reports/profiles.md).
 """
+
+from typing import Any
 
 import warp as wp
 
@@ -19,6 +21,6 @@ def compile_quickly(*modules: str) -> None:
     """
     flags = "-march=native" if wp.config.cpu_compiler_flags is None else wp.config.cpu_compiler_flags
     for name in modules:
-        options = wp.get_module(name).options
+        options: dict[str, Any] = wp.get_module(name).options
         options["enable_backward"] = False
         options["cpu_compiler_flags"] = " ".join(flag for flag in flags.split() if not flag.startswith(RAISED))
