@@ -72,7 +72,7 @@ def test_none_waits_for_another_by_its_flags(asked):
     compile_ahead.compile_ahead("cpu")()
     flags = {wp.get_module(name).options["cpu_compiler_flags"] for name, _ in asked}
     assert len(asked) == 6 and len(flags) == 1
-    assert "-mllvm=-inline" not in flags.pop()
+    assert flags.pop().count("-mllvm=") == 1  # none of Warp's
 
 
 @pytest.mark.parametrize("cached", [False, True])
