@@ -1,5 +1,7 @@
 """Kernels compiled ahead: all that an estimate launches on the CPU, and what goes wrong comes to light."""
 
+import threading
+
 import numpy as np
 import pytest
 import warp as wp
@@ -13,20 +15,25 @@ from nuno.estimate.futures import imagine_picks
 from nuno.estimate.hypotheses import HYPOTHESES, Discretisation
 from nuno.estimate.pick_sight import score_futures
 from nuno.estimate.similarity import Silhouette
+from nuno.kernels import compile_watch
+from nuno.kernels.module_loads import wait_for_load
+from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS
+
+BATCHES = (("nuno.plans.run_blocks_shared", FEW_THREADS), ("nuno.plans.run_blocks_many", MANY_THREADS))
 
 
 @pytest.fixture
 def asked(monkeypatch):
     """The names of modules that were asked for, instead of loading them."""
     names = []
-    monkeypatch.setattr(wp, "load_module", lambda module, device: names.append(module.name))
+    monkeypatch.setattr(wp, "load_module", lambda module, device, **options: names.append((module.name, options)))
     return names
 
 
 def test_what_an_estimate_launches_is_asked_for(asked, monkeypatch):
     """Every kernel of a small batch that is imagined, drawn and scored is in a module that is compiled ahead."""
     compile_ahead.compile_ahead("cpu")()
-    ahead, launched, launch = set(asked), set(), wp.launch
+    ahead, launched, launch = {name for name, _ in asked}, set(), wp.launch
 
     def watch(kernel, *arguments, **options):
         launched.add(kernel.module.name)
@@ -51,7 +58,7 @@ def test_what_an_estimate_launches_is_asked_for(asked, monkeypatch):
 def test_what_goes_wrong_is_raised_by_the_wait(monkeypatch):
     """An error of the compiler is not lost on its thread."""
 
-    def fail(module, device):
+    def fail(module, device, **options):
         raise RuntimeError(f"no compiler for {module.name}")
 
     monkeypatch.setattr(wp, "load_module", fail)
@@ -60,7 +67,45 @@ def test_what_goes_wrong_is_raised_by_the_wait(monkeypatch):
         wait()
 
 
-def test_nothing_is_compiled_ahead_on_cuda(asked):
-    """What is compiled there depends on how many worlds there are."""
+def test_none_waits_for_another_by_its_flags(asked):
+    """LLVM's options are the process's: the modules that are compiled at once on the CPU have the same."""
+    compile_ahead.compile_ahead("cpu")()
+    flags = {wp.get_module(name).options["cpu_compiler_flags"] for name, _ in asked}
+    assert len(asked) == 6 and len(flags) == 1
+    assert flags.pop().count("-mllvm=") == 1  # none of Warp's
+
+
+@pytest.mark.parametrize("cached", [False, True])
+def test_both_sizes_of_batches_are_compiled_on_cuda(asked, monkeypatch, caplog, cached):
+    """By blocks as they are launched, told by name before anything waits; of what is in the cache nothing is loaded."""
+    monkeypatch.setattr(compile_ahead, "is_cached", lambda *_: cached)
     compile_ahead.compile_ahead("cuda:0")()
-    assert asked == []
+    for module, block in BATCHES:
+        wait_for_load(wp.get_module(module), "cuda:0", block)
+        assert ((module, {"block_dim": block}) in asked) != cached
+        assert (module in caplog.text) != cached
+    assert {"nuno.state.pack", "nuno.state.finite", raster.__name__} <= {name for name, _ in asked}
+    assert "nuno.plans.run_lanes" not in {name for name, _ in asked}
+
+
+def test_a_batch_waits_for_its_kernels(monkeypatch, caplog):
+    """The wait of an estimate ends without those of batches; a launch waits, and tells for what and how long."""
+    compiled = threading.Event()
+
+    def load(module, device, **options):
+        if module.name == BATCHES[1][0]:
+            assert compiled.wait(60.0)
+
+    monkeypatch.setattr(wp, "load_module", load)
+    monkeypatch.setattr(compile_ahead, "is_cached", lambda *_: False)
+    monkeypatch.setattr(compile_watch, "LOGGED_AFTER", 0.0)
+    compile_ahead.compile_ahead("cuda:0")()
+    caplog.clear()
+    threading.Timer(0.05, compiled.set).start()
+    module, block = BATCHES[1]
+    with compile_watch.compiling_watched():
+        stages = compile_watch.Stages("compile", "imagine")
+        wait_for_load(wp.get_module(module), "cuda:0", block)
+        stages.end("imagine")
+    assert compiled.is_set() and stages.seconds["compile"] > 0.0
+    assert len(caplog.messages) == 1 and module in caplog.text and "waited" in caplog.text

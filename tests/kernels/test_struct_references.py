@@ -1,4 +1,4 @@
-"""Structs by reference in CUDA's source, and the copies that have to stay."""
+"""Structs by reference in the source of kernels, and the copies that have to stay."""
 
 import ast
 import re
@@ -71,21 +71,21 @@ def test_what_changes_its_struct_has_a_copy(by_value, function, kept):
     function.__module__ = "nuno.tests"
     made = wp.Function(function, function.__name__, "nuno", module=wp.get_module(__name__))
     made.adj.build(None)
-    text = codegen.codegen_func(made.adj, "f", device="cuda", inline_hint=None)
-    head = text.partition("\n{")[0]
-    assert re.search(r"Holder_\w+ var_t" if kept else r"Holder_\w+& var_t", head)
-    assert "WP_FORCEINLINE" in head
+    for device in ("cpu", "cuda"):
+        head = codegen.codegen_func(made.adj, "f", device=device, inline_hint=None).partition("\n{")[0]
+        assert re.search(r"Holder_\w+ var_t" if kept else r"Holder_\w+& var_t", head)
+        assert ("WP_FORCEINLINE" in head) == (device == "cuda")
 
 
-def test_the_cpu_and_functions_of_others_are_left(by_value):
+def test_functions_of_others_are_left(by_value):
     """What is written for them is Warp's own."""
     before = codegen.codegen_func
     assert pass_structs_by_reference()
     made = wp.Function(_read, "_read", "other", module=wp.get_module(__name__))
     made.adj.build(None)
-    for module, device in (("other.things", "cuda"), ("nuno.things", "cpu")):
-        _read.__module__ = module
-        made.adj.func = _read
+    _read.__module__ = "other.things"
+    made.adj.func = _read
+    for device in ("cpu", "cuda"):
         assert codegen.codegen_func(made.adj, "f", device=device) == before(made.adj, "f", device=device)
 
 

@@ -10,8 +10,9 @@ import warp as wp
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region, View, view
 from nuno.camera.projection import SUBPIXELS, project
+from nuno.numbers.cpu_compiler import compile_quickly
 
-wp.set_module_options({"enable_backward": False})
+compile_quickly(__name__)
 
 _LOW_X, _LOW_Y, _HIGH_X, _HIGH_Y, _BEHIND = (wp.constant(i) for i in range(5))
 _NOTHING = (1 << 30, 1 << 30, -(1 << 30), -(1 << 30), 0)

@@ -32,8 +32,9 @@ import warp as wp
 from nuno.camera.image_region import Region, View
 from nuno.camera.projection import project
 from nuno.errors import InvalidInputError
+from nuno.numbers.cpu_compiler import compile_quickly
 
-wp.set_module_options({"enable_backward": False})
+compile_quickly(__name__)
 
 DEPTH_STEP = 1.0e-5  # [m]; 1 m of float32 depth has steps of 0.1 um, cloth and table are about 1 mm apart
 ID_BITS = 20

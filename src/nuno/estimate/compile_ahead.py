@@ -1,48 +1,63 @@
 """An estimate's kernels, compiled on other threads while the images are looked at.
 
-With an empty kernel cache most of the wait is for one of them, that of a batch in lanes; the others are compiled beside
-it. Warp's compiler does not hold Python's lock.
+With an empty kernel cache most of the wait is for one of them, that of a batch in lanes or by blocks; the others are
+compiled beside it.
 """
 
 from __future__ import annotations
 
+import logging
+import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import warp as wp
 
 from nuno.camera import extent, raster
 from nuno.estimate import pattern, similarity
+from nuno.kernels.kernel_cache import is_cached
+from nuno.kernels.module_loads import load_ahead, wait_for_load
+from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS, run_blocks_many, run_blocks_shared
 from nuno.plans.cloth_worlds import run_lanes
 from nuno.state import pack
 
+log = logging.getLogger(__name__)
+
 THREADS = 2
-"""The longest module takes longer than all others together."""
+"""On the CPU: the longest module takes longer than all others together."""
+BATCHES = ((run_blocks_shared, FEW_THREADS), (run_blocks_many, MANY_THREADS))
+"""On CUDA, of some and of many futures; each is compiled for most of a minute. A clear case has only some, a doubtful
+one has many later on."""
 
 
 def compile_ahead(device: str) -> Callable[[], None]:
     """Begin to load the kernels that an estimate launches, compiled where they are not in the cache.
-
-    On CUDA nothing is done: what is compiled there depends on how many worlds there are.
 
     Args:
         device: "cpu" or "cuda:0" ...
 
     Returns:
         A function that waits until all are there, and raises what went wrong. None of these kernels may be launched
-        before, for Warp would compile it once more.
+        before, for Warp would compile it once more. On CUDA it does not wait for those of batches: whoever launches
+        one does (`nuno.kernels.module_loads`).
     """
-    if device != "cpu":
-        return lambda: None
-    wp.init()  # once, before threads do
-    parts = (pack, extent, raster, similarity, pattern)
-    modules = [run_lanes.module, *(wp.get_module(part.__name__) for part in parts)]
-    pool = ThreadPoolExecutor(THREADS, thread_name_prefix="nuno-compile")
-    loading = [pool.submit(wp.load_module, module, device) for module in modules]
-    pool.shutdown(wait=False)
+    parts = [wp.get_module(part.__name__) for part in (pack, extent, raster, similarity, pattern)]
+    if device == "cpu":
+        parts.insert(0, run_lanes.module)
+        load_ahead(((part, None) for part in parts), device, THREADS)
+    else:
+        parts.append(pack.find_broken.module)
+        every = [(kernel.module, block) for kernel, block in BATCHES]
+        batches = [(each, block) for each, block in every if not is_cached(f"{each.name}_*", "ptx", "cubin")]
+        if batches:
+            log.warning(
+                "compiling the kernels of %s beside the estimate, for about a minute: they are kept for later runs",
+                " and ".join(module.name for module, _ in batches),
+            )
+        threads = max(2, len(os.sched_getaffinity(0)))
+        load_ahead([*batches, *((part, None) for part in parts)], device, threads)
 
     def wait() -> None:
-        for each in loading:
-            each.result()
+        for part in parts:
+            wait_for_load(part, device)
 
     return wait

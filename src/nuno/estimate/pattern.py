@@ -31,8 +31,9 @@ from nuno.camera import raster
 from nuno.camera.camera import Camera
 from nuno.camera.image_region import Region
 from nuno.camera.rectangle import ClothRectangle
+from nuno.numbers.cpu_compiler import compile_quickly
 
-wp.set_module_options({"enable_backward": False})
+compile_quickly(__name__)
 
 SCALE = 0.25
 """Patterns are compared at a quarter of the image's resolution: futures are not right to a pixel."""

@@ -12,7 +12,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.files.out_folder import check_out_folder
 from nuno.kernels.command_device import device_of_command
-from nuno.kernels.start_warp import start_warp
+from nuno.kernels.start_warp import importing_kernels, start_warp
 
 KERNELS = "nuno.plans.run_blocks_shared"
 """Of a batch of picks on CUDA, compiled for about a minute."""
@@ -49,7 +49,8 @@ def add_pick(commands: Any) -> argparse.ArgumentParser:
 
 def run_pick(options: argparse.Namespace) -> str:
     """Estimate where a cloth was picked, write the result, and return what to tell."""
-    from nuno.estimate.case import read_case
+    with importing_kernels():
+        from nuno.estimate.case import read_case
 
     parts = options.candidates.lower().split("x")
     if len(parts) != 2 or not all(part.isdecimal() for part in parts):

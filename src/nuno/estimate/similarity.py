@@ -5,8 +5,7 @@ so they are exact in order: the same bits for a world alone and anywhere in a ba
 """
 # ruff: noqa: UP018, RUF046  (in Warp int(0) is a variable, 0 a constant that loops cannot change)
 # Warp's kernels are Python to a type checker, but not with Python's types
-# mypy: disable-error-code="misc, index, attr-defined, operator, call-overload"
-# mypy: disable-error-code="assignment, arg-type, valid-type"
+# mypy: disable-error-code="misc, index, attr-defined, operator, call-overload, assignment, arg-type, valid-type"
 
 from collections.abc import Callable
 from typing import Any
@@ -19,8 +18,9 @@ from nuno.camera.image_region import Region
 from nuno.camera.raster import MASK_BACKGROUND
 from nuno.errors import InvalidInputError, UnknownNameError
 from nuno.estimate.mask_threshold import cut, images_of, is_real
+from nuno.numbers.cpu_compiler import compile_quickly
 
-wp.set_module_options({"enable_backward": False})
+compile_quickly(__name__)
 
 SCORES = ("eq1", "iou", "chamfer")
 DISTANCE_STEPS = 1024  # a pixel; contours are a few thousand pixels, so sums stay far below 2**63

@@ -71,6 +71,21 @@ def compiling_watched() -> Iterator[None]:
                 _watch = None
 
 
+def waited(module: str, seconds: float) -> None:
+    """Count seconds for which this thread waited for another that compiled a module, as those it compiles itself."""
+    if getattr(_here, "depth", 0) > 0:
+        _here.seconds = _compile_seconds() + seconds
+    if seconds > LOGGED_AFTER:
+        _tell(module, seconds)
+
+
+def _tell(module: str, seconds: float) -> None:
+    log.warning(
+        "waited %.1f s for the kernels of %s, which are kept for later runs; nuno compile makes them ahead",
+        seconds, module,
+    )  # fmt: skip
+
+
 def _compile_seconds() -> float:
     return float(getattr(_here, "seconds", 0.0))
 
@@ -98,10 +113,7 @@ class _Watch:
             seconds = float(found[2]) / 1000.0
             _here.seconds = _compile_seconds() + seconds
             if seconds > LOGGED_AFTER and self.level > wp.LOG_INFO:
-                log.warning(
-                    "waited %.1f s for the kernels of %s, which are kept for later runs; nuno compile makes them ahead",
-                    seconds, found[1],
-                )  # fmt: skip
+                _tell(found[1], seconds)
         if self.level <= wp.LOG_INFO:
             self.logger.info(message)
 

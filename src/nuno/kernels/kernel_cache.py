@@ -53,6 +53,7 @@ def compile_kernels(
             raise InvalidInputError(f"there is no module of kernels {unknown[0]!r} for {device}")
         chosen = [module for module in chosen if module.name in only]
     numbers = _architectures(arch) if device == "cuda" else ()
+    pass_structs_by_reference()
 
     def work(module: KernelModule) -> float:
         started = time.perf_counter()
@@ -116,7 +117,6 @@ def _compile_for_cuda(module: KernelModule, numbers: tuple[int, ...]) -> None:
     """Machine code of a module, for each size of blocks."""
     import warp as wp
 
-    pass_structs_by_reference()
     before = wp.get_module_options(module.module)["block_dim"]
     for block in module.blocks:
         wp.set_module_options({"block_dim": block}, module=module.module)

@@ -1,7 +1,8 @@
-"""Warp as commands start it: silent, for a command's output is its answer."""
+"""Warp as commands start it: silent, for a command's output is its answer; and soon."""
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import tempfile
@@ -16,6 +17,18 @@ def start_warp() -> None:
     wp.config.log_level = wp.LOG_ERROR
     with without_lines(b"Warp CUDA warning: Could not find or load"):  # most machines have no such driver
         wp.init()
+
+
+@contextmanager
+def importing_kernels() -> Iterator[None]:
+    """Let Python look for no garbage meanwhile, as it would hundreds of times: a sixth of what importing takes."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 @contextmanager

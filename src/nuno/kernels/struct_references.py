@@ -1,11 +1,12 @@
-"""Structs passed by reference to functions of Nuno's CUDA kernels, which Warp passes by value.
+"""Structs passed by reference to functions of Nuno's kernels, which Warp passes by value.
 
 The state of a world is a struct of some fifty array descriptors, 3 kB. Every call copies it, all calls are inlined, and
 the compiler's optimiser spends most of its time on taking the copies apart again: of `nuno.plans.run_blocks_shared`,
-125 s of CPU time by value and 57 s by reference, with the same instructions in the end. Warp has a public annotation
-for this (``wp.ref[T]``), but not for functions that are generic in the type, as most of Nuno's are. So the C++ text of
-a function's parameters is changed where Warp writes it, for CUDA alone (on the CPU nothing is gained), and only for
-functions of Nuno. A parameter that its function changes, as a whole or in a field, stays a copy.
+125 s of CPU time by value and 57 s by reference, with the same instructions in the end; of `nuno.plans.run_lanes` on
+the CPU a fifth. Warp has a public annotation for this (``wp.ref[T]``), but not for functions that are generic in the
+type, as most of Nuno's are. So the C++ text of a function's parameters is changed where Warp writes it, and only for
+functions of Nuno; for CUDA all of them are inlined by force as well, as its compiler would leave some apart and the
+state in memory then. A parameter that its function changes, as a whole or in a field, stays a copy.
 
 What is changed is private to Warp. Where a version of Warp has another form of it, nothing is changed and kernels take
 longer to compile; `tests/kernels/test_struct_references.py` says so.
@@ -28,10 +29,10 @@ def pass_structs_by_reference() -> bool:
         return True
 
     def codegen_func(adj: Any, *args: Any, **options: Any) -> str:
-        device = options.get("device", "cpu")
-        if device != "cuda" or not getattr(adj.func, "__module__", "").startswith("nuno."):
+        if not getattr(adj.func, "__module__", "").startswith("nuno."):
             return write(adj, *args, **options)
-        options["inline_hint"] = options.get("inline_hint") or "forceinline"
+        if options.get("device", "cpu") == "cuda":
+            options["inline_hint"] = options.get("inline_hint") or "forceinline"
         return _with_references(adj, write(adj, *args, **options))
 
     codegen_func.passes_structs_by_reference = True  # type: ignore[attr-defined]

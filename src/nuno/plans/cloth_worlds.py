@@ -5,6 +5,7 @@ A Warp module for each kernel, so that only the kind that is run is compiled.
 
 import warp as wp
 
+from nuno.numbers.cpu_compiler import compile_quickly
 from nuno.numbers.crew import crew_of
 from nuno.numbers.lanes import LANES
 from nuno.plans.simd_elements import SimdElements, by_sixteen
@@ -20,6 +21,9 @@ from nuno.state.cloth_state import (
     Topology,
     view,
 )
+
+for _name in ("worlds", "lanes", "simd", "double_worlds", "double_lanes", "double_simd"):
+    compile_quickly(f"nuno.plans.run_{_name}")
 
 
 @wp.kernel(enable_backward=False, module="nuno.plans.run_worlds")

@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.numbers.cpu_compiler import compile_quickly
 from nuno.numbers.crew import crew_of
 from nuno.numbers.lanes import LANES
 from nuno.plans.simd_elements import as_lanes, by_sixteen
@@ -23,6 +24,9 @@ from nuno.state.soft_state import (
     Tetrahedra,
     view,
 )
+
+for _name in ("worlds", "lanes", "simd", "double_worlds", "double_lanes", "double_simd"):
+    compile_quickly(f"nuno.plans.run_soft_{_name}")
 
 
 @wp.func

@@ -8,6 +8,7 @@ import warp as wp
 
 from nuno.constraints.compliances import Compliances
 from nuno.contact.self.group_search import make_lists
+from nuno.kernels.module_loads import wait_for_load
 from nuno.plans.block_plan import (
     FEW_FRAMES,
     FEW_THREADS,
@@ -123,6 +124,7 @@ class ClothLaunches(ParticleSolver):
         if shared or queued:
             state.work_counts.zero_()
         blocks += state.spare_blocks if shared else 0
+        wait_for_load(kernel.module, self.device, threads)
         wp.launch(kernel, dim=blocks * threads, inputs=inputs, device=self.device, block_dim=threads)
 
     def _block_kernel(self, doubles: bool) -> Any:

@@ -5,9 +5,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from nuno.numbers.cpu_compiler import compile_quickly
 from nuno.numbers.doubles import add, at, double_lane, to_float  # noqa: F401 (add: the operator)
 from nuno.numbers.lanes import LANES, lane
 from nuno.state.cloth_state import CLOCK, NOTES, ORIGIN, SCALARS
+
+compile_quickly(__name__)
 
 
 @wp.kernel(enable_backward=False)

@@ -29,6 +29,7 @@ def found_device(name: str) -> str:
         InvalidInputError: there is no such device here.
     """
     quiet_warp()
+    pass_structs_by_reference()
     if name == "cpu":
         return name
     import warp as wp
@@ -41,5 +42,4 @@ def found_device(name: str) -> str:
         valid = ", ".join(["cpu", *(f"cuda:{i}" for i in range(available))])
         raise InvalidInputError(f"there is no device {name!r} here; there are: {valid}")
     take_machine_code(f"cuda:{index}")
-    pass_structs_by_reference()
     return f"cuda:{index}"
