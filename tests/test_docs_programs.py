@@ -20,14 +20,12 @@ PAGES = {
 # pages whose programs take some three seconds of a core or more; `test_docs.py` looks for all names of all pages, and
 # runs the first program
 LONG = {
-    "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
-    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "tutorial",
-    "viewer", "wire", "worlds",
+    "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
+    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "teaching",
+    "tutorial", "viewer", "wire", "worlds",
 }  # fmt: skip
 # pages whose every call is made by examples, as a test below holds: long tests run the examples, slow ones these pages
-OF_EXAMPLES = {
-    "carrying": ("carry_mat", "lift_soft_cube"), "closed-loop": ("closed_loop",), "teaching": ("talos_fold",),
-}  # fmt: skip
+OF_EXAMPLES = {"carrying": ("carry_mat", "lift_soft_cube")}
 
 
 def blocks(page):
