@@ -13,7 +13,7 @@ MUTATIONS = (
     ("constraints", "constraints/compliances.py", "shares = np.repeat(density, per_face, axis=1) * areas / 3",
      "shares = np.repeat(density, per_face, axis=1) * areas / 2",
      "constraints/test_compliances.py physics/test_cloth_mesh.py"),
-    ("constraints", "constraints/compliances.py", "bend.append(np.sqrt(bend[0] * bend[1]))", "bend.append(bend[0])",
+    ("constraints", "constraints/compliances.py", "[*found, np.sqrt(found[0] * found[1])]", "[*found, found[0]]",
      "constraints/test_compliances.py physics/test_bending.py"),
     ("constraints", "constraints/damping.py",
      "    rate = twist_of(velocity(t, a), velocity(t, b), velocity(t, c), velocity(t, d))",

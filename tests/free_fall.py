@@ -67,9 +67,9 @@ class FreeFall:
         """It has no lists."""
         return False
 
-    def positions(self):
-        """(worlds, n, 3)."""
-        return self.x.copy()
+    def positions(self, some=None):
+        """(worlds, n, 3), of all particles or of ``some``, (worlds, n)."""
+        return self.x.copy() if some is None else np.take_along_axis(self.x, some[..., None], axis=1)
 
     def velocities(self):
         """(worlds, n, 3)."""

@@ -260,12 +260,12 @@ def test_copies_sum_up_too(build, tmp_path):
     saved, futures, other, read = world.save(path), world.imagine(3), nuno.World(device="cpu"), nuno.World(device="cpu")
     other.restore(saved)
     read.restore(path)
-    world.run(0.1)
+    world.run(0.15)
     told = {name: world.contacts(name).impulses for name in names}
     assert all(told.values())
     for copy in (other, read, futures):
         assert all(copy.contacts(name).impulses == {} for name in names)
-        copy.run(0.1)
+        copy.run(0.15)
         for name in names:
             found = copy.contacts(name).impulses
             assert set(found) == set(told[name])
