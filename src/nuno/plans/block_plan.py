@@ -36,7 +36,7 @@ MANY_AT_ONCE = 3
 FEW_WORLDS = 1.2
 """Worlds for each multiprocessor up to which they are few: a block of many threads each that takes turns is sooner done
 with 1.2 worlds than three blocks of fewer threads beside each other are with one each."""
-FEW_FRAMES, MANY_FRAMES = 2, 15
+FEW_FRAMES, MANY_FRAMES = 2, 5
 """Frames that a world's turn takes where they are few and where they are many: so few that blocks end at about the same
 time, and so many that to read and write a world costs little beside them."""
 FEW_THREADS, MANY_THREADS = 512, 256
