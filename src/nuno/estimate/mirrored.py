@@ -6,7 +6,7 @@ through the hand along one of the cloth's sides, along the other, or in both, wh
 candidate that lies there. It is exactly such a one where the hand ends above the cloth's middle line. Elsewhere the
 hand would have gone another way, by twice its distance from that line. That matters to the part of the cloth that still
 lies on the table. It matters little to a cloth that hangs free, of which only the folds, a matter of chance, and the
-turn hang on the way. So these futures count where hardly any of the cloth lies, or where both ways are much alike.
+turn depend on the way. So these futures count where hardly any of the cloth lies, or where both ways are much alike.
 
 Then the points that hang alike are tried with the same guess, the one that fits best included, without a simulation.
 """
