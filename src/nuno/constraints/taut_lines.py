@@ -24,7 +24,8 @@ TURNED = wp.constant(2.0 / 9.0)
 """The share of a taut edge's force that turns: a wave is never turned over by more than 1/8, up to s = 4.5."""
 ONSET = wp.constant(0.5)
 """Half of the s from which on a share turns; it is all of `TURNED` from s = 5/4 on."""
-RISE = wp.constant(8.0 * 2.0 / 9.0)
+RISE = wp.constant(8.0 * TURNED)
+"""How fast the share rises from the onset on."""
 
 
 @wp.func
