@@ -1,9 +1,9 @@
 """How well and how fast picks are estimated: ``python benchmarks/picks.py --help``.
 
 Parts: ``cases`` (folders with truth.json, through images or masks), ``generated`` (Nuno's own engine at another
-resolution, through noisy masks), ``varied`` (the same engine or MuJoCo, through images that leave the ordinary setting:
-``varied_cases.py``, made on the spot), ``speed`` (one batch of 36 futures; many worlds), ``contact`` (penetration and
-crossings after every pick).
+resolution, through noisy masks), ``varied`` (the same engine, MuJoCo or Newton, through images that leave the ordinary
+setting: ``varied_cases.py``, made on the spot), ``speed`` (one batch of 36 futures; many worlds), ``contact``
+(penetration and crossings after every pick).
 Prints tables and, with --json, writes the numbers.
 """
 
@@ -245,7 +245,7 @@ def main() -> None:
     parser.add_argument("--cases", type=Path, default=Path("examples"), help="folder of case folders")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=1, help="varied cases: each has one of every kind")
-    parser.add_argument("--engine", choices=["nuno", "mujoco"], default="nuno", help="of varied cases")
+    parser.add_argument("--engine", choices=["nuno", "mujoco", "newton"], default="nuno", help="of varied cases")
     parser.add_argument("--seed", type=int, default=REPORTED_SEED)
     parser.add_argument("--limit", type=float, default=1e9, help="stop generated cases after so many seconds")
     parser.add_argument(

@@ -1,8 +1,9 @@
 """Picked cloths that leave the ordinary setting, one departure a case: ``python benchmarks/varied_cases.py DIR``.
 
-Nuno's own engine makes them, on a mesh and with a step that no estimator uses, or MuJoCo's flexible bodies (``--engine
-mujoco``, where that package is installed). Every case is a folder as `nuno.read_case` reads it, with a truth.json, so
-``python benchmarks/picks.py cases --cases DIR`` judges an estimator on them. The same seed makes the same cases.
+Nuno's own engine makes them, on a mesh and with a step that no estimator uses, or MuJoCo's flexible bodies or Newton's
+VBD (``--engine mujoco`` or ``newton``, where that package is installed). Every case is a folder as `nuno.read_case`
+reads it, with a truth.json, so ``python benchmarks/picks.py cases --cases DIR`` judges an estimator on them. The same
+seed makes the same cases.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import colorsys
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -207,14 +209,11 @@ def make_cases(rounds: int, seed: int, engine: str, device: str, kinds: tuple[st
     Args:
         rounds: How often.
         seed: Of everything that is drawn at random.
-        engine: "nuno" or "mujoco".
-        device: Where Nuno simulates.
+        engine: "nuno", "mujoco" or "newton".
+        device: Where Nuno or Newton simulates.
         kinds: What departs.
     """
-    if engine == "mujoco":
-        from mujoco_picks import simulate
-    else:
-        from nuno_picks import simulate
+    simulate = import_module(f"{engine}_picks").simulate
     for k in range(rounds):
         rng = np.random.default_rng((seed, k))
         together = [kind for kind in kinds if kind in ONE_SCENE]
@@ -289,7 +288,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--rounds", type=int, default=1, help=f"each makes {len(KINDS)} cases, one of a kind")
     parser.add_argument("--seed", type=int, default=8000)
-    parser.add_argument("--engine", choices=["nuno", "mujoco"], default="nuno")
+    parser.add_argument("--engine", choices=["nuno", "mujoco", "newton"], default="nuno")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--device", default="cpu")
     options = parser.parse_args()
