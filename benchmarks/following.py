@@ -1,8 +1,8 @@
 """How well a cloth is followed through images, beside physics without images and a tracker without physics.
 
-The truth is made by engines (``moving_cloths.py``) and seen as depth and masks with noise, or as masks alone, at 10 Hz.
-The follower begins 4 mm and 0.7 degrees off, with another material, mesh and substep, and knows the hands' paths with
-an error of 2 mm. "hidden": for a second a board that its world does not have hides a half of the cloth.
+The truth is made by engines (``moving_cloths.py``) and seen as depth and masks with noise, or as masks alone, at 10 Hz
+(``--rate``). The follower begins 4 mm and 0.7 degrees off, with another material, mesh and substep, and knows the
+hands' paths with an error of 2 mm. "hidden": for a second a board that its world does not have hides half of the cloth.
 
 Run: python benchmarks/following.py [--engines nuno mujoco newton] [--motions fold ...] [--device cuda:0] [--strip FILE]
 With ``--unseen 11 12 13`` (seeds) cloths, hands and the camera's place are drawn anew: sequences on which nothing was
@@ -28,7 +28,6 @@ from processes import in_processes
 import nuno
 
 OWN_CELLS = (16, 12)
-PERIOD = 0.1  # [s] between images
 HIDDEN = (1.3, 2.3)  # [s] when a board hides half of the cloth
 NOISE = 0.002  # [m] of the depth at one metre, growing with its square
 OFFSET, TURN, HAND_ERROR = (0.006, -0.005), 0.02, (0.0012, -0.0012, 0.001)
@@ -50,11 +49,11 @@ def camera_of(seed: int | None) -> nuno.Camera:
     return nuno.Camera.look_at(eye, (0.0, 0.0, TOP + 0.1), 0.85, width=320, height=240)
 
 
-def seen(engine: str, name: str, hidden: bool, seed: int | None = None) -> dict[str, Any]:
+def seen(engine: str, name: str, hidden: bool, seed: int | None = None, rate: int = 10) -> dict[str, Any]:
     """Return the truth of a sequence at the images' times, and the images: masks, depths [m] and what is hidden."""
     times, vertices = truth(engine, name, seed)
     hands_, camera = motion(name, seed), camera_of(seed)
-    every = round(PERIOD * (len(times) - 1) / times[-1])
+    every = round((len(times) - 1) / times[-1] / rate)
     times, vertices = times[::every], vertices[::every]
     world = nuno.World(device="cpu")
     world.add(nuno.box((1.2, 1.2, 0.04), name="table", position=(0, 0, TOP - 0.02)))
@@ -246,7 +245,7 @@ def followed(
     logging.disable(logging.WARNING)
     rows = []
     for hidden in (False, True):
-        case, shapes = seen(engine, name, hidden, seed), {}
+        case, shapes = seen(engine, name, hidden, seed, options.rate), {}
         towel = own_world(case["motion"], RADIUS[engine])[1]
         for tracker in options.trackers:
             found, spent = track(tracker, case, options.blind, options.device)
@@ -269,6 +268,7 @@ def main() -> None:
     parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
     parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
     parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
+    parser.add_argument("--rate", type=int, default=10, choices=(1, 2, 3, 5, 6, 10, 15, 30), help="images a second")
     parser.add_argument("--unseen", nargs="+", type=int, metavar="SEED", help="other cloths, hands and cameras")
     parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=Path)
@@ -277,7 +277,7 @@ def main() -> None:
     rows: list[dict[str, Any]] = []
     wanted = itertools.product(options.unseen or [None], options.engines, options.motions)
     parts = [(*which, options, k == 0) for k, which in enumerate(wanted)]
-    print("engine   motion  seed  hidden  tracker     mean  worst  while hidden [mm]   CPU s / image")
+    print("engine   motion  seed  hidden  tracker     mean  worst  while hidden [mm]   s / image")
     for found in in_processes(followed, parts, options.jobs):
         rows += found
         for row in found:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nuno.tracking.displacements import DisplacementField, rim_directions, vertex_normals
+from nuno.tracking.displacements import COHERENCE, REST, DisplacementField, Rim, vertex_normals
 
 
 def flat(columns=5, rows=4):
@@ -32,6 +32,21 @@ def test_what_one_vertex_tells_goes_to_all():
     assert found[:, 0].argmax() == 0 and 0.009 < found[-1, 0] < 0.01  # rest weighs 0.001 for each of 20 vertices
 
 
+def test_the_field_solves_its_equations():
+    """Of random information on a grid, each vertex's balance of what it knows, its neighbours and rest is zero."""
+    vertices, faces = flat(7, 6)
+    n, rng = len(vertices), np.random.default_rng(3)
+    roots = rng.normal(size=(n, 3, 3)) * (rng.random((n, 1, 1)) < 0.6)
+    information = roots @ roots.transpose(0, 2, 1)
+    residuals = (information @ rng.normal(size=(n, 3, 1)))[..., 0]
+    found = DisplacementField(n, faces).solve(information, residuals)
+    balance = (information @ found[..., None])[..., 0] + REST * found - residuals
+    for a, b in {tuple(sorted(side)) for face in faces for side in zip(face, np.roll(face, 1), strict=True)}:
+        balance[a] += COHERENCE * (found[a] - found[b])
+        balance[b] += COHERENCE * (found[b] - found[a])
+    np.testing.assert_allclose(balance, 0.0, atol=1e-12)  # doubles, of residuals of order 1
+
+
 def test_nothing_told_is_nothing_moved():
     """Without residuals the field is exactly zero."""
     vertices, faces = flat()
@@ -43,7 +58,7 @@ def test_normals_and_rims_of_a_flat_grid():
     """Normals are z; at sides the way inwards is across the side, at corners between both, within there is none."""
     vertices, faces = flat()
     np.testing.assert_allclose(vertex_normals(vertices, faces), np.tile([0.0, 0, 1], (len(vertices), 1)), atol=1e-12)
-    inwards = rim_directions(vertices, faces).reshape(4, 5, 3)
+    inwards = Rim(faces).inwards(vertices).reshape(4, 5, 3)
     np.testing.assert_allclose(inwards[0, 1:-1], np.tile([0.0, 1, 0], (3, 1)), atol=1e-12)
     np.testing.assert_allclose(inwards[1:-1, -1], np.tile([-1.0, 0, 0], (2, 1)), atol=1e-12)
     np.testing.assert_allclose(inwards[0, 0], np.array([1.0, 1, 0]) / np.sqrt(2.0), atol=1e-12)

@@ -93,7 +93,7 @@ def weigh(
         image: What it should show, by the cloth as it is.
         vertices: (n, 3) [m], of that cloth.
         normals: (n, 3), of its surface at the vertices.
-        inwards: (n, 3), from `displacements.rim_directions`.
+        inwards: (n, 3), from `displacements.Rim`.
         faces: (m, 3) int.
         spacing: Mean length of the cloth's edges [m].
         reach: Distance [m] at which a point is as likely an outlier as one of the nearest vertex's.
@@ -162,7 +162,7 @@ def _rims(
         image: The cloth as it would be seen.
         grid: The pixels.
         vertices: (n, 3) [m].
-        inwards: (n, 3), from `displacements.rim_directions`.
+        inwards: (n, 3), from `displacements.Rim`.
         near: Those that are seen.
         spacing: [m].
         outer: Whether only a rim against what is no cloth counts, not that of a layer before another.

@@ -14,7 +14,7 @@ from nuno.errors import BodyStateError, ImageError, InvalidInputError
 from nuno.materials import Cloth
 from nuno.tracking.cloth_colours import ClothColours
 from nuno.tracking.cloth_image import depth_of_others, draw_cloth
-from nuno.tracking.displacements import DisplacementField, rim_directions, vertex_normals
+from nuno.tracking.displacements import DisplacementField, Rim, vertex_normals
 from nuno.tracking.evidence import Evidence, weigh
 from nuno.tracking.followed import Followed
 from nuno.tracking.followed_futures import FollowedFutures
@@ -69,6 +69,7 @@ class Follower:
         self._futures = FollowedFutures(world, body, materials, futures, thorough)
         self._faces = np.asarray(body.shape.mesh()[1])
         self._field = DisplacementField(len(body.vertices), self._faces)
+        self._rim = Rim(self._faces)
         corners = np.asarray(body.shape.mesh()[0])[self._faces]
         self._spacing = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).mean())
         self._grids = [PixelGrid.of(camera, body.vertices, pixels) for camera in cameras]
@@ -268,7 +269,7 @@ class Follower:
             for k, image in enumerate(drawn):
                 weigh(
                     view, image, vertices[k], vertex_normals(vertices[k], self._faces),
-                    rim_directions(vertices[k], self._faces), self._faces, self._spacing, self._reach * self._wider,
+                    self._rim.inwards(vertices[k]), self._faces, self._spacing, self._reach * self._wider,
                     found[k],
                 )  # fmt: skip
         return found
