@@ -248,7 +248,8 @@ def followed(
         case, shapes = seen(engine, name, hidden, seed, options.rate), {}
         towel = own_world(case["motion"], RADIUS[engine])[1]
         for tracker in options.trackers:
-            found, spent = track(tracker, case, options.blind, options.device)
+            given = {} if tracker in ("futures", "cpd") else {"iterations": options.iterations}
+            found, spent = track(tracker, case, options.blind, options.device, **given)
             shapes[tracker] = found
             off = 1000.0 * errors(found, case, towel)
             covered = float(off[case["covered"]].mean()) if hidden else float("nan")
@@ -269,6 +270,7 @@ def main() -> None:
     parser.add_argument("--blind", action="store_true", help="the follower does not know of the hands")
     parser.add_argument("--device", default="cpu", help="of the follower; by the clock where it is no CPU")
     parser.add_argument("--rate", type=int, default=10, choices=(1, 2, 3, 5, 6, 10, 15, 30), help="images a second")
+    parser.add_argument("--iterations", type=int, default=2, help="of each image, of all but futures")
     parser.add_argument("--unseen", nargs="+", type=int, metavar="SEED", help="other cloths, hands and cameras")
     parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=Path)

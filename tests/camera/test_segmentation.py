@@ -104,6 +104,21 @@ def test_what_lies_beyond_the_table_is_no_cloth_on_it() -> None:
     assert overlap(segment_before(image, camera, table), cloth) > 0.96  # a pixel of the whole outline is 0.97
 
 
+@pytest.mark.parametrize("border", [0.03, 0.06, 0.09])
+@pytest.mark.parametrize("colours", [((120, 105, 200), (190, 195, 155)), ((200, 95, 55), (75, 95, 95))])
+def test_a_cloth_that_covers_most_of_the_table(colours: tuple, border: float) -> None:
+    """A cloth is found where it leaves a border of 3 to 9 cm of its table, and the cloth is most of what lies there."""
+    rng = np.random.default_rng(0)
+    table = Table(0.7, (0.4, 0.6), (0.0, 0.0))
+    camera = look_at(np.array([-1.0, 0.0, 1.3]), np.array([0.0, 0.0, 0.7]), 380.0)
+    margin = table_margin(table, plane_coordinates(camera, table.height))
+    image = np.where((margin > 0)[..., None], colours[1], (96, 92, 88))
+    image = np.where((margin > border)[..., None], colours[0], image).astype(float)
+    image = cv2.GaussianBlur(image, (0, 0), 0.5) + rng.normal(0.0, 3.0, image.shape)
+    found = segment_before(np.clip(np.round(image), 0, 255).astype(np.uint8), camera, table)
+    assert overlap(found, margin > border) > 0.97  # a pixel of the whole outline is 0.98
+
+
 def faint(difference: tuple[int, ...]) -> tuple:
     """A cloth of 5 cm checks, every other in the speckled table's colour, the others darker by a difference."""
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""A flat cloth on a table: a first look for the region, then its pixels."""
+"""A flat cloth on a table: a first look for the region."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from nuno.camera.camera import Camera
 from nuno.camera.regions import fill_holes, grow, shrink
-from nuno.camera.surface_colours import Illumination, colour_density, discriminant, guided_filter
+from nuno.camera.surface_colours import Illumination
 from nuno.camera.table import Table, plane_coordinates, table_margin
 from nuno.errors import ClothNotFoundError
 
-_STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture average out
+STEP = 4  # the first look is at blocks of 4 x 4 pixels: noise and fine texture average out
 _DIFFERENT = 4.0  # standard deviations of the table's own colour
 _CLOTH_SIDES = (0.08, 1.3)  # [m] what a cloth may measure across; less is a stain
 _SMALLEST = 20  # [blocks] of a region that may be a cloth
-_HELP = "a box around the cloth as a hint, or its mask, would help"
-_DOUBT = 1.0  # [nats] a bay in a flat cloth's outline is one only if the colours in it say so by more than this
-_RECTANGLE = 0.8  # share of the smallest rectangle around it that a flat cloth fills; a disc has 0.785
+_BORDERS = (0.08, 0.04, 0.02)  # [m] widths of a table's border that a large cloth may leave
+HELP = "a box around the cloth as a hint, or its mask, would help"
+RECTANGLE = 0.8  # share of the smallest rectangle around it that a flat cloth fills; a disc has 0.785
 
 
 def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -38,13 +38,13 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     Raises:
         ClothNotFoundError: there is none.
     """
-    h, w = rgb.shape[0] // _STEP, rgb.shape[1] // _STEP
-    small = cv2.resize(rgb[: h * _STEP, : w * _STEP], (w, h), interpolation=cv2.INTER_AREA).astype(np.float32)
-    xy = plane_coordinates(camera, table.height, _STEP)
+    h, w = rgb.shape[0] // STEP, rgb.shape[1] // STEP
+    small = cv2.resize(rgb[: h * STEP, : w * STEP], (w, h), interpolation=cv2.INTER_AREA).astype(np.float32)
+    xy = plane_coordinates(camera, table.height, STEP)
     box = None
     if hint is not None and len(hint) == 4:
         box = np.zeros((h, w), dtype=bool)
-        u0, v0, u1, v1 = np.round((hint + 0.5) / _STEP).astype(int)
+        u0, v0, u1, v1 = np.round((hint + 0.5) / STEP).astype(int)
         box[max(v0, 0) : max(v1, v0 + 1), max(u0, 0) : max(u1, u0 + 1)] = True
     if table.half_extents is not None:
         margin = table_margin(table, xy)
@@ -74,8 +74,11 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     failed = None
     try:
         blob = _choose(found, distance, pixel, xy if hint is None else None)
-        if _likeness(blob, xy) >= _RECTANGLE:
-            return blob, surface
+        if not _covers_rim(blob, surface):
+            if _likeness(blob, xy) >= RECTANGLE:
+                return blob, surface
+        else:  # it is the table's border that differs from a cloth which covers most of the table
+            failed = ClothNotFoundError("no cloth: what differs from the rest of the table is its border")
     except ClothNotFoundError as error:
         failed = error
     # A cloth much like the table may show by less difference over more blocks, and by its texture.
@@ -87,14 +90,51 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     with suppress(ClothNotFoundError):
         other, even = _surrounded(small, xy, hint)
         on = (other & surface).sum()
-        if failed is None or 0.9 * other.sum() < on < 0.9 * surface.sum():
+        like_a_cloth = failed is None or 0.9 * other.sum() < on < 0.9 * surface.sum()
+        if like_a_cloth and not _covers_rim(other, surface):
             return other, even
+    # A cloth may leave no more of the table than a narrow border.
+    if table.half_extents is not None:
+        with suppress(ClothNotFoundError):
+            return _unlike_border(small, margin, surface, xy, pixel), surface
     if failed is not None:
         # A cloth that hangs over the table's near border may fill most of the border's pixels.
         with suppress(ClothNotFoundError):
             return _unlike_far_rim(small, rim, surface, xy, camera, pixel), surface
-        raise ClothNotFoundError(f"{failed}; {_HELP}") from None
+        raise ClothNotFoundError(f"{failed}; {HELP}") from None
     return blob, surface
+
+
+def _covers_rim(blob: np.ndarray, surface: np.ndarray) -> bool:
+    """Return whether a region (h, w) bool goes all around a surface (h, w) bool, so that it is no cloth on it."""
+    ring = surface & ~shrink(surface, 1)
+    return bool((blob & ring).sum() > 0.9 * ring.sum())
+
+
+def _unlike_border(
+    small: np.ndarray, margin: np.ndarray, surface: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None
+) -> np.ndarray:
+    """Return a rectangle (h, w) bool that differs from a narrow border of the table.
+
+    Args:
+        small: (h, w, 3) float32, the image.
+        margin: (h, w) float, how far within the table a block is [m].
+        surface: (h, w) bool, the table's whole top.
+        xy: (h, w, 2) float, coordinates on the plane [m].
+        pixel: (2,) of a hint, or None.
+    """
+    for width in _BORDERS:
+        border = surface & (margin < width)
+        if border.sum() < 30:
+            continue
+        light = Illumination(small, border.astype(float), degree=1)
+        flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, small.shape[0]), slice(0, small.shape[1]))))
+        distance = _difference(cv2.blur(flat, (3, 3)), border, border)
+        with suppress(ClothNotFoundError):
+            blob = _choose(((distance > _DIFFERENT) & surface).astype(np.uint8), distance, pixel, xy)
+            if _likeness(blob, xy) >= RECTANGLE and not _covers_rim(blob, surface):
+                return blob
+    raise ClothNotFoundError("no cloth: no rectangle differs from the table's border")
 
 
 def _unlike_far_rim(
@@ -117,7 +157,7 @@ def _unlike_far_rim(
 
 def _texture(rgb: np.ndarray, h: int, w: int) -> np.ndarray:
     """(h, w) float32, the logarithm of the deviation of brightness within 9 x 9 px, at blocks of an image."""
-    grey = cv2.cvtColor(rgb[: h * _STEP, : w * _STEP], cv2.COLOR_RGB2GRAY).astype(np.float32)
+    grey = cv2.cvtColor(rgb[: h * STEP, : w * STEP], cv2.COLOR_RGB2GRAY).astype(np.float32)
     variance = cv2.blur(grey * grey, (9, 9)) - cv2.blur(grey, (9, 9)) ** 2
     return 0.5 * np.log(cv2.resize(np.maximum(variance, 0.0), (w, h), interpolation=cv2.INTER_AREA) + 1.0)
 
@@ -149,7 +189,7 @@ def _faint(
     blob = _choose(cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), distance, pixel, xy)
     around = inner & ~grow(blob, 3)
     even = around.sum() > 30 and np.quantile(distance[blob], 0.2) > np.quantile(distance[around], 0.95)
-    if not even or _likeness(blob, xy) < _RECTANGLE:
+    if not even or _likeness(blob, xy) < RECTANGLE:
         raise ClothNotFoundError("no cloth: nothing like a rectangle differs from the table")
     return blob
 
@@ -186,7 +226,7 @@ def _choose(found: np.ndarray, distance: np.ndarray, pixel: np.ndarray | None, x
     large = stats[:, cv2.CC_STAT_AREA] >= _SMALLEST
     if not large.any():
         raise ClothNotFoundError(
-            f"no cloth: nothing of at least {_SMALLEST * _STEP**2} pixels on the table differs from it"
+            f"no cloth: nothing of at least {_SMALLEST * STEP**2} pixels on the table differs from it"
         )
     if pixel is None:
         mass = np.bincount(labels.ravel(), weights=np.minimum(distance, 20).ravel(), minlength=count)
@@ -209,7 +249,7 @@ def _choose(found: np.ndarray, distance: np.ndarray, pixel: np.ndarray | None, x
 def _label_near(labels: np.ndarray, pixel: np.ndarray) -> int:
     """The label at a pixel of the full image or within 2 blocks of it, or 0."""
     rows, columns = np.nonzero(labels)
-    away = np.hypot(*(np.stack([columns, rows]) - ((pixel + 0.5) / _STEP - 0.5)[:, None]))
+    away = np.hypot(*(np.stack([columns, rows]) - ((pixel + 0.5) / STEP - 0.5)[:, None]))
     return int(labels[rows[away.argmin()], columns[away.argmin()]]) if len(away) and away.min() <= 2.0 else 0
 
 
@@ -240,7 +280,7 @@ def _surrounded(small: np.ndarray, xy: np.ndarray, pixel: np.ndarray | None) -> 
                 if blob.sum() < _SMALLEST or (pixel is not None and _label_near(blob.astype(int), pixel) == 0):
                     continue
                 size, likeness = _size_on_plane(contour[:, 0], xy)
-                if likeness < _RECTANGLE or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:
+                if likeness < RECTANGLE or not _CLOTH_SIDES[0] <= min(size) <= max(size) <= _CLOTH_SIDES[1]:
                     continue
                 if likeness * np.sqrt(blob.sum()) > best:
                     best, answer = (
@@ -269,98 +309,3 @@ def _size_on_plane(outline: np.ndarray, xy: np.ndarray) -> tuple[tuple[float, fl
     ground = (ground - ground.mean(axis=0)).astype(np.float32)
     _, size, _ = cv2.minAreaRect(ground)
     return (float(size[0]), float(size[1])), cv2.contourArea(ground) / max(size[0] * size[1], 1e-9)
-
-
-def refine(rgb: np.ndarray, blob: np.ndarray, surface: np.ndarray) -> np.ndarray:
-    """Decide pixel by pixel what a first look found.
-
-    Args:
-        rgb: (h, w, 3) uint8.
-        blob: (h // 4, w // 4) bool, the cloth roughly.
-        surface: (h // 4, w // 4) bool, where the table may be seen.
-
-    Returns:
-        (h, w) bool.
-
-    Raises:
-        ClothNotFoundError: nothing, or much less, is left on the closer look.
-    """
-    h, w = rgb.shape[:2]
-    full = (w // _STEP * _STEP, h // _STEP * _STEP)
-
-    def enlarge(small: np.ndarray) -> np.ndarray:
-        big = cv2.resize(small.astype(np.uint8), full, interpolation=cv2.INTER_NEAREST)
-        return np.pad(big, ((0, h - full[1]), (0, w - full[0])), mode="edge").astype(bool)
-
-    labels, table = enlarge(blob), enlarge(surface)
-    rows, columns = np.flatnonzero(labels.any(axis=1)), np.flatnonzero(labels.any(axis=0))
-    pad = 12 + int(0.15 * max(np.ptp(rows), np.ptp(columns)))
-    crop = (
-        slice(max(0, rows[0] - pad), min(h, rows[-1] + pad + 1)),
-        slice(max(0, columns[0] - pad), min(w, columns[-1] + pad + 1)),
-    )
-    image = rgb[crop].astype(np.float32)
-    labels, table = labels[crop], table[crop]
-    # What lies beyond the table's edge is no cloth on it, whatever its colour; the surface ends a block short of it.
-    on_table = grow(table, 4)
-    around = table & ~grow(labels, 8)
-    # Divide by the light on the table: then one colour is one colour from end to end.
-    step = image[::2, ::2]
-    light = Illumination(step, around[::2, ::2].astype(float), full_shape=image.shape[:2], degree=1)
-    field = light.field((slice(0, image.shape[0]), slice(0, image.shape[1])))
-    image = np.clip(image / field * light.level(), 0, 255)
-    inside = shrink(labels, 5) if shrink(labels, 5).sum() > 20 else labels
-    for attempt in range(3):
-        soft = cv2.GaussianBlur(image, (0, 0), 0.8)
-        ratio = np.log(colour_density(soft[inside], soft) / colour_density(soft[around], soft))
-        ratio = np.clip(ratio, -6, 6)
-        guide = discriminant(soft, inside, around)
-        score = guided_filter(ratio, guide, radius=4 if attempt < 2 else 3, epsilon=0.05)
-        labels = _without_bays(_near((score > 0) & on_table, labels), score)
-        inside, around = shrink(labels, 3), table & ~grow(labels, 4)
-        if inside.sum() < 20 or around.sum() < 20:
-            break
-    if labels.sum() < 0.5 * blob.sum() * _STEP**2:
-        raise ClothNotFoundError(f"no cloth: what looked like one dissolved on a closer look; {_HELP}")
-    mask = np.zeros((h, w), dtype=bool)
-    mask[crop] = labels
-    return mask
-
-
-def _without_bays(mask: np.ndarray, score: np.ndarray) -> np.ndarray:
-    """A mask (h, w) bool with the bays of its outline filled about which its score (h, w) is in doubt.
-
-    A flat rectangle has no bays: where a pattern meets the outline in the table's own colour, that decides.
-    """
-    width = int(0.06 * np.sqrt(mask.sum())) | 1
-    ellipse = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
-    solid = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, ellipse)  # without spurs, which would be spanned
-    contours, _ = cv2.findContours(solid, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    if not contours:
-        return mask
-    hull = np.zeros_like(solid)
-    cv2.fillConvexPoly(hull, cv2.convexHull(np.concatenate(contours)), 1)
-    if mask.sum() < _RECTANGLE * hull.sum():
-        return mask
-    # Bays of less than 5 px are the outline's own unevenness.
-    small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    bays = cv2.morphologyEx(np.where(mask, np.uint8(0), hull), cv2.MORPH_OPEN, small)
-    count, parts = cv2.connectedComponents(bays, connectivity=4)
-    mean = np.bincount(parts.ravel(), weights=score.ravel(), minlength=count) / np.bincount(parts.ravel())
-    closed = mean > -_DOUBT
-    closed[0] = False
-    if not closed.any():
-        return mask
-    filled = np.minimum(cv2.dilate(closed[parts].astype(np.uint8), small), hull)
-    return fill_holes(mask | filled.astype(bool))
-
-
-def _near(found: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """The part of what was found that overlaps the labels most, without holes and hairs."""
-    opened = cv2.morphologyEx(
-        found.astype(np.uint8), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    )
-    count, parts = cv2.connectedComponents(opened, connectivity=4)
-    overlap = np.bincount(parts[labels], minlength=count)
-    overlap[0] = 0
-    return fill_holes(parts == overlap.argmax()) if overlap.any() else np.zeros_like(labels)

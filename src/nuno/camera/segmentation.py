@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.camera.camera import Camera
-from nuno.camera.flat import first_look, refine
+from nuno.camera.flat import first_look
+from nuno.camera.flat_pixels import refine
 from nuno.camera.image import check_image, check_mask
 from nuno.camera.regions import fill_doubtful_holes, grow, parts_at, sharpen, shrink
 from nuno.camera.scene_without_cloth import compare
