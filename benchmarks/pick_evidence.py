@@ -26,13 +26,13 @@ from typing import Any
 
 import cv2
 import numpy as np
+from pick_stages import NAMES, stages_named
 
 WHAT_IFS = (("focal", 0.9), ("focal", 0.95), ("focal", 1.05), ("focal", 1.1), ("table", -0.03), ("table", 0.03))
 """Camera and table as they may be instead: a factor of the focal length, or [m] added to the table's height."""
 LOOKED_AT = 6  # candidates of a what-if
 ASKED = ("ordinary", "sideways", "focal_off", "table_off", "tilt_off", "hand_off")
 """Kinds of which what-ifs are asked."""
-EARLY = 2  # stages that were imagined on the finer mesh
 CHUNK = 14_000_000  # [bytes] of an npz file
 
 
@@ -81,16 +81,6 @@ def rounds(
             table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
         )  # fmt: skip
         yield f"{name}-{n}" if only else name, truth["kind"], arguments, truth["true_ij"], truth
-
-
-def fine_stages() -> tuple[Any, ...]:
-    """The stages as they were before: the early ones on the mesh of the later ones, and all ten weaves."""
-    from nuno.estimate.hypotheses import DISCRETISATIONS, hypotheses_with
-
-    early = tuple(replace(stage, cells=20, substeps=14) for stage in DISCRETISATIONS[:EARLY])
-    weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
-    later = tuple(replace(s, hypotheses=weaves) if s.cells == 25 else s for s in DISCRETISATIONS[EARLY:])
-    return early + later
 
 
 def judged(
@@ -225,14 +215,14 @@ def work(
         from nuno.estimate import pick_trials
 
         pick_trials.mirrored = lambda *_: None
-    sure = SURE if options.stop else 1.0
+    sure, stages = SURE if options.stop else 1.0, stages_named(options.stages)
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:
                 job = jobs.get(timeout=1.0)
                 for name, kind, arguments, true, truth in rounds(job, options.seed, device, tuple(options.kinds)):
-                    if options.fine:
-                        arguments["discretisations"] = fine_stages()
+                    if stages is not None:
+                        arguments["discretisations"] = stages
                     row = {"case": name, "round": job, "kind": kind, "device": device, "true": true}
                     row |= {"material": truth["material"], "at": time.time() - started}
                     try:
@@ -292,7 +282,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=50_000)
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
     parser.add_argument("--kinds", nargs="+", default=[], help="of varied_cases.py: each round is a scene with these")
-    parser.add_argument("--fine", action="store_true", help="early stages on the finer mesh, as before")
+    parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
     parser.add_argument("--no-reflections", action="store_true", help="take no future for one of another candidate")
     parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
     parser.add_argument("--stop", action="store_true", help="end the stages as users' estimates do, for true seconds")
