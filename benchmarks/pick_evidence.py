@@ -75,12 +75,27 @@ def rounds(
     kinds = ONE_SCENE if number % 4 == 1 else (*ONE_SCENE, OWN_SCENE[number // 4 % len(OWN_SCENE)])
     made = make_cases(1, seed + number, "nuno", device, only or kinds)
     for n, (name, told, truth, before, after) in enumerate(made):
-        arguments = dict(
-            before=before, after=after, camera=told["camera"], table_height=told["table_height_m"],
-            hand=told["hand_position_m"], table_half_extents=told["table_half_extents_xy_m"],
-            table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
-        )  # fmt: skip
+        arguments = told_of(told, before, after)
         yield f"{name}-{n}" if only else name, truth["kind"], arguments, truth["true_ij"], truth
+
+
+def from_folder(folder: Path, number: int) -> Iterator[tuple[str, str, dict[str, Any], list[int], dict[str, Any]]]:
+    """The same of one of the case folders that ``varied_cases.py`` wrote; nothing behind the last one."""
+    paths = sorted(path.parent for path in folder.glob("*/truth.json"))
+    for path in paths[number : number + 1]:
+        told, truth = (json.loads((path / name).read_text()) for name in ("input.json", "truth.json"))
+        images = (cv2.imread(str(path / told[f"image_{name}"])) for name in ("before", "after"))
+        before, after = (np.ascontiguousarray(image[..., ::-1]) for image in images)
+        yield path.name, truth["kind"], told_of(told, before, after), truth["true_ij"], truth
+
+
+def told_of(told: dict[str, Any], before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
+    """Arguments of `nuno.estimate_pick` by an input.json and two images."""
+    return dict(
+        before=before, after=after, camera=told["camera"], table_height=told["table_height_m"],
+        hand=told["hand_position_m"], table_half_extents=told["table_half_extents_xy_m"],
+        table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
+    )  # fmt: skip
 
 
 def judged(
@@ -215,12 +230,21 @@ def work(
         from nuno.estimate import pick_trials
 
         pick_trials.mirrored = lambda *_: None
+    if options.settle is not None:
+        from nuno.estimate import futures
+
+        futures.SETTLE_SECONDS = options.settle
     sure, stages = SURE if options.stop else 1.0, stages_named(options.stages)
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:
                 job = jobs.get(timeout=1.0)
-                for name, kind, arguments, true, truth in rounds(job, options.seed, device, tuple(options.kinds)):
+                made = (
+                    rounds(job, options.seed, device, tuple(options.kinds))
+                    if options.cases is None
+                    else from_folder(options.cases, job)
+                )
+                for name, kind, arguments, true, truth in made:
                     if stages is not None:
                         arguments["discretisations"] = stages
                     row = {"case": name, "round": job, "kind": kind, "device": device, "true": true}
@@ -282,6 +306,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=50_000)
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
     parser.add_argument("--kinds", nargs="+", default=[], help="of varied_cases.py: each round is a scene with these")
+    parser.add_argument("--cases", type=Path, help="a folder of case folders to take in place of generated ones")
+    parser.add_argument("--settle", type=float, help="[s] at most that cloths may take to come to rest")
     parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
     parser.add_argument("--no-reflections", action="store_true", help="take no future for one of another candidate")
     parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
