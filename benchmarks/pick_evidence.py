@@ -215,7 +215,7 @@ def work(
     """Judge rounds until there are no more or the time is up; the first process of a device compiles on all cores."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    if not first:
+    if not (first or options.share):
         pin(number)
     import warp as wp
 
@@ -258,7 +258,8 @@ def work(
                     lines.write(json.dumps(row) + "\n")
                     lines.flush()
                     if first and not ready.is_set():
-                        pin(number)
+                        if not options.share:
+                            pin(number)
                         ready.set()
                     if time.time() > deadline:
                         break
@@ -307,6 +308,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
     parser.add_argument("--kinds", nargs="+", default=[], help="of varied_cases.py: each round is a scene with these")
     parser.add_argument("--cases", type=Path, help="a folder of case folders to take in place of generated ones")
+    parser.add_argument("--share", action="store_true", help="let processes take all cores, for seconds by the clock")
     parser.add_argument("--settle", type=float, help="[s] at most that cloths may take to come to rest")
     parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
     parser.add_argument("--no-reflections", action="store_true", help="take no future for one of another candidate")
