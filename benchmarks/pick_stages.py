@@ -15,8 +15,9 @@ def stages_named(name: str) -> tuple[Discretisation, ...] | None:
 
     Args:
         name: "now"; "fine": the early stages on the mesh of the later ones, and all ten weaves, as once; "no-weaves":
-            without the stage of a finer weave; "lean": without it, with fewer candidates in the stages before, and
-            the last one on the early stages' mesh; "lean-12": the same with the early stages' mesh still coarser.
+            without the stage of a finer weave; "lean": without it, with fewer candidates in the stages before and
+            where hands are tried that went up first, and with the last stage on the early ones' mesh; "lean-12": the
+            same with the early stages' mesh still coarser.
     """
     early, later = DISCRETISATIONS[:3], DISCRETISATIONS[3:]
     if name == "now":
@@ -28,6 +29,7 @@ def stages_named(name: str) -> tuple[Discretisation, ...] | None:
     if name == "no-weaves":
         return early + tuple(stage for stage in later if stage.cells != 25)
     cells, substeps = (12, 8) if name == "lean-12" else (15, 10)
+    early = (*early[:2], replace(early[2], share_if_poor=0.98))
     first, second, _, last = later
     return (
         *(replace(stage, cells=cells, substeps=substeps) for stage in early),

@@ -20,7 +20,7 @@ CORNERS = np.array([(-0.3, -0.2, 0.0), (0.3, -0.2, 0.0), (0.3, 0.2, 0.0), (-0.3,
 RECTANGLE = ClothRectangle(CORNERS, 0.6, 0.4, np.zeros(3), 0.0, 0.0)
 STAGES = (
     Discretisation(20, 14, (Hypothesis(1e-4), Hypothesis(1e-3))),
-    Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, all_if_poor=True),
+    Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, share_if_poor=1.0),
     Discretisation(20, 14, (Hypothesis(1e-5), *(Hypothesis(k * 1e-5) for k in range(2, 11))), best=3, any_way=True),
 )
 ups: list[int] = []

@@ -51,8 +51,9 @@ class Discretisation:
         hypotheses: The hypotheses that are run on it.
         best: It looks at so many of the candidates that are best so far at most, and at no more than are plausible
             (`nuno.estimate.ranking.SHARE`); None is all.
-        all_if_poor: It looks at all candidates nevertheless where even the best future so far fits poorly
-            (`nuno.estimate.doubt.FAIRLY`) and the hand's way is not known.
+        share_if_poor: It looks at all candidates that together hold so much of the probability where even the best
+            future so far fits poorly (`nuno.estimate.doubt.FAIRLY`) and the hand's way is not known; 1 is all, None
+            at no more than otherwise.
         any_way: Where the hand's way is not known, as large a share of its guesses goes up first as that way is likely
             by what was looked at before.
     """
@@ -61,7 +62,7 @@ class Discretisation:
     substeps: int
     hypotheses: tuple[Hypothesis, ...]
     best: int | None = None
-    all_if_poor: bool = False
+    share_if_poor: float | None = None
     any_way: bool = False
 
     def with_up_first(self, share: float) -> Discretisation:
@@ -133,7 +134,7 @@ DISCRETISATIONS = (
     Discretisation(15, 10, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
     Discretisation(15, 10, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=16),
     Discretisation(
-        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, all_if_poor=True
+        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, share_if_poor=1.0
     ),
     Discretisation(
         20, 14,
