@@ -6,31 +6,30 @@ from dataclasses import replace
 
 from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation, hypotheses_with
 
-EARLY = 2  # stages that were imagined on the finer mesh before
-NAMES = ("now", "fine", "lean", "coarse")
+NAMES = ("now", "weaves", "fine", "coarse")
 
 
 def stages_named(name: str) -> tuple[Discretisation, ...] | None:
     """Return stages; None of those that there are.
 
     Args:
-        name: "now"; "fine": the early stages on the mesh of the later ones, and all ten weaves, as once; "lean":
-            without the stage of a finer weave, with fewer candidates in the stages before and where hands are tried
-            that went up first, and with the last stage on the early ones' mesh; "coarse": the same with all later
-            stages on the early ones' mesh, and those on a still coarser one.
+        name: "now"; "weaves": as once, with a stage of a finer, stiffer weave before the last one, more candidates in
+            those before, and the last one on the mesh of these; "fine": as before that, with the early stages on that
+            mesh too, and ten weaves; "coarse": as now with all later stages on the early ones' mesh, and those on a
+            still coarser one.
     """
     if name == "now":
         return None
+    first, second, third, fourth, fifth, last = DISCRETISATIONS
+    if name == "coarse":
+        early = (replace(stage, cells=12, substeps=8) for stage in (first, second, third))
+        return (*early, *(replace(stage, cells=15, substeps=10) for stage in (fourth, fifth, last)))
+    weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
     if name == "fine":
-        weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
-        fine = tuple(replace(stage, cells=20, substeps=14) for stage in DISCRETISATIONS[:EARLY])
-        return fine + tuple(replace(s, hypotheses=weaves) if s.cells == 25 else s for s in DISCRETISATIONS[EARLY:])
-    first, second, third, fourth, fifth, _, last = DISCRETISATIONS
-    early = (first, second, replace(third, share_if_poor=0.98))
-    later = (replace(fourth, best=8), replace(fifth, best=6), replace(last, cells=15, substeps=10))
-    if name == "lean":
-        return early + later
+        first, second = (replace(stage, cells=20, substeps=14) for stage in (first, second))
+    else:
+        weaves = weaves[:9]
     return (
-        *(replace(stage, cells=12, substeps=8) for stage in early),
-        *(replace(stage, cells=15, substeps=10) for stage in later),
-    )
+        first, second, replace(third, share_if_poor=1.0), replace(fourth, best=16), replace(fifth, best=8),
+        Discretisation(25, 20, weaves, best=5, any_way=True), replace(last, cells=20, substeps=14),
+    )  # fmt: skip
