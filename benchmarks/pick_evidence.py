@@ -315,6 +315,8 @@ def main() -> None:
     parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
     parser.add_argument("--stop", action="store_true", help="end the stages as users' estimates do, for true seconds")
     options = parser.parse_args()
+    if options.cases is not None and not any(options.cases.glob("*/truth.json")):
+        parser.error(f"no case folder with a truth.json in {options.cases}")
     started = time.time()
     parts = Path(tempfile.mkdtemp())
     options.folder.mkdir(parents=True, exist_ok=True)
