@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from generated_cases import HAND_RADIUS, REST_HEIGHT, displaced, looking_at
+from pick_stages import NAMES, stages_named
 from processes import in_processes
 
 from nuno import Cloth, Path, World, box, cloth_mesh, estimate_pick, garment, plane
@@ -130,13 +131,13 @@ def _scene(shape: str, rng: np.random.Generator, picks: int, device: str, layers
     return cases
 
 
-def judged(case: OutlineCase, device: str) -> dict[str, Any]:
+def judged(case: OutlineCase, device: str, stages: str) -> dict[str, Any]:
     """One case's line: how far the answer, the best of three and the nearest candidate are from the truth [m]."""
-    clock = time.process_time()
+    clock, others = time.process_time(), stages_named(stages)
     result = estimate_pick(
         None, None, camera=case.camera, table_height=case.table.height, table_half_extents=case.table.half_extents,
         table_centre=case.table.centre, hand=case.hand, before_mask=case.mask_before, after_mask=case.mask_after,
-        shape="outline", device=device, progress=False,
+        shape="outline", device=device, progress=False, **({} if others is None else {"discretisations": others}),
     )  # fmt: skip
     places = result.rectangle.world_positions(result.fractions)  # type: ignore[attr-defined]
     away = np.linalg.norm(places - case.picked, axis=1)[result.order]
@@ -147,9 +148,10 @@ def judged(case: OutlineCase, device: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def scene(shape: str, picks: int, seed: int, device: str, layers: int) -> list[dict[str, Any]]:
+def scene(shape: str, picks: int, seed: int, device: str, layers: int, stages: str) -> list[dict[str, Any]]:
     """The lines of a scene's cases."""
-    return [judged(case, device) | {"seed": seed} for case in generate((shape,), picks, seed, device, layers)]
+    made = generate((shape,), picks, seed, device, layers)
+    return [judged(case, device, stages) | {"seed": seed} for case in made]
 
 
 def main() -> None:
@@ -160,13 +162,14 @@ def main() -> None:
     parser.add_argument("--picks", type=int, default=1, help="of each scene")
     parser.add_argument("--seed", type=int, default=9000)
     parser.add_argument("--layers", type=int, default=1, choices=[1, 2], help="of garments that have two")
+    parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--jobs", type=int, default=1, help="processes, each on one core")
     parser.add_argument("--json", type=FilePath)
     options = parser.parse_args()
     rows: list[dict[str, Any]] = []
     parts = [
-        (shape, options.picks, options.seed + k, options.device, options.layers)
+        (shape, options.picks, options.seed + k, options.device, options.layers, options.stages)
         for k in range(options.scenes)
         for shape in options.shapes
     ]

@@ -26,13 +26,13 @@ from typing import Any
 
 import cv2
 import numpy as np
+from pick_stages import NAMES, stages_named
 
 WHAT_IFS = (("focal", 0.9), ("focal", 0.95), ("focal", 1.05), ("focal", 1.1), ("table", -0.03), ("table", 0.03))
 """Camera and table as they may be instead: a factor of the focal length, or [m] added to the table's height."""
 LOOKED_AT = 6  # candidates of a what-if
 ASKED = ("ordinary", "sideways", "focal_off", "table_off", "tilt_off", "hand_off")
 """Kinds of which what-ifs are asked."""
-EARLY = 2  # stages that were imagined on the finer mesh
 CHUNK = 14_000_000  # [bytes] of an npz file
 
 
@@ -75,22 +75,27 @@ def rounds(
     kinds = ONE_SCENE if number % 4 == 1 else (*ONE_SCENE, OWN_SCENE[number // 4 % len(OWN_SCENE)])
     made = make_cases(1, seed + number, "nuno", device, only or kinds)
     for n, (name, told, truth, before, after) in enumerate(made):
-        arguments = dict(
-            before=before, after=after, camera=told["camera"], table_height=told["table_height_m"],
-            hand=told["hand_position_m"], table_half_extents=told["table_half_extents_xy_m"],
-            table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
-        )  # fmt: skip
+        arguments = told_of(told, before, after)
         yield f"{name}-{n}" if only else name, truth["kind"], arguments, truth["true_ij"], truth
 
 
-def fine_stages() -> tuple[Any, ...]:
-    """The stages as they were before: the early ones on the mesh of the later ones, and all ten weaves."""
-    from nuno.estimate.hypotheses import DISCRETISATIONS, hypotheses_with
+def from_folder(folder: Path, number: int) -> Iterator[tuple[str, str, dict[str, Any], list[int], dict[str, Any]]]:
+    """The same of one of the case folders that ``varied_cases.py`` wrote; nothing behind the last one."""
+    paths = sorted(path.parent for path in folder.glob("*/truth.json"))
+    for path in paths[number : number + 1]:
+        told, truth = (json.loads((path / name).read_text()) for name in ("input.json", "truth.json"))
+        images = (cv2.imread(str(path / told[f"image_{name}"])) for name in ("before", "after"))
+        before, after = (np.ascontiguousarray(image[..., ::-1]) for image in images)
+        yield path.name, truth["kind"], told_of(told, before, after), truth["true_ij"], truth
 
-    early = tuple(replace(stage, cells=20, substeps=14) for stage in DISCRETISATIONS[:EARLY])
-    weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
-    later = tuple(replace(s, hypotheses=weaves) if s.cells == 25 else s for s in DISCRETISATIONS[EARLY:])
-    return early + later
+
+def told_of(told: dict[str, Any], before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
+    """Arguments of `nuno.estimate_pick` by an input.json and two images."""
+    return dict(
+        before=before, after=after, camera=told["camera"], table_height=told["table_height_m"],
+        hand=told["hand_position_m"], table_half_extents=told["table_half_extents_xy_m"],
+        table_centre=told["table_centre_xy_m"], table_thickness=told["table_thickness_m"],
+    )  # fmt: skip
 
 
 def judged(
@@ -210,7 +215,7 @@ def work(
     """Judge rounds until there are no more or the time is up; the first process of a device compiles on all cores."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    if not first:
+    if not (first or options.share):
         pin(number)
     import warp as wp
 
@@ -225,14 +230,23 @@ def work(
         from nuno.estimate import pick_trials
 
         pick_trials.mirrored = lambda *_: None
-    sure = SURE if options.stop else 1.0
+    if options.settle is not None:
+        from nuno.estimate import futures
+
+        futures.SETTLE_SECONDS = options.settle
+    sure, stages = SURE if options.stop else 1.0, stages_named(options.stages)
     with (folder / f"{number}.jsonl").open("w") as lines:
         while time.time() < deadline and not jobs.empty():
             try:
                 job = jobs.get(timeout=1.0)
-                for name, kind, arguments, true, truth in rounds(job, options.seed, device, tuple(options.kinds)):
-                    if options.fine:
-                        arguments["discretisations"] = fine_stages()
+                made = (
+                    rounds(job, options.seed, device, tuple(options.kinds))
+                    if options.cases is None
+                    else from_folder(options.cases, job)
+                )
+                for name, kind, arguments, true, truth in made:
+                    if stages is not None:
+                        arguments["discretisations"] = stages
                     row = {"case": name, "round": job, "kind": kind, "device": device, "true": true}
                     row |= {"material": truth["material"], "at": time.time() - started}
                     try:
@@ -244,7 +258,8 @@ def work(
                     lines.write(json.dumps(row) + "\n")
                     lines.flush()
                     if first and not ready.is_set():
-                        pin(number)
+                        if not options.share:
+                            pin(number)
                         ready.set()
                     if time.time() > deadline:
                         break
@@ -292,11 +307,16 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=50_000)
     parser.add_argument("--limit", type=float, default=420.0, help="[s] after which no case is begun")
     parser.add_argument("--kinds", nargs="+", default=[], help="of varied_cases.py: each round is a scene with these")
-    parser.add_argument("--fine", action="store_true", help="early stages on the finer mesh, as before")
+    parser.add_argument("--cases", type=Path, help="a folder of case folders to take in place of generated ones")
+    parser.add_argument("--share", action="store_true", help="let processes take all cores, for seconds by the clock")
+    parser.add_argument("--settle", type=float, help="[s] at most that cloths may take to come to rest")
+    parser.add_argument("--stages", choices=NAMES, default="now", help="of pick_stages.py")
     parser.add_argument("--no-reflections", action="store_true", help="take no future for one of another candidate")
     parser.add_argument("--what-ifs", action="store_true", help="ask also whether camera and table are as told")
     parser.add_argument("--stop", action="store_true", help="end the stages as users' estimates do, for true seconds")
     options = parser.parse_args()
+    if options.cases is not None and not any(options.cases.glob("*/truth.json")):
+        parser.error(f"no case folder with a truth.json in {options.cases}")
     started = time.time()
     parts = Path(tempfile.mkdtemp())
     options.folder.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,14 +21,16 @@ CORNERS = np.array([(-0.3, -0.2, 0.0), (0.3, -0.2, 0.0), (0.3, 0.2, 0.0), (-0.3,
 RECTANGLE = ClothRectangle(CORNERS, 0.6, 0.4, np.zeros(3), 0.0, 0.0)
 STAGES = (
     Discretisation(20, 14, (Hypothesis(1e-4), Hypothesis(1e-3))),
-    Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, all_if_poor=True),
+    Discretisation(20, 14, (Hypothesis(1e-4, up_first=True), Hypothesis(1e-3, up_first=True)), 3, share_if_poor=1.0),
     Discretisation(20, 14, (Hypothesis(1e-5), *(Hypothesis(k * 1e-5) for k in range(2, 11))), best=3, any_way=True),
 )
 ups: list[int] = []
 """How many guesses of each stage went up first in what was looked at last."""
 
 
-def looked_at(monkeypatch: pytest.MonkeyPatch, chamfer: float, **changes: Any) -> list[int]:
+def looked_at(
+    monkeypatch: pytest.MonkeyPatch, chamfer: float, stages: tuple[Discretisation, ...] = STAGES, **changes: Any
+) -> list[int]:
     """How many candidates of six each stage looks at, where all fit alike but for two, which are ``chamfer`` px off."""
     numbers: list[int] = []
     ups.clear()
@@ -49,7 +52,7 @@ def looked_at(monkeypatch: pytest.MonkeyPatch, chamfer: float, **changes: Any) -
     monkeypatch.setattr(pick_trials, "compare", compare)
     monkeypatch.setattr(pick_trials, "imagine_picks", imagine)
     monkeypatch.setattr(pick_trials, "mirrored", lambda *_: None)
-    given = settings(discretisations=STAGES, turns=(0.0,), learned=False, sideways=None, **changes)
+    given = settings(discretisations=stages, turns=(0.0,), learned=False, sideways=None, **changes)
     seen: Any = SimpleNamespace(warnings=())
     pick_trials.try_picks(given, RECTANGLE, lambda: seen, Stages("imagine", "see", "compile", "compare"))
     return numbers
@@ -59,6 +62,13 @@ def test_another_way_of_the_hand_is_tried_on_all_candidates_where_none_fits_well
     """Contours 1.5 px off cost 5 ln 2.5 + 1 = 5.6, those 6 px off 10.7: above 10 is poor; the next stage is as ever."""
     assert looked_at(monkeypatch, 1.5) == [6, 2, 2]
     assert looked_at(monkeypatch, 6.0) == [6, 6, 2]
+
+
+def test_where_none_fits_well_all_of_a_share_are_tried(monkeypatch):
+    """Beside the best two, four at 40 px are exp(-8.8 / 0.8) as likely where those are at 6 px, exp(-1) at 34 px."""
+    wide = (STAGES[0], replace(STAGES[1], share_if_poor=0.98), STAGES[2])
+    assert looked_at(monkeypatch, 6.0, stages=wide) == [6, 2, 2]
+    assert looked_at(monkeypatch, 34.0, stages=wide) == [6, 6, 3]
 
 
 def test_a_known_way_of_the_hand_is_no_guess(monkeypatch):

@@ -115,10 +115,11 @@ def test_a_ranking_is_settled_by_a_sure_candidate():
 
 
 def test_what_is_plausible_holds_most_of_the_probability():
-    """95 % of it, in two candidates at least and in no more than are asked for; other scores tell no probability."""
+    """95 % of it or another share, in two candidates at least, no more than asked for; other scores tell no shares."""
     flat = Ranked("log_evidence", np.log([0.3, 0.1, 0.48, 0.06, 0.06]), np.zeros(5))
     assert list(flat.plausible(9)) == [0, 1, 2, 3, 4]
     assert list(flat.plausible(3)) == [0, 1, 2]
+    assert list(flat.plausible(9, 0.7)) == [0, 2] and list(flat.plausible(9, 1.0)) == [0, 1, 2, 3, 4]
     steep = Ranked("log_evidence", np.log([0.25, 0.73, 0.01, 0.01]), np.zeros(4))
     assert list(steep.plausible(4)) == [0, 1]
     sure = Ranked("log_evidence", np.log([0.01, 0.98, 0.01]), np.zeros(3))

@@ -51,8 +51,9 @@ class Discretisation:
         hypotheses: The hypotheses that are run on it.
         best: It looks at so many of the candidates that are best so far at most, and at no more than are plausible
             (`nuno.estimate.ranking.SHARE`); None is all.
-        all_if_poor: It looks at all candidates nevertheless where even the best future so far fits poorly
-            (`nuno.estimate.doubt.FAIRLY`) and the hand's way is not known.
+        share_if_poor: It looks at all candidates that together hold so much of the probability where even the best
+            future so far fits poorly (`nuno.estimate.doubt.FAIRLY`) and the hand's way is not known; 1 is all, None
+            at no more than otherwise.
         any_way: Where the hand's way is not known, as large a share of its guesses goes up first as that way is likely
             by what was looked at before.
     """
@@ -61,7 +62,7 @@ class Discretisation:
     substeps: int
     hypotheses: tuple[Hypothesis, ...]
     best: int | None = None
-    all_if_poor: bool = False
+    share_if_poor: float | None = None
     any_way: bool = False
 
     def with_up_first(self, share: float) -> Discretisation:
@@ -126,19 +127,18 @@ _MISTAKES = tuple(
     for sign in (-1.0, 1.0)
 )
 
-_WEAVES = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))[:9]
 _LATER = SHEARING[::2] + _MISTAKES
 
 DISCRETISATIONS = (
     Discretisation(15, 10, (_firm(1e-4, 0.25), _firm(2e-3, 0.5), _loose(3e-5, 0.5))),
     Discretisation(15, 10, (_firm(3e-5, 0.25), _firm(5e-3, 0.3), _loose(1e-4, 0.25), _loose(1e-3, 0.5)), best=16),
     Discretisation(
-        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, all_if_poor=True
+        15, 10, (_firm(3e-4, 0.25, up_first=True), _loose(1e-4, 0.5, up_first=True)), best=16, share_if_poor=0.98
     ),
     Discretisation(
         20, 14,
         (_loose(3e-4, 0.25), _firm(8e-4, 0.5, hand=_HIGHER), _loose(1e-3, 0.25), _firm(1e-4, 0.5, hand=_LOWER)),
-        best=16, any_way=True,
+        best=8, any_way=True,
     ),
     Discretisation(
         20, 14,
@@ -146,27 +146,27 @@ DISCRETISATIONS = (
             _firm(8e-4, 0.25), _firm(3e-5, 0.5), _firm(3e-4, 0.5), _firm(1.6e-3, 0.5),
             _loose(1e-6, 0.25), _loose(3e-5, 0.25, hand=_HIGHER), _loose(5e-6, 0.5, hand=_LOWER), _loose(3e-4, 0.5),
         ),
-        best=8, any_way=True,
+        best=6, any_way=True,
     ),
-    Discretisation(25, 20, _WEAVES, best=5, any_way=True),
-    Discretisation(20, 14, _LATER, best=4, any_way=True),
+    Discretisation(15, 10, _LATER, best=4, any_way=True),
 )  # fmt: skip
 """Stages, which end as soon as a candidate is sure (`nuno.estimate.ranking.SURE`).
 
 Three guesses that differ as far as they may, firm and loose, limp and stiff, slippery and not, look at every candidate;
-the others of both kinds at the best, and a finer and stiffer weave and one that shears at the best of these. How a
-lifted cloth buckles depends on how it stretches and shears and on the mesh: those that differ in all three had more
-right answers than any one (docs/reports/accuracy.md). Some take it that the hand went up first and sideways then, that
-it is a standard deviation higher or lower than it is told, or, by mistake, much more. A cloth that is led up first
-swings, and takes half as much time again as others to be imagined. So such guesses look at every candidate only where
-the best of seven straight ways fits poorly: these then often take the true candidate for one of the worst. These
-stages of many candidates are on a coarser mesh, which ranks the true one about as high in less than half of the time;
-different meshes together rank it higher than any. After that, guesses go the way that is likelier by then. A CPU takes
-sixteen worlds at once: so many candidates fill them.
+the others of both kinds at the best, and one that shears at the best of these. How a lifted cloth buckles depends on
+how it stretches and shears and on the mesh: those that differ in all three had more right answers than any one. A
+weave that is finer and stiffer still had not (docs/reports/accuracy.md). Some guesses take it that the hand went up
+first and sideways then, that it is a standard deviation higher or lower than it is told, or, by mistake, much more. A
+cloth that is led up first swings, and takes half as much time again as others to be imagined. So such guesses look at
+nearly every candidate only where the best of seven straight ways fits poorly: these then often take the true candidate
+for one of the worst. All but the stages between are on a coarser mesh, which ranks the true one about as high in less
+than half of the time; different meshes together rank it higher than any. After the first three, guesses go the way that
+is likelier by then. A CPU takes sixteen worlds at once: so many candidates fill them.
 """
 
-OF_OUTLINES = tuple(replace(stage, cells=20, substeps=14) for stage in DISCRETISATIONS[:2]) + DISCRETISATIONS[2:]
-"""The same of a cloth that is taken by its outline: what a coarser mesh costs there was not measured."""
+OF_OUTLINES = tuple(replace(stage, cells=12, substeps=8) for stage in DISCRETISATIONS[:3]) + DISCRETISATIONS[3:]
+"""The same of a cloth that is taken by its outline, whose triangles take several times as long as a rectangle's grid:
+so the stages of many candidates are on a still coarser mesh, which told as much of them (docs/reports/accuracy.md)."""
 
 
 def cell_counts(long_m: float, short_m: float, cells: int, grid: tuple[int, int]) -> tuple[int, int]:

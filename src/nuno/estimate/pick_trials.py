@@ -117,11 +117,15 @@ def try_picks(
             ]
         discretisation = meshes[k]
         chosen = np.arange(len(uv))
-        looks_at_all = discretisation.all_if_poor and is_open and _fits_poorly(comparisons, ranked)
-        if ranked is not None and discretisation.best is not None and not looks_at_all:
+        wider = discretisation.share_if_poor
+        if wider is not None and not (is_open and _fits_poorly(comparisons, ranked)):
+            wider = None
+        if ranked is not None and wider is not None:
+            chosen = ranked.plausible(len(uv), wider)
+        elif ranked is not None and discretisation.best is not None:
             chosen = ranked.plausible(discretisation.best)
         # what is imagined ahead is of the stages after this one, too, which look at fewer candidates
-        stages_ahead = meshes[k : k + 1] if looks_at_all else meshes[k:]
+        stages_ahead = meshes[k : k + 1] if wider is not None else meshes[k:]
         futures: Futures | None = None if ahead is None else ahead.part(stages_ahead, chosen)
         if futures is None:
             futures = imagine_picks(candidates=uv[chosen], discretisation=discretisation, **arguments)

@@ -132,19 +132,20 @@ class Ranked:
         """(k,) float, how likely each candidate is; None where something else than evidence ranks."""
         return probabilities(self.name, self.scores) if self.likely is None else self.likely
 
-    def plausible(self, limit: int) -> np.ndarray:
+    def plausible(self, limit: int, share: float = SHARE) -> np.ndarray:
         """The best candidates, in the order of their numbers: (m,) int.
 
-        Where evidence ranks, they are the fewest that hold `SHARE` of the probability, but two at least.
+        Where evidence ranks, they are the fewest that hold a share of the probability, but two at least.
 
         Args:
             limit: No more than so many.
+            share: Of the probability; 1 is all of it.
         """
         order, likely = self.order, self.probabilities
         if likely is not None and self.likely is not None:
             order = np.argsort(-likely, kind="stable")
-        if likely is not None:
-            limit = min(limit, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), SHARE))))
+        if likely is not None and share < 1.0:
+            limit = min(limit, max(2, 1 + int(np.searchsorted(np.cumsum(likely[order]), share))))
         return np.sort(order[:limit])
 
     def settled(self, sure: float) -> bool:

@@ -1,0 +1,35 @@
+"""Stages of `estimate_pick` to compare with those that it has, by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nuno.estimate.hypotheses import DISCRETISATIONS, Discretisation, hypotheses_with
+
+NAMES = ("now", "weaves", "fine", "coarse")
+
+
+def stages_named(name: str) -> tuple[Discretisation, ...] | None:
+    """Return stages; None of those that there are.
+
+    Args:
+        name: "now"; "weaves": as once, with a stage of a finer, stiffer weave before the last one, more candidates in
+            those before, and the last one on the mesh of these; "fine": as before that, with the early stages on that
+            mesh too, and ten weaves; "coarse": as now with all later stages on the early ones' mesh, and those on a
+            still coarser one.
+    """
+    if name == "now":
+        return None
+    first, second, third, fourth, fifth, last = DISCRETISATIONS
+    if name == "coarse":
+        early = (replace(stage, cells=12, substeps=8) for stage in (first, second, third))
+        return (*early, *(replace(stage, cells=15, substeps=10) for stage in (fourth, fifth, last)))
+    weaves = hypotheses_with(3000.0, 1200.0, (3e-5, 1e-4, 3e-4, 8e-4, 3e-3))
+    if name == "fine":
+        first, second = (replace(stage, cells=20, substeps=14) for stage in (first, second))
+    else:
+        weaves = weaves[:9]
+    return (
+        first, second, replace(third, share_if_poor=1.0), replace(fourth, best=16), replace(fifth, best=8),
+        Discretisation(25, 20, weaves, best=5, any_way=True), replace(last, cells=20, substeps=14),
+    )  # fmt: skip
