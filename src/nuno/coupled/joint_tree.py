@@ -42,6 +42,9 @@ from nuno.rigid.rigid_body import RigidState, point_before, point_of
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
+TURN_ROUNDING = wp.constant(1.0e-6)
+"""[rad] What rounding of two bodies' turns, and of their products with a hinge's frames, leaves of its angle."""
+
 
 @wp.struct
 class Inertia:
@@ -201,7 +204,9 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     apart, off = joint_apart(rigid, joints, world, k, dt)
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    wrong = wp.max(wp.max(wp.length(apart), wp.length(off)) - rounding, 0.0)
+    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - TURN_ROUNDING), 0.0)
+    if kind == HINGE:
+        rounding = TURN_ROUNDING
     made = Opening()
     limit = LIMITED * joints.limit[r] * dt * dt
     if wp.length(joints.pull[r]) > limit or wp.length(joints.twist[r]) > limit:
@@ -291,6 +296,8 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
     # what drives a joint goes by where it ends, and looks again until that stays
     at = world * trees.count + t
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
+    if joints.kind[k] == HINGE or joints.kind[k] == BALL:
+        rounding = TURN_ROUNDING
     trees.wrong[at] = wp.max(trees.wrong[at], wp.length(q) - rounding)
     trees.turn[nodes + t] = turn
     trees.shift[nodes + t] = shift - wp.cross(turn, below)
