@@ -58,9 +58,12 @@ class Dynamics:
         grips: What holds it.
         pushes: What pushes it.
         substeps: Substeps of a frame.
+        is_rigid: Whether it is that of a rigid body.
+        copies_vertices: Whether ``vertices`` returns an array that nobody else has.
     """
 
     is_rigid: ClassVar[bool] = False
+    copies_vertices: ClassVar[bool] = False
 
     def __init__(self, material: Material, friction: Any, world: Simulation) -> None:
         self.material, self.friction, self.world_count = material, friction, world.world_count
@@ -163,6 +166,8 @@ class ParticleDynamics(Dynamics):
     Raises:
         InvalidInputError: the shape has no dynamics, or the material does not fit the shape or the batch.
     """
+
+    copies_vertices: ClassVar[bool] = True
 
     def __init__(
         self,
