@@ -6,8 +6,9 @@ from nuno.coupled.bounded_particles import Particles, bound_all
 from nuno.coupled.contact_rows import Rows, forget_sharers, take_sums
 from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint, projections_of, settle_spins, sum_joint
 from nuno.coupled.joint_contacts import resolve_entries, resolve_others
+from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.joint_tree import Trees, project_trees
+from nuno.coupled.joint_tree import project_trees
 from nuno.coupled.kept_multipliers import Kept, keep, recall
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, is_linked, island_of, note_wrong
 from nuno.coupled.rigid_supports import link_supports, rubs_both, with_mate

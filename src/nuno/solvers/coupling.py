@@ -14,8 +14,8 @@ from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.drive_constraints import UNDECIDED
+from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.joint_tree import Trees
 from nuno.coupled.kept_multipliers import kept_room, more_kept_room
 from nuno.coupled.pass_progress import Passing
 from nuno.coupled.rigid_supports import held_slots
