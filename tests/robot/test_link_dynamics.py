@@ -235,7 +235,7 @@ def soles(world, robot):
 
 @pytest.fixture(scope="module")
 def statics(resting):
-    """Torques of all joints (n,) [N m], told and by statics: means of 3 s; and velocities of all its frames, (180, n)."""
+    """Torques of all joints (n,) [N m], told and by statics, means of 3 s; and velocities of its frames, (180, n)."""
     world, robot = resting
     model, data = robot.actual.model, robot.actual.model.createData()
     told, wanted, speeds = [], [], []
