@@ -15,7 +15,7 @@ import warp as wp
 
 from nuno.plans.cpu_threads import core_count, run_together
 
-PARTS, FEWEST = 3, 2
+PARTS, FEWEST = 3, 4
 """Parts that worlds are cut into for each core, as some take longer than others; and worlds of a part, at least."""
 
 
