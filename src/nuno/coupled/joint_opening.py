@@ -23,8 +23,8 @@ LIMITED = wp.constant(0.999)
 
 TURN_ROUNDING = wp.constant(2.0e-6)
 """[rad] What rounding leaves of a joint's turn: of two bodies' turns and their products with its frames 0.7e-6, and as
-much again of contacts, whose own rounding of 4e-7 m turns a foot by 3e-6. Along its free direction no more is let pass
-than `ROUNDING`: with 1e-6 friction lets go of arms that are at rest."""
+much again of contacts, whose own rounding of 4e-7 m turns a foot by 3e-6. Friction that lets go or takes hold counts as
+wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
 
 
 @wp.struct
