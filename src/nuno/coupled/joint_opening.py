@@ -21,7 +21,7 @@ from nuno.rigid.rigid_body import RigidState, point_before, point_of
 LIMITED = wp.constant(0.999)
 """Of a joint's limit, from where on it bears no more in the substep."""
 
-TURN_ROUNDING = wp.constant(2.0e-6)
+ROTATION_ROUNDING = wp.constant(2.0e-6)
 """[rad] What rounding leaves of a joint's turn: of two bodies' turns and their products with its frames 0.7e-6, and as
 much again of contacts, whose own rounding of 4e-7 m turns a foot by 3e-6. Friction that lets go or takes hold counts as
 wrong however little that turns, see `nuno.coupled.joint_tree.PIVOTED`."""
@@ -130,7 +130,7 @@ def place_along(rigid: RigidState, joints: Joints, world: int, k: int, start: fl
 
 @wp.func
 def begin_opening(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: int, dt: float):
-    """What of a joint stays as it is for a whole substep."""
+    """Keep what of a joint stays as it is for a whole substep."""
     k = trees.joint[t]
     at = world * trees.count + t
     _i, _j, arm, other_arm = arms_of(rigid, joints, world, k)
@@ -185,10 +185,10 @@ def open_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: i
     off = off - made.left_off
     i = world * rigid.capacity + joints.slot[k]
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
-    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - TURN_ROUNDING), 0.0)
+    wrong = wp.max(wp.max(wp.length(apart) - rounding, wp.length(off) - ROTATION_ROUNDING), 0.0)
     anew = stale
     if kind == HINGE:
-        rounding = TURN_ROUNDING
+        rounding = ROTATION_ROUNDING
     limit = LIMITED * joints.limit[r] * dt * dt
     if wp.length(joints.pull[r]) > limit or wp.length(joints.twist[r]) > limit:
         if made.alone == 0:

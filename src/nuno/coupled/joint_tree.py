@@ -27,7 +27,7 @@ import warp as wp
 from nuno.coupled.articulated_inertia import added, body_inertia, rest_of, seen_from
 from nuno.coupled.drive_constraints import project_ball
 from nuno.coupled.joint_constraints import ROUNDING
-from nuno.coupled.joint_opening import TURN_ROUNDING, Trees, arms_of, axis_before, begin_opening, open_joint
+from nuno.coupled.joint_opening import ROTATION_ROUNDING, Trees, arms_of, axis_before, begin_opening, open_joint
 from nuno.coupled.joint_response import BALL, HINGE, SLIDER, Joints, apply_joint, block_of
 from nuno.coupled.pass_progress import Passing, goes_on, island_of
 from nuno.coupled.tie_constraints import within
@@ -71,7 +71,7 @@ def close_joint(rigid: RigidState, joints: Joints, trees: Trees, world: int, t: 
     at = world * trees.count + t
     rounding = ROUNDING * (1.0 + wp.length(rigid.position[i]))
     if joints.kind[k] == HINGE or joints.kind[k] == BALL:
-        rounding = TURN_ROUNDING
+        rounding = ROTATION_ROUNDING
     trees.wrong[at] = wp.max(trees.wrong[at], wp.length(q) - rounding)
     trees.turn[nodes + t] = turn
     trees.shift[nodes + t] = shift - wp.cross(turn, below)
