@@ -45,3 +45,20 @@ def test_what_is_new_is_taken():
     assert launched(one, 1.0, other, dim=2) == [1.0, 4.0, 0.0, 0.0]
     assert launched(line([5.0] * 4, 1.0), 1.0, other) == [6.0] * 4
     assert np.array_equal(out.numpy(), [1.0, 4.0, 1.0, 4.0])
+
+
+@wp.kernel(enable_backward=False)
+def number_worlds(out: wp.array(dtype=float), first: int):
+    """Each world's number."""
+    world = first + wp.tid() / 2
+    wp.atomic_add(out, world, float(world))
+
+
+def test_worlds_are_gone_through_once_each_in_parts():
+    """Twice a number is what two threads of a world add up, however many parts the worlds are cut into."""
+    launches = RecordedLaunches("cpu", 1)
+    for worlds in (1, 3, 64, 65):
+        for _ in range(2):  # the second time as recorded
+            out = wp.zeros(worlds, dtype=float, device="cpu")
+            launches.launch_worlds(number_worlds, worlds, 2, [out])
+            np.testing.assert_array_equal(out.numpy(), 2.0 * np.arange(worlds))

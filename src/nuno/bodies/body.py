@@ -195,6 +195,8 @@ class Body(Quantities, Coordinates):
         with self._guard():
             vertices = self._vertices()
             count = 1 if self._world is None else self._world.world_count
+            if self._dynamics is not None and self._dynamics.copies_vertices:  # nobody else has this array
+                return vertices if count > 1 else vertices[0]
         if count > 1:
             return np.array(np.broadcast_to(vertices, (count, *vertices.shape[-2:])))
         return np.array(vertices[0] if len(vertices) == 1 and vertices.ndim == 3 else vertices)

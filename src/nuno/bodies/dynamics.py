@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_particles
 from nuno.bodies.given_velocity import GivenVelocity
+from nuno.bodies.push import Push
 from nuno.bodies.shape_topology import element_count, topology_of, vertex_shares
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import Grip
@@ -35,19 +35,6 @@ State = dict[str, np.ndarray]  # of a solver: "local" and "origin", which add up
 SOON = 1e-9  # [s], below which two instants are the same
 
 
-@dataclass(frozen=True, eq=False)
-class Push:
-    """A force on a body's vertices.
-
-    Attributes:
-        force: (worlds, n, 3) float32 [N]; of a rigid body (worlds, 6): force, and torque [N m], at the centre of mass.
-        end: The world's time [s] at which it ends, or None.
-    """
-
-    force: np.ndarray
-    end: float | None
-
-
 class Dynamics:
     """The dynamics of an attached body, whatever its kind.
 
@@ -58,9 +45,12 @@ class Dynamics:
         grips: What holds it.
         pushes: What pushes it.
         substeps: Substeps of a frame.
+        is_rigid: Whether it is that of a rigid body.
+        copies_vertices: Whether ``vertices`` returns an array that nobody else has.
     """
 
     is_rigid: ClassVar[bool] = False
+    copies_vertices: ClassVar[bool] = False
 
     def __init__(self, material: Material, friction: Any, world: Simulation) -> None:
         self.material, self.friction, self.world_count = material, friction, world.world_count
@@ -163,6 +153,8 @@ class ParticleDynamics(Dynamics):
     Raises:
         InvalidInputError: the shape has no dynamics, or the material does not fit the shape or the batch.
     """
+
+    copies_vertices: ClassVar[bool] = True
 
     def __init__(
         self,

@@ -23,7 +23,7 @@ from nuno.solvers.rigid_solver import RigidSolver
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.bodies.dynamics import Push
+    from nuno.bodies.push import Push
     from nuno.world.simulation import Simulation
 
 

@@ -6,8 +6,9 @@ from nuno.coupled.bounded_particles import Particles, bound_all
 from nuno.coupled.contact_rows import Rows, forget_sharers, take_sums
 from nuno.coupled.joint_constraints import begin_joint, joint_at, project_joint, projections_of, settle_spins, sum_joint
 from nuno.coupled.joint_contacts import resolve_entries, resolve_others
+from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.joint_tree import Trees, project_trees
+from nuno.coupled.joint_tree import project_trees
 from nuno.coupled.kept_multipliers import Kept, keep, recall
 from nuno.coupled.pass_progress import ENOUGH, Passing, begin_pass, end_pass, goes_on, is_linked, island_of, note_wrong
 from nuno.coupled.rigid_supports import link_supports, rubs_both, with_mate
@@ -121,11 +122,11 @@ def add_impulses(rows: Rows, bodies: int, total: wp.array(dtype=wp.int64)):
 def solve(
     particles: Particles, rigid: RigidState, parts: Parts, manifolds: Contacts, rows: Rows, ties: Ties, holds: Holds,
     joints: Joints, trees: Trees, passing: Passing, kept: Kept, dt: float, fraction: float, passes: int,
-    at_once: int, size: int,
+    at_once: int, size: int, first_world: int,
 ):  # fmt: skip
     """All contacts and ties of a world, up to ``passes`` times: contacts one after the other, or all ``at_once``."""
     tid = wp.tid()
-    world = tid / size
+    world = first_world + tid / size
     rank = tid % size
     first = world * particles.count
     start = world * rigid.capacity
@@ -249,8 +250,9 @@ def solve(
 
 @wp.kernel(enable_backward=False)
 def end_contacts(
-    rigid: RigidState, parts: Parts, manifolds: Contacts, joints: Joints, passing: Passing, dt: float, size: int
-):
+    rigid: RigidState, parts: Parts, manifolds: Contacts, joints: Joints, passing: Passing, dt: float, size: int,
+    first_world: int,
+):  # fmt: skip
     """One pass over the positions of rigid bodies that touch, where joints are: those without any had none yet."""
     tid = wp.tid()
-    resolve_others(rigid, parts, manifolds, joints, passing, tid / size, dt, tid % size, size)
+    resolve_others(rigid, parts, manifolds, joints, passing, first_world + tid / size, dt, tid % size, size)

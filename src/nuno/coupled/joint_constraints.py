@@ -22,6 +22,7 @@ from nuno.coupled.joint_response import (
     arm_of,
     block_of,
     other_frame,
+    other_frame_now,
     respond,
 )
 from nuno.coupled.tie_constraints import CATCH_UP, UNMET, left_over, stand_on, within
@@ -89,22 +90,37 @@ def project_joint(rigid: RigidState, joints: Joints, world: int, k: int, dt: flo
 
 
 @wp.func
-def joint_apart(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
-    """The distance and turn that should not be, beyond what the joint may mend in a substep."""
+def joint_misfit(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The distance and the turn of a joint's frames that should not be, as they are now."""
     r = world * joints.count + k
     i = world * rigid.capacity + joints.slot[k]
-    z = wp.vec3(0.0, 0.0, 1.0)
-    own = joints.turn[r]
-    place, other_turn, place_before, other_before = other_frame(rigid, joints, world, k)
+    place, other_turn = other_frame_now(rigid, joints, world, k)
+    return misfit(
+        joints.kind[k], point_of(rigid, i, joints.place[r]) - place, rigid.rotation[i] * joints.turn[r], other_turn,
+        wp.quat_rotate(other_turn, wp.vec3(0.0, 0.0, 1.0)),
+    )  # fmt: skip
+
+
+@wp.func
+def joint_left(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
+    """The distance and turn that a joint leaves in a substep: what it may not mend of how that began."""
+    r = world * joints.count + k
+    i = world * rigid.capacity + joints.slot[k]
+    _place, _turn, place_before, other_before = other_frame(rigid, joints, world, k)
     apart, off = misfit(
-        joints.kind[k], point_of(rigid, i, joints.place[r]) - place, rigid.rotation[i] * own, other_turn,
-        wp.quat_rotate(other_turn, z),
+        joints.kind[k], point_before(rigid, i, joints.place[r]) - place_before,
+        rigid.rotation_before[i] * joints.turn[r], other_before,
+        wp.quat_rotate(other_before, wp.vec3(0.0, 0.0, 1.0)),
     )  # fmt: skip
-    apart_before, off_before = misfit(
-        joints.kind[k], point_before(rigid, i, joints.place[r]) - place_before, rigid.rotation_before[i] * own,
-        other_before, wp.quat_rotate(other_before, z),
-    )  # fmt: skip
-    return apart - left_over(apart_before, CATCH_UP * dt), off - left_over(off_before, CATCH_UP * dt)
+    return left_over(apart, CATCH_UP * dt), left_over(off, CATCH_UP * dt)
+
+
+@wp.func
+def joint_apart(rigid: RigidState, joints: Joints, world: int, k: int, dt: float):
+    """The distance and turn that should not be, beyond what the joint may mend in a substep."""
+    apart, off = joint_misfit(rigid, joints, world, k)
+    left_apart, left_off = joint_left(rigid, joints, world, k, dt)
+    return apart - left_apart, off - left_off
 
 
 @wp.func

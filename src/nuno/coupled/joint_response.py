@@ -83,6 +83,19 @@ def other_frame(rigid: RigidState, joints: Joints, world: int, k: int):
 
 
 @wp.func
+def other_frame_now(rigid: RigidState, joints: Joints, world: int, k: int):
+    """The joint's frame in the other body, or in the world: place and turn now."""
+    r = world * joints.count + k
+    place = joints.other_place[r]
+    turn = joints.other_turn[r]
+    if joints.other[k] >= 0:
+        j = world * rigid.capacity + joints.other[k]
+        place = point_of(rigid, j, joints.other_place[r])
+        turn = rigid.rotation[j] * turn
+    return place, turn
+
+
+@wp.func
 def block_of(rigid: RigidState, kind: int, i: int, j: int, arm: wp.vec3, other_arm: wp.vec3, axis: wp.vec3):
     """The block of a joint."""
     made = Block()

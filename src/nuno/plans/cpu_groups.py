@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, SimpleQueue
 from typing import Any
 
 import warp as wp
 
+from nuno.plans.cpu_threads import core_count, thread_pool
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.state.cloth_state import Settings
 
 PIECES = 12
 """Launches of a group of lanes in a run, between which threads may change groups."""
-
-_threads: ThreadPoolExecutor | None = None
 
 
 def launch_groups(
@@ -77,19 +74,7 @@ def run_groups(
             if k + 1 < len(pieces):
                 waiting.put((group, k + 1))
 
-    list(_pool().map(work, range(min(_cores(), groups))))
-
-
-def _pool() -> ThreadPoolExecutor:
-    """A thread per core."""
-    global _threads
-    if _threads is None:
-        _threads = ThreadPoolExecutor(_cores(), thread_name_prefix="nuno-lanes")
-    return _threads
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0))
+    list(thread_pool().map(work, range(min(core_count(), groups))))
 
 
 def _from(run: Settings, start: int) -> Settings:

@@ -7,9 +7,16 @@ what such a launch is given, structures of arrays, than the launch takes to run.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import warp as wp
+
+from nuno.plans.cpu_threads import core_count, run_together
+
+PARTS, FEWEST = 3, 4
+"""Parts that worlds are cut into for each core, as some take longer than others; and worlds of a part, at least."""
 
 
 class RecordedLaunches:
@@ -36,7 +43,28 @@ class RecordedLaunches:
             inputs: Its arguments.
             name: Tells launches of one kernel apart that take turns with different structures.
         """
-        key = (kernel, name)
+        self._recording(kernel, dim, inputs, (kernel, name)).launch()
+
+    def launch_worlds(self, kernel: Any, worlds: int, threads: int, inputs: Sequence[Any]) -> None:
+        """Launch a kernel over worlds: on the CPU a part of them on each core.
+
+        Args:
+            kernel: Which; its last argument is the first world of a launch.
+            worlds: How many there are; none must touch what another's launch does.
+            threads: Of a world.
+            inputs: Its other arguments.
+        """
+        parts = min(PARTS * core_count(), worlds // FEWEST) if self._device == "cpu" else 1
+        ends = np.linspace(0, worlds, max(1, parts) + 1).astype(int).tolist()
+        run_together(
+            [
+                self._recording(kernel, threads * (end - first), [*inputs, first], (kernel, first)).launch
+                for first, end in pairwise(ends)
+            ]
+        )
+
+    def _recording(self, kernel: Any, dim: int | tuple[int, ...], inputs: Sequence[Any], key: Hashable) -> Any:
+        """Return the launch that is recorded by a key, with these arguments."""
         if key not in self._recorded:
             command = wp.launch(
                 kernel, dim=dim, inputs=list(inputs), device=self._device, block_dim=self._block_dim, record_cmd=True
@@ -49,4 +77,4 @@ class RecordedLaunches:
                 if value is not old:
                     command.set_param_at_index(k, value)
         self._recorded[key] = command, list(inputs), dim
-        command.launch()
+        return command

@@ -18,6 +18,8 @@ INSET = 0.25
 direction between them is found more coarsely."""
 ENDLESS = 1.0e9
 """[m] How far a plane reaches."""
+REMEMBERED = 4096
+"""Points of a hull, up to which its part is kept for who asks again: 25 MB for as many as are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +136,8 @@ def _primitive(shape: Any) -> RigidPart:
 def convex_part(points: np.ndarray, thickness: float = 0.0) -> RigidPart:
     """Return the convex hull of points as a part; flat ones become a plate of ``thickness``, at least 1 mm.
 
+    Parts of up to `REMEMBERED` points are kept, and shared by who asks again.
+
     Args:
         points: (n, 3) float [m].
         thickness: Of what is flat [m].
@@ -141,6 +145,19 @@ def convex_part(points: np.ndarray, thickness: float = 0.0) -> RigidPart:
     Raises:
         MeshError: all points lie on a line.
     """
+    given = np.ascontiguousarray(points, dtype=float)
+    if len(given) > REMEMBERED:
+        return _convex_part(given, thickness)
+    return _remembered_part(given.tobytes(), len(given), float(thickness))
+
+
+@lru_cache(maxsize=256)
+def _remembered_part(points: bytes, count: int, thickness: float) -> RigidPart:
+    """`_convex_part`, which takes milliseconds: each time that a robot is imagined its links are asked for again."""
+    return _convex_part(np.frombuffer(points).reshape(count, 3), thickness)
+
+
+def _convex_part(points: np.ndarray, thickness: float) -> RigidPart:
     from scipy.spatial import ConvexHull, HalfspaceIntersection
 
     middle = points.mean(axis=0)

@@ -143,10 +143,12 @@ def go_through(
 
 
 @wp.kernel(enable_backward=False, module="nuno.rigid.run_rigid")
-def run_rigid(s: RigidState, parts: Parts, c: Contacts, rules: Rules, run: RigidSettings, phase: int, size: int):
+def run_rigid(
+    s: RigidState, parts: Parts, c: Contacts, rules: Rules, run: RigidSettings, phase: int, size: int, first_world: int
+):
     """`go_through` every world by itself, on CUDA by a block."""
     tid = wp.tid()
-    go_through(s, parts, c, rules, run, phase, tid / size, tid % size, size, size)
+    go_through(s, parts, c, rules, run, phase, first_world + tid / size, tid % size, size, size)
 
 
 @wp.kernel(enable_backward=False, module="nuno.rigid.run_rigid_group")

@@ -24,10 +24,10 @@ def standing_place(robot: Humanoid) -> tuple[float, float, float]:
 
 def convex_outline(points: np.ndarray) -> np.ndarray:
     """Return the corners (k, 2) of the convex hull of points (n, 2), counterclockwise (Andrew 1979)."""
-    ordered = np.unique(points, axis=0)
+    ordered = sorted(set(map(tuple, points.tolist())))
     chains = []
     for sweep in (ordered, ordered[::-1]):
-        chain: list[np.ndarray] = []
+        chain: list[tuple[float, float]] = []
         for point in sweep:
             while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
                 chain.pop()
@@ -38,10 +38,11 @@ def convex_outline(points: np.ndarray) -> np.ndarray:
 
 def edges_of(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return outward normals (k, 2) and offsets (k,) [m] of a counterclockwise outline: inside is n p <= offset."""
-    along = np.roll(outline, -1, axis=0) - outline
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.sum(normals * outline, axis=1)
+    normals = np.empty(outline.shape)
+    normals[:-1, 0], normals[-1, 0] = outline[1:, 1] - outline[:-1, 1], outline[0, 1] - outline[-1, 1]
+    normals[:-1, 1], normals[-1, 1] = outline[:-1, 0] - outline[1:, 0], outline[-1, 0] - outline[0, 0]
+    normals /= np.sqrt(normals[:, :1] ** 2 + normals[:, 1:] ** 2)
+    return normals, normals[:, 0] * outline[:, 0] + normals[:, 1] * outline[:, 1]
 
 
 def distance_inside(outline: np.ndarray, point: np.ndarray) -> float:
@@ -65,5 +66,5 @@ def zero_moment_point(force: np.ndarray, torque: np.ndarray, height: float) -> n
     return np.array([height * along_x - about_y, about_x + height * along_y]) / upward
 
 
-def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -93,6 +93,15 @@ class WholeBodyControl:
         of_legs = {j for chain in chains for j in chain if sum(j in other for other in chains) == 1 and j > 1}
         # feet and trunk say all of where a leg of six joints is
         self._share = np.array([LEGS if n + 2 in of_legs else 1.0 for n in range(len(limits))])
+        nv = robot.model.nv
+        # what of the tasks is the same in every frame: trunk and posture are the velocities themselves
+        self._tasks = np.zeros((nv + 6 * len(self._feet), nv))
+        self._tasks[3:6, 3:6], self._tasks[6:nv, 6:] = np.eye(3), np.eye(nv - 6)
+        self._weights = np.full(len(self._tasks), self.gains.foot)
+        self._weights[:3], self._weights[3:6] = self.gains.centre, self.gains.trunk
+        self._weights[6:nv] = self.gains.posture * self._share
+        self._below = np.tril_indices(nv, -1)
+        self._programs: dict[int, tuple[np.ndarray, ...]] = {}
         flat = friction / np.sqrt(2.0)
         self._pyramid = np.array([[1.0, 0, -flat], [-1.0, 0, -flat], [0, 1.0, -flat], [0, -1.0, -flat], [0, 0, -1.0]])
 
@@ -113,37 +122,36 @@ class WholeBodyControl:
         drift, centre, speed = (np.array(own[0]) for own in (data.acom, data.com, data.vcom))
         centre_rows = np.array(pin.jacobianCenterOfMass(model, data, now.q))
         mass = np.array(pin.crba(model, data, now.q, pin.Convention.WORLD))
-        mass = np.triu(mass) + np.triu(mass, 1).T
+        mass[self._below] = mass.T[self._below]
         forced = () if loads is None else (pin.StdVec_Force([pin.Force(own) for own in loads]),)
         bias = np.array(pin.rnea(model, data, now.q, now.v, none, *forced))
         pin.forwardKinematics(model, data, now.q, now.v, none)
         pin.updateFramePlacements(model, data)
 
-        tasks = np.zeros((6 + model.nv - 6 + 6 * len(self._feet), nv))
+        tasks, weights = self._tasks.copy(), self._weights.copy()
         wanted = np.zeros(len(tasks))
-        weights = np.empty(len(tasks))
         pull = _back(gains.centre_rate, aims.centre[0] - centre, aims.centre[1] - speed)
         if aims.falls_freely:
             pull[:2] = 0.0
-        tasks[:3], wanted[:3], weights[:3] = centre_rows, aims.centre[2] + pull - drift, gains.centre
+        tasks[:3], wanted[:3] = centre_rows, aims.centre[2] + pull - drift
         if aims.falls_freely:
             weights[:2] = gains.catch
         error = pin.difference(model, now.q, aims.q)
         across = pin.Quaternion(now.q[3:7]).toRotationMatrix().T @ pin.Quaternion(aims.q[3:7]).toRotationMatrix()
-        tasks[3:6, 3:6], weights[3:6] = np.eye(3), gains.trunk
         wanted[3:6] = across @ aims.a[3:6] + _back(gains.trunk_rate, error[3:6], across @ aims.v[3:6] - now.v[3:6])
-        tasks[6:nv, 6:], weights[6:nv] = np.eye(nv - 6), gains.posture * self._share
         wanted[6:nv] = aims.a[6:] + _back(gains.posture_rate, error[6:], (aims.v - now.v)[6:])
         touching: list[np.ndarray] = []
         for k, (frame, corners, aim) in enumerate(zip(self._feet, self._corners, aims.feet, strict=True)):
             row = slice(nv + 6 * k, nv + 6 * k + 6)
             own = np.array(pin.getFrameJacobian(model, data, frame, WORLD_AXES))
-            tasks[row], weights[row] = own, gains.swing if aims.falls_freely and not aim.bears else gains.foot
+            tasks[row] = own
+            if aims.falls_freely and not aim.bears:
+                weights[row] = gains.swing
             wanted[row] = self._foot(data, frame, aim)
             if aim.bears:
-                for arm in corners @ data.oMf[frame].rotation.T:
-                    touching.append(own[:3] - pin.skew(arm) @ own[3:])
-        return self._minimised(np.sqrt(weights)[:, None] * tasks, np.sqrt(weights) * wanted, touching, mass, bias)
+                touching.append(own[:3] - _skew(corners @ data.oMf[frame].rotation.T) @ own[3:])
+        roots = np.sqrt(weights)
+        return self._minimised(roots[:, None] * tasks, roots * wanted, touching, mass, bias)
 
     def _foot(self, data: Any, frame: int, aim: FootAim) -> np.ndarray:
         """Return the acceleration (6,) that a foot is to have beside what the joints' velocities bring about."""
@@ -167,26 +175,46 @@ class WholeBodyControl:
         self, tasks: np.ndarray, wanted: np.ndarray, touching: list[np.ndarray], mass: np.ndarray, bias: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Return accelerations and torques that miss the tasks least; None where nothing fulfils the constraints."""
-        n, count = len(bias), len(touching)
-        contact = np.concatenate(touching) if touching else np.zeros((0, n))
-        hessian = np.zeros((n + 3 * count, n + 3 * count))
-        hessian[:n, :n] = tasks.T @ tasks + 1e-6 * np.eye(n)
-        hessian[n:, n:] = self.gains.force * np.eye(3 * count)
-        linear = np.zeros(n + 3 * count)
+        n, count = len(bias), sum(map(len, touching))
+        hessian, linear, constraints, upper, lower, sense = (part.copy() for part in self._program(count))
+        hessian[:n, :n] += tasks.T @ tasks
         linear[:n] = -tasks.T @ wanted
-        motion = np.concatenate([mass, -contact.T], axis=1)
-        cones = np.zeros((5 * count, n + 3 * count))
-        for k in range(count):
-            cones[5 * k : 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
-        constraints = np.concatenate([motion, cones])
-        upper = np.concatenate([-bias[:6], self._efforts - bias[6:], np.zeros(len(cones))])
-        lower = np.concatenate([-bias[:6], -self._efforts - bias[6:], np.full(len(cones), -1e30)])
-        sense = np.zeros(len(upper), dtype=np.int32)
-        sense[:6] = EQUAL
+        constraints[:n, :n] = mass
+        if touching:
+            constraints[:n, n:] = -np.concatenate(touching).reshape(3 * count, n).T
+        motion = constraints[:n]
+        upper[:6] = lower[:6] = -bias[:6]
+        upper[6:n] -= bias[6:]
+        lower[6:n] -= bias[6:]
         found, _, flag, _ = daqp.solve(hessian, linear, constraints, upper, lower, sense)
         if flag <= 0:
             return None
         return np.asarray(found[:n]), np.asarray((motion @ found + bias)[6:])
+
+    def _program(self, count: int) -> tuple[np.ndarray, ...]:
+        """Return what of the quadratic program is the same in every frame with so many points that bear."""
+        if count not in self._programs:
+            n = self._model.nv
+            rows, columns = n + 5 * count, n + 3 * count
+            hessian, constraints = np.zeros((columns, columns)), np.zeros((rows, columns))
+            hessian[:n, :n] = 1e-6 * np.eye(n)
+            hessian[n:, n:] = self.gains.force * np.eye(3 * count)
+            for k in range(count):
+                constraints[n + 5 * k : n + 5 * k + 5, n + 3 * k : n + 3 * k + 3] = self._pyramid
+            upper = np.concatenate([np.zeros(6), self._efforts, np.zeros(5 * count)])
+            lower = np.concatenate([np.zeros(6), -self._efforts, np.full(5 * count, -1e30)])
+            sense = np.zeros(rows, dtype=np.int32)
+            sense[:6] = EQUAL
+            self._programs[count] = hessian, np.zeros(columns), constraints, upper, lower, sense
+        return self._programs[count]
+
+
+def _skew(arms: np.ndarray) -> np.ndarray:
+    """Return the matrices (k, 3, 3) of the cross products with vectors (k, 3)."""
+    made = np.zeros((len(arms), 3, 3))
+    made[:, 2, 1], made[:, 0, 2], made[:, 1, 0] = arms.T
+    made[:, 1, 2], made[:, 2, 0], made[:, 0, 1] = -arms.T
+    return made
 
 
 def _back(rate: float, error: np.ndarray, speed: np.ndarray) -> np.ndarray:

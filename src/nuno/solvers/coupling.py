@@ -14,8 +14,8 @@ from nuno.coupled.contact_geometry import measure_rows
 from nuno.coupled.contact_rows import Rows
 from nuno.coupled.coupled_passes import Layout, add_impulses, collect, end_contacts, scatter, solve
 from nuno.coupled.drive_constraints import UNDECIDED
+from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.joint_tree import Trees
 from nuno.coupled.kept_multipliers import kept_room, more_kept_room
 from nuno.coupled.pass_progress import Passing
 from nuno.coupled.rigid_supports import held_slots
@@ -248,10 +248,8 @@ class Coupling(CouplingResults):
                 self._rigid.predict()
             self._touch(k, dt, (k + 1) / substeps)
             if self.joints.count or not (self._at_once or self._rigid is None):
-                self._go(
-                    end_contacts, self.world_count * self._threads, self._state, *self._manifolds(), self.joints,
-                    self._passing, dt, self._threads,
-                )  # fmt: skip
+                last: list[Any] = [self._state, *self._manifolds(), self.joints, self._passing, dt, self._threads]
+                self._launches.launch_worlds(end_contacts, self.world_count, self._threads, last)
             elif self._rigid is not None:
                 self._rigid.contacts()
             for solver in self._solvers:
@@ -329,11 +327,11 @@ class Coupling(CouplingResults):
                         dt, body=body,
                     )  # fmt: skip
         if self._row_count or self._ties.count or self.holds.count or self.joints.count:
-            self._go(
-                solve, worlds * self._threads, particles, self._state, *self._manifolds(), rows, self._ties,
-                self.holds, self.joints, self._trees, self._passing, self._multipliers, dt, fraction,
-                PASSES_AT_ONCE if self._at_once else PASSES, int(self._at_once), self._threads,
-            )  # fmt: skip
+            self._launches.launch_worlds(solve, worlds, self._threads, [
+                particles, self._state, *self._manifolds(), rows, self._ties, self.holds, self.joints, self._trees,
+                self._passing, self._multipliers, dt, fraction, PASSES_AT_ONCE if self._at_once else PASSES,
+                int(self._at_once), self._threads,
+            ])  # fmt: skip
             if self._row_count:
                 self._go(add_impulses, (worlds, self._row_count), rows, self._bodies, self._impulses)
             for solver, layout in zip(self._solvers, self._layouts, strict=True):

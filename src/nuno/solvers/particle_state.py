@@ -146,6 +146,10 @@ class ParticleState:
 
     def positions(self, some: np.ndarray | None = None) -> np.ndarray:
         """(worlds, n, 3) float64, a copy [m], of all particles or of ``some``, (worlds, n) int."""
+        if self._cuda:
+            from nuno.state.pack import places_of_worlds
+
+            return places_of_worlds(self.doubles.arrays, self.origin, self.particle_count, some, self.device)
         rows = np.arange(self.world_count)[:, None]
         places = np.empty((self.world_count, self.particle_count if some is None else some.shape[1], 3))
         for k, array in enumerate(self.doubles.arrays):

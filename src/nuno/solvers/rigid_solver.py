@@ -304,7 +304,7 @@ class RigidSolver(RigidContacts):
                 self.manifolds.counts.assign(counts.ravel())
             inputs = [self.state, self.table.parts, self.manifolds, self.rules, run, PHASES[phase]]
             if not self._launch_block_groups(inputs):
-                self._launches.launch(run_rigid, self.world_count * threads, [*inputs, threads])
+                self._launches.launch_worlds(run_rigid, self.world_count, threads, [*inputs, threads])
             counts = self.manifolds.counts.numpy().reshape(-1, COUNTS)
             if not counts[:, OVERFLOW].any():
                 return

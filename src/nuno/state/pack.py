@@ -96,6 +96,53 @@ def find_broken(
         broken[world] = 1
 
 
+@wp.kernel(enable_backward=False, module="nuno.state.finite")
+def gather_places(
+    x: wp.array(dtype=Any),
+    y: wp.array(dtype=Any),
+    z: wp.array(dtype=Any),
+    origin: wp.array2d(dtype=wp.float64),
+    some: wp.array2d(dtype=int),
+    n: int,
+    out: wp.array3d(dtype=wp.float64),
+):
+    """All particles of each world, or ``some`` where there are any, in doubles and about the world's own origin."""
+    world, i = wp.tid()
+    k = world * n + i
+    if some.shape[1] > 0:
+        k = world * n + (some[world, i] + n) % n  # -1 is the last, as in NumPy
+    out[world, i, 0] = wp.float64(x[k]) + origin[world, 0]
+    out[world, i, 1] = wp.float64(y[k]) + origin[world, 1]
+    out[world, i, 2] = wp.float64(z[k]) + origin[world, 2]
+
+
+for _number in (float, wp.float64):
+    _ends = [wp.array2d(dtype=wp.float64), wp.array2d(dtype=int), int, wp.array3d(dtype=wp.float64)]
+    wp.overload(gather_places, [*[wp.array(dtype=_number)] * 3, *_ends])
+
+
+def places_of_worlds(
+    places: list[wp.array], origin: np.ndarray, n: int, some: np.ndarray | None, device: str
+) -> np.ndarray:
+    """Return (worlds, k, 3) float64 [m], put together on the device, which is waited for once.
+
+    Args:
+        places: The solver's x, y and z, one world of n particles after the other.
+        origin: (worlds, 3) float64, what they are relative to.
+        n: Particles of a world.
+        some: (worlds, k) int, which of them; None for all.
+        device: Where they are.
+    """
+    worlds = len(origin)
+    count = n if some is None else some.shape[1]
+    chosen = np.zeros((worlds, 0), dtype=np.int32) if some is None else np.asarray(some, dtype=np.int32)
+    out = wp.empty((worlds, count, 3), dtype=wp.float64, device=device)
+    if out.size:
+        given = [wp.array(origin, dtype=wp.float64, device=device), wp.array(chosen, dtype=int, device=device), n, out]
+        wp.launch(gather_places, dim=(worlds, count), inputs=[*places, *given], device=device)
+    return np.asarray(out.numpy())
+
+
 def finite_worlds(
     state: Any, worlds: int, n: int, device: str, counts: wp.array | None = None
 ) -> tuple[np.ndarray, np.ndarray | None]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.coupled.joint_opening import Trees
 from nuno.coupled.joint_response import Joints
-from nuno.coupled.joint_tree import Trees
 from nuno.joints.joint import KINDS, Joint, JointSpec
 from nuno.tables.joint_trees import ANCHOR, tree_table
 

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import warp as wp
 
-from nuno.coupled.joint_tree import Inertia, Opening, Trees
+from nuno.coupled.articulated_inertia import Inertia
+from nuno.coupled.joint_opening import Opening, Trees
 
 ANCHOR = -1
 """In place of a body: the world, or what is static."""
@@ -108,6 +109,7 @@ def tree_table(pairs: Sequence[tuple[int, int]], worlds: int, device: str) -> Tr
     table.opening = wp.zeros(worlds * table.count, dtype=Opening, device=device)
     table.shift = wp.zeros(nodes, dtype=wp.vec3, device=device)
     table.turn = wp.zeros(nodes, dtype=wp.vec3, device=device)
+    table.stale = wp.zeros(nodes, dtype=int, device=device)
     table.changed = wp.zeros(worlds * table.count, dtype=int, device=device)
     table.wrong = wp.zeros(worlds * table.count, dtype=float, device=device)
     return table

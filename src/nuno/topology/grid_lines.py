@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from nuno.topology.cloth_topology import Elements
 
 
+@lru_cache(maxsize=8)
 def find_grid_lines(edges: Elements) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Order edges so that each grid line's follow one another, the second vertex of one the first of the next.
+
+    What it returns is kept for who asks again, and not to be written to.
 
     Args:
         edges: Edges whose ``axis`` is 0 (warp) or 1 (weft); none but the ends of a grid line branch.

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics, Push
+from nuno.bodies.dynamics import ParticleDynamics
+from nuno.bodies.push import Push
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.rows_of_worlds import SOON, WorldRows, merge_path
 from nuno.shapes.coordinates import Pose

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.bodies.dynamics import Push, State
+from nuno.bodies.dynamics import State
+from nuno.bodies.push import Push
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import GripSpec
 from nuno.joints.joint import JointSpec

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import Push
+from nuno.bodies.push import Push
 from nuno.engines.engine_registry import ENGINES
 from nuno.errors import FileFormatError, NunoError
 from nuno.files.whole_file import replacing
