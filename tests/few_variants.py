@@ -6,9 +6,4 @@ import pytest
 def few(values, *short):
     """Return parameters for ``pytest.mark.parametrize``, all but ``short`` of them marked long."""
     assert all(any(value == each for each in values) for value in short)
-    return [
-        value
-        if value in short
-        else pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.long)
-        for value in values
-    ]
+    return [value if value in short else pytest.param(value, marks=pytest.mark.long) for value in values]

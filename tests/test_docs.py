@@ -140,7 +140,7 @@ def test_every_example_is_in_the_gallery():
 
 
 def test_the_first_program_runs(tmp_path):
-    """That of docs/getting-started.md, as it is, in a process of its own, which prints its own lines and none of Warp's."""
+    """That of docs/getting-started.md, as it is, in a process of its own, which prints no line of Warp's."""
     (tmp_path / "first.py").write_text(BLOCKS["getting-started-0"])
     done = subprocess.run([sys.executable, "first.py"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr

@@ -106,6 +106,6 @@ def test_order_depends_on_the_world_alone(shape: str, alone: str) -> None:
         listed(batch, "fused", 0.004, 0.003),
         listed(batch, "fused", 0.004, 0.008),
     ):
-        for few, many in zip(short, other, strict=True):
-            wanted = set(map(tuple, few.tolist()))
-            assert [row for row in map(tuple, many.tolist()) if row in wanted] == list(map(tuple, few.tolist()))
+        for fewer, many in zip(short, other, strict=True):
+            wanted = set(map(tuple, fewer.tolist()))
+            assert [row for row in map(tuple, many.tolist()) if row in wanted] == list(map(tuple, fewer.tolist()))
