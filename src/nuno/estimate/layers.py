@@ -88,7 +88,7 @@ class Layers:
     def _on_the_cloth(self, colours: Any) -> tuple[list[str], list[tuple[float, ...]], np.ndarray]:
         """Return what parts of the cloth there are, their colours, and a picture (h, w, 3) of the cloth spread flat.
 
-        Each pixel has the colour of the nearest sample of the grid. It is white where none is near: that part stands upright.
+        A pixel has the colour of the grid's nearest sample. It is white where none is near, as on what stands upright.
         """
         from scipy.spatial import cKDTree
 
