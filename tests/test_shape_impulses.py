@@ -203,7 +203,7 @@ def scenes(world):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("build", [scenes, thrown])
+@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.slow), thrown])
 @pytest.mark.parametrize("device", DEVICES)
 def test_asking_changes_no_bit(device, build):
     """Bodies that sum up go on, step by step or in one run, as they do without; so do those around them."""
