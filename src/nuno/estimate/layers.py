@@ -78,14 +78,14 @@ class Layers:
         )  # fmt: skip
         figure.colorbar(shown, ax=left, ticks=range(1, max(deepest, 2) + 1), label="layers", shrink=0.7)
         left.set(title="from above: layers over the table", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        names, colours, shown = self._on_the_cloth(_colours(max(deepest, 2)))
-        right.imshow(shown, origin="lower", extent=(0, 1, 0, 1), aspect="auto", interpolation="nearest")
+        names, colours, picture = self._on_the_cloth(_colours(max(deepest, 2)))
+        right.imshow(picture, origin="lower", extent=(0, 1, 0, 1), aspect="auto", interpolation="nearest")
         right.set(title="on the cloth: which parts lie under which", xlabel="u", ylabel="v", xlim=(0, 1), ylim=(0, 1))
         parts = [Patch(facecolor=colour, label=name) for name, colour in zip(names, colours, strict=True)]
         right.legend(handles=parts, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
         return figure
 
-    def _on_the_cloth(self, colours: Any) -> tuple[list[str], list[tuple[float, ...]], np.ndarray]:
+    def _on_the_cloth(self, colours: Any) -> tuple[list[str], list[tuple[float, float, float]], np.ndarray]:
         """Return what parts of the cloth there are, their colours, and a picture (h, w, 3) of the cloth spread flat.
 
         A pixel has the colour of the grid's nearest sample. It is white where none is near, as on what stands upright.
@@ -100,7 +100,8 @@ class Layers:
             colour = np.array(colours(int(kind) // 2)[:3])
             palette[kind] = 0.5 + 0.5 * colour if kind % 2 else colour  # paler: turned over
             names.append(f"{name}, turned over" if kind % 2 else name)
-            shades.append(tuple(palette[kind]))
+            red, green, blue = palette[kind].tolist()
+            shades.append((red, green, blue))
         picture = np.ones((PIXELS, PIXELS, 3))
         if len(kinds):
             centres = (np.arange(PIXELS) + 0.5) / PIXELS
