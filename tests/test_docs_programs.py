@@ -21,7 +21,8 @@ PAGES = {
 # runs the first program
 LONG = {
     "engines", "folds", "following", "learning", "picks", "planning", "robot-dynamics",
-    "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "tutorial", "viewer", "wire", "worlds",
+    "rigid-bodies", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "tutorial", "viewer", "walking",
+    "wire", "worlds",
 }  # fmt: skip
 # pages whose every call is made by examples, as a test below holds: long tests run the examples, slow ones these pages
 OF_EXAMPLES = {
