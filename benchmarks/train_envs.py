@@ -114,7 +114,7 @@ def plot(file: Path, rows: list[dict[str, float]], found: dict[str, tuple[float,
     axes.plot([last, last], found["learned"], "o", color="black", label="score and solved, without noise")
     axes.axhline(found["script"][0], color="gray", linestyle=":", label="score of the script")
     axes.set(xlabel="environment steps", ylim=(0.0, 1.02), title=title)
-    axes.legend()
+    axes.legend(loc="lower right", fontsize="small")
     figure.savefig(file, dpi=100)
 
 

@@ -79,4 +79,6 @@ if out:
         pictures.append(nuno.take_picture(real, camera, samples=3).color.numpy()[..., ::-1].copy())
         outline, _ = cv2.findContours(masks[k].astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(pictures[-1], outline, -1, (0, 128, 255), 1)
+        label = f"{TIMES[k]:.1f} s: found, and the outline seen"
+        cv2.putText(pictures[-1], label, (10, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (40, 40, 40), 1, cv2.LINE_AA)
     cv2.imwrite(str(out / "fit_material.png"), np.hstack(pictures))

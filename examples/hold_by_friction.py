@@ -29,9 +29,9 @@ def thing(kind, x):
         cube = nuno.box((0.05,) * 3, position=(x, 0, 0.45), color="#c05030")
         return cube, nuno.Rigid(mass=0.5, friction=MU), 0.5, 0.025
     if kind == "towel":  # by its upper edge
-        sheet = nuno.sheet((0.2, 0.3), (14, 21), position=(x, 0, 0.32), quaternion=UPRIGHT, color="#3070b0")
+        sheet = nuno.sheet((0.2, 0.3), (10, 15), position=(x, 0, 0.32), quaternion=UPRIGHT, color="#3070b0")
         return sheet, nuno.Cloth(area_density=0.4, friction=MU, damping=0.02), 0.024, 0.002
-    mat = nuno.soft_box((0.2, 0.02, 0.2), (10, 2, 10), position=(x, 0, 0.339), quaternion=CORNER, color="#40a060")
+    mat = nuno.soft_box((0.2, 0.02, 0.2), (6, 2, 6), position=(x, 0, 0.339), quaternion=CORNER, color="#40a060")
     return mat, nuno.Soft(youngs_modulus=1e5, poisson_ratio=0.3, density=200.0, friction=MU, damping=0.05), 0.16, 0.01
 
 
@@ -68,5 +68,5 @@ for kind, share, force, body, palm, _ in tries:
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = nuno.Camera.look_at(eye=(0.9, 2.6, 1.1), target=(0.0, 0.0, 0.5), fov=0.5, width=800, height=480)
+    camera = nuno.Camera.look_at(eye=(0.5, 2.3, 0.95), target=(0.0, 0.0, 0.52), fov=0.45, width=800, height=480)
     nuno.take_picture(world, camera).save(out / "hold_by_friction.png")

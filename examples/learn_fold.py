@@ -68,6 +68,7 @@ if out:
     left.axhline(scripted, color="gray", linestyle="--", label="script")
     left.set(xlabel="generation of 16 episodes", ylabel="score of the fold", ylim=(0.0, 1.0))
     left.legend(loc="lower right")
+    left.xaxis.get_major_locator().set_params(integer=True)
     right.imshow(picture)
     right.set_axis_off()
     figure.savefig(out / "learn_fold.png", dpi=100)

@@ -21,7 +21,7 @@ out = options.parse_args().out
 
 world = nuno.World(device="cpu")
 world.add(nuno.box((1.2, 0.8, 0.02), name="table", position=(0.6, 0, 0.70), color="#b08050"))
-cube = world.add(nuno.soft_box((SIZE, SIZE, SIZE), cells=(CELLS, CELLS, CELLS), color="gray"))
+cube = world.add(nuno.soft_box((SIZE, SIZE, SIZE), cells=(CELLS, CELLS, CELLS), color="#50a050"))
 cube.locate((0.6, 0, 0.95))  # still a rigid, motionless shape
 world.run(0.2)  # nothing moves, nothing is computed
 world.attach(cube, FOAM)

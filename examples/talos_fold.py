@@ -43,7 +43,7 @@ assert talos.reach({"base_link": hips, **READY})
 robot = nuno.SimulatedRobot(talos, world)
 
 as_taught = taught.on(towel, forward=(1, 0))
-better = improve_fold(as_taught, towel, generations=1, population=8, progress=False)
+better = improve_fold(as_taught, towel, generations=1, population=5, progress=False)
 
 look = FoldPictures(robot, towel)
 played = play_fold(robot, towel, better.motion, watch=look if asked.out else None)

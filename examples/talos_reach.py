@@ -70,5 +70,5 @@ assert robot.self_collisions() == []
 
 if out:
     out.mkdir(parents=True, exist_ok=True)
-    camera = nuno.Camera.look_at((1.9, -1.5, 1.6), (0.35, 0, 0.8), fov=0.72)
+    camera = nuno.Camera.look_at((1.9, -1.5, 1.6), (0.3, 0, 0.86), fov=0.82)
     nuno.HeadCameras(links, samples=2).look_from(camera).save(out / "talos_reach.png")

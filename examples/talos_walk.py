@@ -46,14 +46,16 @@ assert robot.self_collisions() == []
 if out:
     out.mkdir(parents=True, exist_ok=True)
     figure = Figure((10, 3.2), layout="constrained")
-    for axes, walk in zip(figure.subplots(1, 3, width_ratios=(2.6, 1, 1)), (ahead, turn, stopped), strict=True):
-        for foot, colour in ((0, "tab:blue"), (1, "tab:red")):
+    walks = {"a metre ahead": ahead, "a turn on the spot": turn, "stopped on its way": stopped}
+    for axes, (title, walk) in zip(figure.subplots(1, 3, width_ratios=(2.6, 1, 1)), walks.items(), strict=True):
+        for foot, (side, colour) in enumerate({"left": "tab:blue", "right": "tab:red"}.items()):
+            axes.plot([], [], color=colour, linewidth=0.7, label=f"{side} sole on the floor")
             for x, y, _, yaw in np.unique(walk.feet[walk.support == 0][:, foot].round(6), axis=0):
                 c, s = np.cos(yaw), np.sin(yaw)
                 corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)]) * sole / 2
                 axes.plot(*(corners @ [[c, s], [-s, c]] + (x, y)).T, color=colour, linewidth=0.7)
         axes.plot(*walk.zmp.T, color="black", linewidth=0.8, label="zero moment point")
         axes.plot(*walk.centre[:, :2].T, color="tab:green", label="centre of mass")
-        axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+        axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=title)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     figure.savefig(out / "talos_walk.png", dpi=100)

@@ -78,9 +78,9 @@ def check_result(result, n, m):
     assert set(result["seconds"]) == {"read", "see", "compile", "imagine", "compare", "total"}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_full_grid(tmp_path):
-    """All 36 candidates: the answer is the point that was picked; `test_a_small_grid_end_to_end` has four of them."""
+    """All 36 candidates: the answer is the point that was picked. An example has all of them, of fewer guesses."""
     assert pick(CASE, tmp_path) == 0
     check_result(json.loads((tmp_path / "result.json").read_text()), 6, 6)
 

@@ -14,6 +14,8 @@ others, where one was put elsewhere in some, where some were reset to before a b
 under way in one alone; the last but one where a body stood on a path that led elsewhere in others."""
 FEW = (29, 55, 58, 106)
 """Of those, some that take no second each and have all kinds of changes but leaving dynamics."""
+LONGEST = (5, 19)
+"""Of those, two that take more seconds than all others."""
 WORLDS, COLOURS = 3, 4
 
 
@@ -78,7 +80,7 @@ def test_a_few_worlds_of_a_batch_that_differ():
 @pytest.mark.long
 def test_worlds_of_a_batch_that_differ():
     """Other places, velocities, pushes, paths, grips and friction in each world: each is what it is alone."""
-    happened = check([seed for seed in SHORT if seed not in FEW], "cpu")
+    happened = check([seed for seed in SHORT if seed not in FEW + LONGEST], "cpu")
     assert happened >= {"place", "velocity", "push", "path", "hold", "friction", "attach", "detach", "reset", "run"}
 
 
@@ -221,6 +223,12 @@ def test_what_stands_on_a_path_is_touched_as_what_has_none(kind):
         return batch.find("sheet").vertices
 
     np.testing.assert_array_equal(lain(0.3, 0.0)[1], lain(0.0))
+
+
+@pytest.mark.slow
+def test_more_worlds_of_a_batch_that_differ():
+    """The same for those that take longest."""
+    check(LONGEST, "cpu")
 
 
 @pytest.mark.slow

@@ -20,12 +20,18 @@ PAGES = {
 # pages whose programs take some three seconds of a core or more; `test_docs.py` looks for all names of all pages, and
 # runs the first program
 LONG = {
-    "closed-loop", "engines", "folds", "following", "garments", "getting-started", "learning", "picks",
-    "planning", "robot-dynamics", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "teaching",
-    "tutorial", "viewer", "wire", "worlds",
+    "engines", "folds", "following", "learning", "picks", "planning", "robot-dynamics",
+    "rigid-bodies", "robot-interface", "scenes", "sensors", "soft-bodies", "sweeps", "tutorial", "viewer", "walking",
+    "wire", "worlds",
 }  # fmt: skip
 # pages whose every call is made by examples, as a test below holds: long tests run the examples, slow ones these pages
-OF_EXAMPLES = {"carrying": ("carry_mat", "lift_soft_cube")}
+OF_EXAMPLES = {
+    "carrying": ("carry_mat", "lift_soft_cube"),
+    "closed-loop": ("closed_loop",),
+    "getting-started": ("drop_on_table",),  # test_docs.py runs it, too
+    "garments": ("hold_garment", "follow_in_hand", "pick_outline"),
+    "teaching": ("talos_fold",),
+}
 
 
 def blocks(page):

@@ -1,9 +1,6 @@
 """Every example runs headless and passes its own check."""
 
 import importlib.util
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -13,8 +10,6 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-SHORT = {"soft_cube"}
-"""The others take more than some three seconds of a core each."""
 
 
 def _pictures_of():
@@ -28,22 +23,14 @@ def _pictures_of():
 pictures_of = _pictures_of()
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, id=path.stem, marks=[] if path.stem in SHORT else [pytest.mark.long]) for path in EXAMPLES],
-)
-def test_example(path, tmp_path, request):
+@pytest.mark.long
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example(path, tmp_path, run_warm):
     """In a process of its own, without a display: its check holds, and a picture is all that it leaves."""
     folder = tmp_path / "here"
     folder.mkdir()
     out = folder / "out"
-    arguments = [str(path), "--out", str(out)]
-    if path.stem in SHORT:
-        headless = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
-        command = [sys.executable, *arguments]
-        done = subprocess.run(command, cwd=folder, env=headless, capture_output=True, text=True, check=False)
-    else:
-        done = request.getfixturevalue("run_warm")(arguments, folder, tmp_path)
+    done = run_warm([str(path), "--out", str(out)], folder, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert list(folder.iterdir()) == [out], "it leaves nothing behind that was not asked for"
     pictures = [cv2.imread(str(picture)) for picture in out.glob("*.png")]

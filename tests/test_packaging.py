@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -39,6 +40,8 @@ sys.meta_path[:] = [Without(finder) for finder in sys.meta_path]
 import nuno
 """
 
+END = "that is all of it"
+
 
 def without(code, packages=OPTIONAL):
     """Run ``code`` in a process that has none of some packages, and return what it prints."""
@@ -70,27 +73,36 @@ for module in pkgutil.walk_packages(nuno.__path__, "nuno."):
     assert missed["nuno.robot.humanoid"] == "robot" and missed["nuno.viewer"] == "viewer"
 
 
-@pytest.mark.parametrize(
-    ("code", "package", "extra"),
-    [
-        ("nuno.Humanoid", "pin", "robot"),
-        ("nuno.plan_walk", "pin", "robot"),
-        ("nuno.TowelPicker", "pin", "robot"),
-        ("nuno.WireRobot", "pin", "robot"),
-        ("nuno.Viewer", "tornado", "viewer"),
-        ("nuno.Viewer(nuno.World())", "meshcat", "viewer"),
-        ("nuno.Humanoid('talos')", "example-robot-data", "robot"),
-        ("nuno.World(engine='mujoco')", "mujoco 4", "mujoco"),
-        ("nuno.minimise(lambda world, params: None, {'x': (0, 1)}, value='v')", "cma", "search"),
-    ],
-)
+USES = [
+    ("nuno.Humanoid", "pin", "robot"),
+    ("nuno.plan_walk", "pin", "robot"),
+    ("nuno.TowelPicker", "pin", "robot"),
+    ("nuno.WireRobot", "pin", "robot"),
+    ("nuno.Viewer", "tornado", "viewer"),
+    ("nuno.Viewer(nuno.World())", "meshcat", "viewer"),
+    ("nuno.Humanoid('talos')", "example-robot-data", "robot"),
+    ("nuno.World(engine='mujoco')", "mujoco 4", "mujoco"),
+    ("nuno.minimise(lambda world, params: None, {'x': (0, 1)}, value='v')", "cma", "search"),
+]
+MISSING = tuple(code for code, *_ in USES)
+
+
+@cache
+def refused(codes, *packages):
+    """Return what is said of each use of packages that are not there, all in one process."""
+    attempts = (
+        f"try:\n    {code}\nexcept nuno.MissingPackageError as error:\n    print(error.package, error.extra, error)\n"
+        f"print({END!r})\n"
+        for code in codes
+    )
+    return without("".join(attempts), packages).split(f"{END}\n")
+
+
+@pytest.mark.parametrize(("code", "package", "extra"), USES)
 def test_a_missing_package_is_named(code, package, extra):
     """What is used without its extra names the package as pip calls it, and the command that works in a clone."""
     single = package in ("meshcat", "example-robot-data")  # the others are met before these
-    out = without(
-        f"try:\n    {code}\nexcept nuno.MissingPackageError as error:\n    print(error.package, error.extra, error)\n",
-        [package.replace("-", "_")] if single else OPTIONAL,
-    )
+    out = refused((code,), package.replace("-", "_"))[0] if single else refused(MISSING, *OPTIONAL)[MISSING.index(code)]
     assert out.startswith(f"{package} {extra} ")
     assert f"in a clone of Nuno: pip install -c constraints.txt '.[{extra}]'" in out
 

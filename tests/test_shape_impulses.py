@@ -155,7 +155,7 @@ def test_worlds_in_which_a_pair_takes_other_substeps():
     worlds.attach(cube, nuno.Soft(density=200.0, youngs_modulus=2e5, damping=0.02))
     assert cube.resolution.substeps > body.resolution.substeps
     worlds.set_pose(cube, position=(0.6, 0.0, 0.032), worlds=[0])  # on the table alone
-    worlds.run(1.0)
+    worlds.run(0.6)
     found = worlds.contacts(body).impulses["box"]
     weight_of_box = 0.3 * GRAVITY / worlds.frame_rate
     np.testing.assert_allclose(found, [(0.0, 0.0, -weight_of_box)] * 2, atol=0.02 * weight_of_box)
@@ -202,7 +202,8 @@ def scenes(world):
     return (grip,)
 
 
-@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.long), thrown])
+@pytest.mark.long
+@pytest.mark.parametrize("build", [pytest.param(scenes, marks=pytest.mark.slow), thrown])
 @pytest.mark.parametrize("device", DEVICES)
 def test_asking_changes_no_bit(device, build):
     """Bodies that sum up go on, step by step or in one run, as they do without; so do those around them."""

@@ -61,6 +61,19 @@ def test_the_picture():
     assert len(figure.axes) == 3  # two maps and a colour bar
 
 
+def test_the_picture_of_the_cloth():
+    """Folded twice, its quarters have the colours of their layers; no other part is as large as a tenth of it."""
+    right = find_layers(*folded(2), step=STEP).figure().axes[1]
+    shades = {text.get_text(): patch.get_facecolor()[:3] for text, patch in
+              zip(right.get_legend().get_texts(), right.get_legend().get_patches(), strict=True)}  # fmt: skip
+    picture = np.asarray(right.images[0].get_array())
+    quarters = ("under 3", "seen from above, turned over", "under 1", "under 2, turned over")
+    for k, name in enumerate(quarters):
+        alike = (np.abs(picture - shades[name]) < 0.01).all(axis=-1)
+        middle = alike[:, (2 * k + 1) * alike.shape[1] // 8]
+        assert middle.all() and 0.2 < alike.mean() < 0.3, name
+
+
 @pytest.mark.parametrize("step", [0.0, -1.0, np.nan, 1e-6])
 def test_a_bad_step(step):
     """Not positive, or so fine that the grid would not fit into memory."""

@@ -36,7 +36,7 @@ MESHES = {
 }
 
 
-LONG = ("torus", "cylinder", "turned box", "odd sphere", "wavy ball")
+LONG = ("torus", "cone", "cylinder", "turned box", "odd sphere", "wavy ball")
 
 
 @pytest.fixture(

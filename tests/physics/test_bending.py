@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from world_with import GRAVITY, attached
 
 import nuno
+from few_variants import few
 
 
 def ratios(loads, cells, **options):
@@ -161,7 +162,7 @@ def test_edge_moments_bend_a_plate_to_a_cylinder_in_any_direction(direction):
     np.testing.assert_allclose(w - w.mean(), expected - expected.mean(), atol=0.05 * np.ptp(expected))
 
 
-@pytest.mark.parametrize("angle", [0.0, 45.0, 90.0])
+@pytest.mark.parametrize("angle", few([0.0, 45.0, 90.0], 45.0))
 def test_a_bias_strip_of_a_mesh_bends_by_the_same_rigidity(angle):
     """Elastica at G = 10 for a strip cut at an angle to the warp, which the pattern says."""
     length, cells, across, load = 0.2, 10, 2, 10.0

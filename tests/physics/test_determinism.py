@@ -6,7 +6,7 @@ import pytest
 import nuno
 
 WORLDS = 20
-SECONDS = 0.8
+SECONDS = 0.5
 
 
 def materials():

@@ -117,17 +117,17 @@ def test_a_lifted_cube_slides_as_coulomb_says(share):
     assert gripper.slip() == pytest.approx(held, rel=0.03, abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=() if kind == "cube" else pytest.mark.long) for kind in MATERIALS]
-)
+MARKS = {"cube": (), "cloth mat": pytest.mark.slow}
+"""A mat of cloth is held as a towel is."""
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=MARKS.get(kind, pytest.mark.long)) for kind in MATERIALS])
 def test_things_are_carried_by_friction_alone(kind):
     """0.5 m up in 1 s: with 1.2 times the bound's force nothing slides by more than 0.5 mm."""
     assert Gripper(kind, 1.2 * bound(kind, PEAK)).carry() < 5e-4
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=() if kind == "cube" else pytest.mark.long) for kind in MATERIALS]
-)
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=MARKS.get(kind, pytest.mark.long)) for kind in MATERIALS])
 def test_things_slip_where_friction_is_too_small(kind):
     """With 0.8 times the force that holds the weight at rest, they slide down, and out."""
     gripper = Gripper(kind, 0.8 * bound(kind))

@@ -6,6 +6,7 @@ from triangles import rectangle
 from world_with import GRAVITY, attached
 
 import nuno
+from few_variants import few
 from nuno.shapes import quaternion as quat
 
 
@@ -43,7 +44,7 @@ def test_translation_changes_nothing(kind):
 
 
 @pytest.mark.parametrize("kind", ["sheet", "right-angled"])
-@pytest.mark.parametrize("angle", [37.0, 90.0, 180.0])
+@pytest.mark.parametrize("angle", few([37.0, 90.0, 180.0], 37.0))
 def test_rotation_turns_the_result(kind, angle):
     """Invariant: cloth, ball and gravity turned about a slanted axis give the same motion, turned."""
     axis = np.array([1.0, 2.0, -2.0]) / 3.0

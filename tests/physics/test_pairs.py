@@ -67,7 +67,7 @@ def test_a_sheet_rests_on_a_sheet():
     upper = world.add(nuno.sheet((0.2, 0.2), (10, 10), position=(0.03, 0.02, 0.06)))
     for each in (lower, upper):
         world.attach(each, nuno.Cloth(thickness=0.004))
-    world.run(1.5)
+    world.run(0.8)
     both = np.concatenate([lower.vertices, upper.vertices])
     faces = np.concatenate([lower.faces, upper.faces + len(lower.vertices)])
     assert count_crossings(both, faces) == 0

@@ -62,7 +62,9 @@ SIZES = {
 # on CUDA, where a frame of these takes 0.1 s, the test of forces below tells as much sooner
 @pytest.mark.long
 @pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=[pytest.mark.cuda, pytest.mark.slow])])
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(
+    "size", [size if size == "coarse" else pytest.param(size, marks=pytest.mark.slow) for size in SIZES]
+)
 @pytest.mark.parametrize(("part", "holds"), [(0.95, True), (1.05, False)])
 def test_the_cloth_slips_where_it_is_too_heavy(part, holds, size, device):
     """Coulomb: two fingers at N hold 2 mu N; a weight of 0.95 of that stays and one of 1.05 slips."""

@@ -77,6 +77,7 @@ def disc(radius, rings):
     return points, Delaunay(points).simplices
 
 
+@pytest.mark.long
 def test_a_clamped_disc_sags_as_a_plate():
     """Closed form w = q R^4 / (64 D)."""
     rings, radius = 9, 0.09

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import nuno
+from few_variants import few
 from nuno.mesh.tetrahedra import box_tetrahedra
 
 CELL = 0.01  # [m]
@@ -81,7 +82,7 @@ def test_a_batch_is_as_its_worlds_alone():
     np.testing.assert_array_equal(closed(True, worlds=3).vertices, np.repeat(closed(True).vertices[None], 3, axis=0))
 
 
-@pytest.mark.parametrize("layers", [1, 2, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.parametrize("layers", few([1, 2, 3], 1))
 def test_a_thin_plate_does_not_push_itself(layers):
     """Its far side is near, too, but through the material: it falls and lies as one that does not touch itself."""
 

@@ -12,6 +12,7 @@ from triangles import rectangle
 from world_with import attached
 
 import nuno
+from few_variants import few
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,7 @@ def test_a_wide_strip_has_the_rigidity_of_a_narrow_one(kind):
         assert rigidity_ratio(felt[0], measured[0]) == pytest.approx(1.0, abs=0.06)
 
 
-@pytest.mark.parametrize("kind", ["sheet", "right-angled", "jittered"])
+@pytest.mark.parametrize("kind", few(["sheet", "right-angled", "jittered"], "sheet"))
 def test_a_wide_clamped_strip_stretches_by_its_stiffness(kind):
     """Closed form F / width = Et strain with Et, not Et / (1 - nu^2), and no contraction across."""
     stiffness, traction, cells, side = 100.0, 2.0, 10, 0.2  # [N/m], [N/m]

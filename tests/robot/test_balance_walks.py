@@ -27,6 +27,10 @@ def stood(request):
     return world, robot, world.save()
 
 
+PUSHED = pytest.mark.parametrize("stood", ["talos", pytest.param("g1", marks=pytest.mark.slow)], indirect=True)
+"""One robot is pushed by long tests, the other by slow ones."""
+
+
 def front_bound(robot):
     """The impulse [N s] that brings the capture point to the soles' front edge: m w d, w = sqrt(g / h)."""
     actual = robot.actual
@@ -54,6 +58,7 @@ def test_the_floor_bears_the_weight_and_is_told(stood):
 
 
 @pytest.mark.long
+@PUSHED
 def test_below_the_capture_bound_its_feet_stay(stood):
     """0.7 m w d ahead: ankles are enough, no foot is lifted, and it stands where it stood within 5 mm."""
     world, robot, saved = stood
@@ -86,6 +91,7 @@ def test_past_the_capture_bound_it_steps_and_stands():
 
 
 @pytest.mark.long
+@PUSHED
 def test_far_past_it_falls_says_so_and_is_set_up(stood, caplog):
     """3 N s a kilogram: it falls, says when and why, lies on more than its feet, and stands again when set up."""
     world, robot, saved = stood

@@ -58,6 +58,26 @@ def pressing(robot, before):
     return pose.rotation @ robot.read().wrenches["right_wrist"][:3] - before
 
 
+@pytest.fixture(scope="module")
+def lowered(floor_world):
+    """What the wrist felt before (3,) [N], and a snapshot in which the hand has come to rest on a table."""
+    world, robot, saved = floor_world
+    world.restore(saved)
+    free = robot.actual.frame_pose("right_wrist").rotation @ robot.read().wrenches["right_wrist"][:3]
+    world.add(table_under(robot))
+    lower_hand(robot)
+    return free, world.save()
+
+
+@pytest.fixture
+def on_a_table(floor_world, lowered):
+    """The world and the robot of ``floor_world``, its right hand on a table, and what its wrist felt before."""
+    world, robot, _ = floor_world
+    free, saved = lowered
+    world.restore(saved)
+    return world, robot, free
+
+
 def test_contacts_bear_the_robot(standing):
     """At rest both soles touch the floor and nothing else does: together they bear its weight, within 0.1 %."""
     world, robot = standing
@@ -88,18 +108,14 @@ def test_contacts_are_what_moves_the_robot(standing):
 
 
 @pytest.mark.long
-def test_a_wrist_reads_what_a_table_does_to_the_hand(standing):
+def test_a_wrist_reads_what_a_table_does_to_the_hand(on_a_table):
     """A hand that presses a static table stops there; its wrist reads the table's force, within 1 %.
 
     Inverse dynamics with the feet alone would miss it.
     """
-    world, robot = standing
-    pose = robot.actual.frame_pose("right_wrist")
-    free = pose.rotation @ robot.read().wrenches["right_wrist"][:3]
-    table = world.add(table_under(robot))
-    lower_hand(robot)
+    world, robot, free = on_a_table
     state = robot.state()
-    assert hand_points(robot)[:, 2].min() > table.vertices[:, 2].max() - 1e-3
+    assert hand_points(robot)[:, 2].min() > world.find("table").vertices[:, 2].max() - 1e-3
     force = by_table(state)
     assert SOLES < set(state.contacts) <= SOLES | set(HAND) and force[2] > 20.0
     np.testing.assert_allclose(pressing(robot, free), force, atol=0.01 * np.linalg.norm(force))
@@ -147,11 +163,10 @@ def felt_by_copies(world, seconds):
 
 
 @pytest.mark.long
-def test_feelings_are_restored_and_imagined(standing):
+def test_feelings_are_restored_and_imagined(on_a_table):
     """A restored robot reads what it read, and a copy in an imagined world feels what the robot does, bit for bit."""
-    world, robot = standing
-    world.add(table_under(robot))
-    lower_hand(robot)
+    world, robot, _ = on_a_table
+    world.step()
     told, state, saved = robot.read(), robot.state(), world.save()
     wrenches, forces = felt_by_copies(world, 0.05)
     np.testing.assert_array_equal(wrenches, [robot.state().joint_wrenches] * 2)
@@ -171,11 +186,10 @@ def test_without_dynamics_nothing_is_felt():
 
 
 @pytest.mark.long
-def test_a_copy_whose_hand_presses_a_table_keeps_the_bits(standing):
+def test_a_copy_whose_hand_presses_a_table_keeps_the_bits(on_a_table):
     """A copy of a robot that presses a table goes on bit for bit, also where a first contact point is not near."""
-    world, robot = standing
-    world.add(table_under(robot))
-    lower_hand(robot)
+    world, robot, _ = on_a_table
+    world.step()
     wrenches, forces = felt_by_copies(world, 0.5)
     np.testing.assert_array_equal(wrenches, [robot.state().joint_wrenches] * 2)
     np.testing.assert_array_equal(forces, [by_table(robot.state())] * 2)

@@ -67,8 +67,13 @@ def test_a_cube_is_lifted_by_friction_alone(scene):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("share", [pytest.param(1.2, marks=pytest.mark.long), 0.8])
-@pytest.mark.parametrize("kind", [pytest.param("towel", marks=pytest.mark.long), "mat"])
+@pytest.mark.parametrize(
+    ("kind", "share"),
+    [
+        ("towel", 1.2), ("mat", 0.8), pytest.param("towel", 0.8, marks=pytest.mark.slow),
+        pytest.param("mat", 1.2, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_a_towels_edge_and_a_mats_corner_are_lifted_by_friction_alone(tmp_path, kind, share):
     """0.5 m up in 1 s: with 1.2 times the bound's force they slide by less than 0.5 mm, with 0.8 times out."""
     world = nuno.World(device="cpu")

@@ -20,8 +20,13 @@ def benchmark():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("afloat", [False, True])
-@pytest.mark.parametrize("friction", ["none", "hard"])
+@pytest.mark.parametrize(
+    ("friction", "afloat"),
+    [
+        ("none", True), ("hard", False), pytest.param("none", False, marks=pytest.mark.slow),
+        pytest.param("hard", True, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_a_step_response_is_mujocos(benchmark, afloat, friction):
     """Seven joints are sent elsewhere, 2 s, steps of 0.83 ms, the same gains: within 1 % of the joints' ranges.
 
@@ -33,7 +38,7 @@ def test_a_step_response_is_mujocos(benchmark, afloat, friction):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("afloat", [False, True])
+@pytest.mark.parametrize("afloat", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_step_response_with_friction_at_the_default_step_is_mujocos_in_fine_steps(benchmark, afloat):
     """The same in Nuno's default steps of 1.67 ms, against MuJoCo in steps of 26 us: within 1 % of the joints' ranges.
 

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import nuno
+from few_variants import few
 from nuno.errors import InvalidInputError, RobotModelError, UnknownNameError, WalkError
 from nuno.robot.footsteps import Footstep, middle_of
 from nuno.robot.stride import Stride
@@ -61,7 +62,13 @@ def check_stands(robot, walk, margin):
     assert abs(nearest - walk.measures.margin) < 0.003
 
 
-@pytest.mark.parametrize("goal", [(0.36, 0, 0), (0, 0.15, 0), (0, 0, -0.7), (0.4, 0.1, 0.4), (-0.2, 0, 0)])
+@pytest.mark.parametrize(
+    "goal",
+    [
+        (0.36, 0, 0), (0.4, 0.1, 0.4),
+        *(pytest.param(goal, marks=pytest.mark.long) for goal in ((0, 0.15, 0), (0, 0, -0.7), (-0.2, 0, 0))),
+    ],
+)  # fmt: skip
 def test_talos_goes_there_and_stands(still_talos, goal):
     """Straight, aside, turning, all, and back: the end within 1 mm, 20 mm to the edge, feet still, limits kept."""
     walk = plan_walk(still_talos, *goal)
@@ -173,7 +180,7 @@ def test_a_velocity_is_kept_and_changed_under_way(still_talos):
     assert other.measures.margin > 0.03 and other.times[-1] > walk.times[-1]
 
 
-@pytest.mark.parametrize("time", [0.3, 0.9, 1.3, 2.6, 2.9, 3.5])
+@pytest.mark.parametrize("time", few([0.3, 0.9, 1.3, 2.6, 2.9, 3.5], 0.9, 2.6))
 def test_a_walk_stops_within_a_step(still_talos, time):
     """The foot in the air lands, the other comes beside it: two steps at most, and the robot stands."""
     walk = plan_walk(still_talos, 1.0, check_collisions=False)

@@ -81,10 +81,10 @@ def left_after_a_second(seed):
     return crossings(sheet)
 
 
-LONG = (2, 6, 12, 15, 18, 32, 39, 44, 50)
+LONG = (2, 6, 11, 12, 14, 15, 18, 26, 32, 39, 44, 50)
 
 
-@pytest.mark.parametrize("seed", [0, 4, 11, 14, 26, 33, *(pytest.param(seed, marks=pytest.mark.long) for seed in LONG)])
+@pytest.mark.parametrize("seed", [0, 4, 33, *(pytest.param(seed, marks=pytest.mark.long) for seed in LONG)])
 def test_nothing_thrown_dropped_or_crumpled_stays_crossed(seed):
     """Exact: no edge is inside of a triangle 1 s later; eleven of these left 2 to 21 crossings before."""
     assert left_after_a_second(seed) == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,8 @@ STEEP = 1e-3
 """Faces whose shadow on the ground is less than this share of them stand upright and count as no layer."""
 SAME = 1e-6
 """Points of the cloth whose fractions differ by less are one: rounding on a border that faces share."""
+PIXELS = 240
+"""Of the picture of the cloth spread flat, along either side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,7 @@ class Layers:
     def figure(self) -> Figure:
         """Two maps: how many layers lie where, from above; and, on the cloth spread flat, how deep each part lies."""
         from matplotlib.figure import Figure
+        from matplotlib.patches import Patch
 
         deepest = self.height.shape[-1]
         figure = Figure(figsize=(9.0, 4.2), layout="constrained", facecolor="white")
@@ -75,17 +78,38 @@ class Layers:
         )  # fmt: skip
         figure.colorbar(shown, ax=left, ticks=range(1, max(deepest, 2) + 1), label="layers", shrink=0.7)
         left.set(title="from above: layers over the table", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-        for layer in range(deepest - 1, -1, -1):
-            there = self.count > layer
-            u, v = self.material[there, layer].T
-            name = "seen from above" if layer == 0 else f"under {layer}"
-            turned = ~self.upward[there, layer]
-            colour = _colours(max(deepest, 2))(layer)
-            right.plot(u[~turned], v[~turned], "s", markersize=2.0, color=colour, label=name)
-            right.plot(u[turned], v[turned], "x", markersize=2.5, color=colour, label=f"{name}, turned over", alpha=0.8)
+        names, colours, picture = self._on_the_cloth(_colours(max(deepest, 2)))
+        right.imshow(picture, origin="lower", extent=(0, 1, 0, 1), aspect="auto", interpolation="nearest")
         right.set(title="on the cloth: which parts lie under which", xlabel="u", ylabel="v", xlim=(0, 1), ylim=(0, 1))
-        right.legend(fontsize=7, markerscale=3, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
+        parts = [Patch(facecolor=colour, label=name) for name, colour in zip(names, colours, strict=True)]
+        right.legend(handles=parts, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
         return figure
+
+    def _on_the_cloth(self, colours: Any) -> tuple[list[str], list[tuple[float, float, float]], np.ndarray]:
+        """Return what parts of the cloth there are, their colours, and a picture (h, w, 3) of the cloth spread flat.
+
+        A pixel has the colour of the grid's nearest sample. It is white where none is near, as on what stands upright.
+        """
+        from scipy.spatial import cKDTree
+
+        there = np.isfinite(self.material[..., 0])
+        kinds = 2 * np.nonzero(there)[2] + ~self.upward[there]
+        names, shades, palette = [], [], np.ones((int(kinds.max(initial=0)) + 1, 3))
+        for kind in np.unique(kinds):
+            name = "seen from above" if kind < 2 else f"under {kind // 2}"
+            colour = np.array(colours(int(kind) // 2)[:3])
+            palette[kind] = 0.5 + 0.5 * colour if kind % 2 else colour  # paler: turned over
+            names.append(f"{name}, turned over" if kind % 2 else name)
+            red, green, blue = palette[kind].tolist()
+            shades.append((red, green, blue))
+        picture = np.ones((PIXELS, PIXELS, 3))
+        if len(kinds):
+            centres = (np.arange(PIXELS) + 0.5) / PIXELS
+            places = np.stack(np.meshgrid(centres, centres), axis=-1)
+            away, nearest = cKDTree(self.material[there]).query(places)
+            near = away < 3.0 / np.sqrt(len(kinds))
+            picture[near] = palette[kinds[nearest[near]]]
+        return names, shades, picture
 
 
 def find_layers(vertices: np.ndarray, faces: np.ndarray, fractions: np.ndarray, *, step: float = 0.004) -> Layers:

@@ -162,7 +162,7 @@ def test_a_world_of_a_batch_meets_hulls_as_alone():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("substeps", [20, 40])
+@pytest.mark.parametrize("substeps", [20, pytest.param(40, marks=pytest.mark.slow)])
 def test_all_plans_meet_hulls_alike(substeps):
     """One source: sixteen particles at a time and one by one give the same bits, with floats and with doubles."""
     world = crowded(1)

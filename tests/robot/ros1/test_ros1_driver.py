@@ -106,6 +106,7 @@ def test_rospy_and_actionlib(master, plain):
 @pytest.mark.skipif(
     f"{sys.version_info.major}.{sys.version_info.minor}" != "3.11", reason="rospy's Python is another than this one"
 )
+@pytest.mark.long
 def test_scikit_robot_unmodified(master, plain):
     """Promise: scikit-robot's own ROSRobotInterfaceBase drives a robot of Nuno's as a real one."""
     pytest.importorskip("skrobot")
