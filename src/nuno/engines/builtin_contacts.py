@@ -3,20 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from nuno.bodies.dynamics import ParticleDynamics
-from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
+from nuno.dynamics.dynamics import ParticleDynamics
+from nuno.dynamics.rigid_dynamics import RigidScene, RigidWorld
+from nuno.engines.world_view import EngineWorld, bodies_by_key, dynamics_of, rules_of
 from nuno.materials import Cloth
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.joints.grip import Grip
 
 
-def contact_rows(world: Simulation, body: Body, itself: bool) -> list[tuple[Any, ...]]:
+class FrameSteps(Protocol):
+    """The bodies of a world in time, `nuno.world.stepping.Stepping` as the engine sees it."""
+
+    last: list[Any]
+
+    def run(self, time: float, stop: float) -> None:
+        """Advance all dynamic bodies from ``time`` to ``stop`` [s]."""
+
+    def wrench(self, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+        """Return force [N] and torque [N m], (worlds, 3) each, that a grip bore in the last frame."""
+
+    def effort(self, joint: Grip) -> np.ndarray:
+        """Return (worlds,), what acted along a joint's free direction in the last frame."""
+
+
+class BuiltinWorld(EngineWorld, RigidWorld, Protocol):
+    """A world as Nuno's own engine sees it; the members are those of `nuno.world.advancing.Advancing`."""
+
+    @property
+    def _rigid(self) -> RigidScene | None:
+        """What moves the rigid bodies, None where there are none."""
+
+    @property
+    def _stepping(self) -> FrameSteps:
+        """The bodies in time, with what the last frame told."""
+
+    def _bring_colliders(self) -> None:
+        """Tell solvers of the static bodies that they touch."""
+
+    def _bring_rigid(self) -> None:
+        """Tell the rigid solver what has changed."""
+
+
+def contact_rows(world: BuiltinWorld, body: Body, itself: bool) -> list[tuple[Any, ...]]:
     """Return a dynamic body's contacts as `Engine.contacts` tells them."""
     dynamics: Any = dynamics_of(body)
     found: list[tuple[Any, ...]] = []
@@ -34,7 +68,7 @@ def contact_rows(world: Simulation, body: Body, itself: bool) -> list[tuple[Any,
     return found
 
 
-def contact_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
+def contact_impulses(world: BuiltinWorld, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
     """Return what contacts gave bodies in the last frame as `Engine.impulses` tells it, read once for all."""
     found: list[dict[str, np.ndarray]] = [{} for _ in bodies]
     rigid: dict[int, Any] = {}
@@ -59,18 +93,18 @@ def contact_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str
     return found
 
 
-def _names(world: Simulation) -> dict[int, str]:
+def _names(world: BuiltinWorld) -> dict[int, str]:
     """Return the names of bodies by their slots among the rigid ones."""
     rigid = world._rigid
     assert rigid is not None
     return {slot: other.name for other, slot in zip(world.bodies, rigid.slots_of(world), strict=True)}
 
 
-def _coupled(world: Simulation) -> list[Any]:
+def _coupled(world: BuiltinWorld) -> list[Any]:
     return list(world._stepping.last)
 
 
-def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+def _on_itself(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
     """Return what a cloth's contacts with itself would do to its particles in the next substep."""
     from nuno.solvers.self_forces import self_contact_forces
 
@@ -82,7 +116,7 @@ def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
     return [(points[k, i], normals[k, i], forces[k, i], body.name, int(k)) for k, i in touching]
 
 
-def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+def _on_shapes(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
     """Return what static shapes would do to the body's particles in the next substep.
 
     What other bodies press on a shape is known of the last substep instead, from what the two did together.

@@ -11,7 +11,7 @@ from nuno.validation import checked
 if TYPE_CHECKING:
     from nuno.bodies.contact_rules import ContactRules
     from nuno.engines.engine import Engine
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 ENGINES = {
     "nuno": "nuno.engines.builtin_engine:BuiltinEngine",
@@ -34,7 +34,7 @@ def engine_class(name: Any) -> type[Engine]:
     return found
 
 
-def make_engine(name: Any, world: Simulation, device: str, rules: ContactRules) -> Engine:
+def make_engine(name: Any, world: EngineWorld, device: str, rules: ContactRules) -> Engine:
     """Return an engine for a world.
 
     Args:

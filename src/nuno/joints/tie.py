@@ -17,8 +17,7 @@ from nuno.validation import as_array, finite_array
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.joints.grip import Grip
-    from nuno.world.simulation import Simulation
+    from nuno.joints.grip import Grip, GripWorld
 
 
 MAX_FORCE = 1e4
@@ -119,7 +118,7 @@ def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
     return np.max([np.full(worlds, MAX_FORCE), *(MAX_ACCELERATION * mass for mass in masses)], axis=0)
 
 
-def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:
+def make_tie(body: Body, where: Any, other: Body, compliance: float, world: GripWorld) -> TieSpec:
     """Return what ties points of ``body`` to the nearest points of ``other``, where both are now.
 
     Raises:
@@ -158,7 +157,7 @@ def _tie_of(
 
 
 def make_hold(
-    body: Body, to: Any, target: Body | None, free: Any, compliance: float, world: Simulation
+    body: Body, to: Any, target: Body | None, free: Any, compliance: float, world: GripWorld
 ) -> tuple[HoldSpec, Pose | None]:
     """Return what holds a rigid body, and its pose in the frame of a static leader.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment

@@ -28,7 +28,7 @@ from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import checked, number
-from nuno.world.background import LATE
+from nuno.world.pace import LATE
 
 if TYPE_CHECKING:
     from nuno.robot.head_cameras import HeadCameras

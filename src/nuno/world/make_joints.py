@@ -23,6 +23,7 @@ from nuno.joints.tie import force_limit
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose, invert
 from nuno.validation import checked, finite_array
+from nuno.world.simulation import Simulation
 
 
 @checked
@@ -143,7 +144,7 @@ def _join(
         if not isinstance(body, Body) and not (body is None and body is b):
             raise InvalidInputError(f"a joint needs two bodies, or one and None, got {type(body).__name__}")
     world = a._world
-    if world is None:
+    if not isinstance(world, Simulation):
         raise BodyStateError(f"{a.name!r} is in no world; add and attach it before it is joined")
     with world._change("join"):
         other = None if b is None else world._own(b)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import SOON
+from nuno.dynamics.dynamics import SOON
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.mesh.memory_limit import check_host_memory
 from nuno.validation import finite_array, flag, function, instant, number
@@ -143,7 +144,7 @@ class Running(Advancing):
             instant("times", float(instants[-1]))
             needed = 3 * len(instants) * own.vertices.nbytes // 2  # float32, in pieces and as a whole
             check_host_memory(f"a trace of {len(instants)} instants", needed, "trace fewer at a time")
-            found = run_traced(self, own, instants)
+            found = run_traced(self, own, instants, partial(self.run, progress=False))
         return found[:, 0] if self.world_count == 1 else found
 
     def start(self, real_time_factor: float = 1.0) -> None:

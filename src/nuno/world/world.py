@@ -10,16 +10,18 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
 from nuno.bodies.body_facts import place_text
-from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
+from nuno.dynamics.dynamics import check_material, default_material
+from nuno.dynamics.push import make_push
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.html_table import html_table
-from nuno.joints.grip import Grip, make_grip, warn_shared
-from nuno.joints.joint import Joint, check_joined
+from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint
+from nuno.joints.make_grip import make_grip, warn_shared
 from nuno.joints.tie import check_leader, check_weld, tie_to_leader
 from nuno.materials import Material, Rigid
 from nuno.shapes.path import Path
-from nuno.solvers.resolution import warn_of_resolution
+from nuno.solvers.resolution_warnings import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
 from nuno.validation import finite_array, flag, number
 from nuno.world.setting import Setting
@@ -156,7 +158,7 @@ class World(Setting):
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
-            check_joined(own, chosen, self)
+            self._check_joined(own, chosen)
             given = None if own._dynamics is None else present_velocity(own)
             if velocity is not None or angular_velocity is not None:
                 is_rigid = isinstance(chosen, Rigid)
@@ -183,7 +185,8 @@ class World(Setting):
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
-            warn_of_resolution(own, self)
+            if not self._quiet:
+                warn_of_resolution(own)
         return own
 
     def detach(self, body: Body | str) -> Body:
@@ -240,7 +243,8 @@ class World(Setting):
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
-            warn_of_resolution(own, self)
+            if not self._quiet:
+                warn_of_resolution(own)
 
     def grip(
         self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,
@@ -282,7 +286,7 @@ class World(Setting):
                 own, where, to, number("compliance", compliance, low=0.0), target, free, self, max_force=max_force,
                 ignored=None if ignore is None else [self._own(other) for other in ignore],
             )  # fmt: skip
-            warn_shared(grip)
+            warn_shared(grip, dynamics.grips)
             self._hold(grip)
         return grip
 

@@ -38,8 +38,8 @@ from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.engines.world_view import EngineWorld
     from nuno.joints.joint import Joint
-    from nuno.world.simulation import Simulation
 
 THIN = 0.02
 """Share of its body's mass that the helper of a joint has that is loose or a ball."""
@@ -103,7 +103,7 @@ class MujocoScene:
         world: The world.
     """
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: EngineWorld) -> None:
         self._world = world
         self._mujoco = mujoco_package()
         self._made = 0
@@ -221,7 +221,7 @@ class MujocoScene:
             flex.selfcollide = 4 if _touches_itself(self._world, body) else 0
             own = Placed(role, signature, bodies, flexes=[flex], mesh=mesh)
         else:
-            from nuno.bodies.rigid_dynamics import parts_of
+            from nuno.dynamics.body_parts import parts_of
 
             other = None if joint is None else joint.target
             parent = spec.worldbody if other is None else self.placed[other.key].bodies[0]
@@ -325,7 +325,7 @@ def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
         ]  # fmt: skip
 
 
-def _helped(world: Simulation) -> list[Joint]:
+def _helped(world: EngineWorld) -> list[Joint]:
     """Return the joints whose body, or a helper of it, hangs on the other body."""
     grips = [grip for dynamics in attached(world) for grip in dynamics.grips]
     return [grip for grip in grips if is_of_tree(grip) or is_driven_spherical(grip.spec)]
@@ -337,7 +337,7 @@ def flex_id(model: Any, name: str) -> int:
     return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, name))
 
 
-def _role_and_signature(world: Simulation, body: Body) -> tuple[str, tuple[Any, ...]]:
+def _role_and_signature(world: EngineWorld, body: Body) -> tuple[str, tuple[Any, ...]]:
     role = _role(body)
     return role, _signature(world, body, role)
 
@@ -348,13 +348,13 @@ def _role(body: Body) -> str:
     return "moving" if is_kinematic(body) else "static"
 
 
-def _signature(world: Simulation, body: Body, role: str) -> tuple[Any, ...]:
+def _signature(world: EngineWorld, body: Body, role: str) -> tuple[Any, ...]:
     if dynamics_of(body) is not None:
         # another material makes other dynamics
         return role, id(dynamics_of(body)), rules_of(world).touches_itself(body)
     return role, id(body.shape), body.local_vertices().tobytes() if body.is_deformed else None, body.thickness
 
 
-def _touches_itself(world: Simulation, body: Body) -> bool:
+def _touches_itself(world: EngineWorld, body: Body) -> bool:
     """Return True if the parts of a cloth touch each other, or those of a soft body whose material asks for it."""
     return rules_of(world).touches_itself(body) and getattr(dynamics_of(body).material, "self_contact", True)
