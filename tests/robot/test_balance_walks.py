@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.robot.support import standing_place
+from nuno.robot.robot_model import standing_place
 
 G = 9.81
 

@@ -224,15 +224,15 @@ class Body(Quantities, Coordinates):
         Raises:
             InvalidInputError: a batch without ``world``, or out of range.
         """
-        from nuno.bodies.export import to_trimesh
+        from nuno.bodies.surface_file import to_trimesh
 
         return to_trimesh(self, world)
 
     def export(self, path: str | os.PathLike[str], world: int | None = None) -> None:
         """Write the surface as it is now to a .obj, .ply or .glb file; see ``nuno.export_body``."""
-        from nuno.bodies.export import export_body
+        from nuno.bodies.surface_file import write_surface
 
-        export_body(path, self, world)
+        write_surface(path, self, world)
 
     @property
     def velocities(self) -> np.ndarray:

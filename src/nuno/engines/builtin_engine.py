@@ -118,14 +118,14 @@ class BuiltinEngine(Engine):
 
     def rigid_motions(self, bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return where dynamic rigid bodies are and how they move."""
-        found: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] = self._rigid.motions(bodies)
-        return found
+        assert self._rigid is not None  # there are rigid bodies
+        return self._rigid.motions(bodies)
 
     def velocity_at(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocity of a point of a body that does not deform, and its spin."""
         scene = self._rigid
         slot = None if body is None or scene is None else scene.slot_of(body)
-        if slot is None:
+        if scene is None or slot is None:
             return np.zeros_like(point), np.zeros_like(point)
         velocity, spin = scene.solver.velocity(slot)
         middle, _ = scene.solver.pose(slot)

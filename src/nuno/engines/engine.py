@@ -112,7 +112,7 @@ class Engine(ABC):
         """
         for name in names:
             if name not in self.capabilities:
-                from nuno.engines.engine_registry import engines_with
+                from nuno.engines.engine_table import engines_with
 
                 raise EngineCapabilityError(self.name, name, engines_with(name), hint)
 

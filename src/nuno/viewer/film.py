@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.export import check_extension, one_world
+from nuno.bodies.surface_file import check_extension, one_world
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.whole_file import file_path, write_whole
 from nuno.mesh.primitives import PLANE_HALF

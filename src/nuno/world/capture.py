@@ -121,7 +121,7 @@ def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
         engine.require("batch")
 
 
-def _neutral(snapshot: Snapshot, world: Simulation) -> Snapshot:
+def _neutral(snapshot: Snapshot, world: Advancing) -> Snapshot:
     """Return a snapshot of another engine's world with neutral states, by way of such a world."""
     other = type(world)(device=world._device, engine=snapshot.engine)
     apply(snapshot, other)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from nuno.dynamics.push import Push
-from nuno.engines.engine_registry import ENGINES
+from nuno.engines.engine_table import ENGINES
 from nuno.errors import FileFormatError, NunoError
 from nuno.files.whole_file import replacing
 from nuno.joints.grip import GripSpec

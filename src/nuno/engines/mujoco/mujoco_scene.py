@@ -6,7 +6,6 @@ is compiled anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics
 from nuno.engines.mujoco.mujoco_leaders import LEADER
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_placed import Placed
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
     CONTACT,
@@ -45,43 +45,6 @@ THIN = 0.02
 """Share of its body's mass that the helper of a joint has that is loose or a ball."""
 LEADING = 0.5 * LEADER
 """[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
-
-
-@dataclass(eq=False)
-class Placed:
-    """The elements that a body is in the spec.
-
-    Attributes:
-        role: "static", "moving" (it follows a path), "rigid" or "flex".
-        signature: What it was made of; another means that it is made anew.
-        bodies: Its bodies in the spec, one, or of a flex one a vertex.
-        geoms, assets: Its geoms, and the meshes that they need.
-        flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
-        mesh: Of one that deforms, its elements.
-        friction: (worlds,), the coefficient of its shapes.
-        helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
-        thin: Helpers of joints that are loose or balls, each with a fiftieth of its mass.
-        carries: Whether bodies hang on it by joints.
-        depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
-        id: Of the first of its bodies in the model.
-        qpos, dof: Addresses (n,) of each body's coordinates and velocities; empty of a static one.
-    """
-
-    role: str
-    signature: tuple[Any, ...]
-    bodies: list[Any]
-    geoms: list[Any] = field(default_factory=list)
-    assets: list[Any] = field(default_factory=list)
-    flexes: list[Any] = field(default_factory=list)
-    mesh: FlexMesh | None = None
-    friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    helpers: list[Any] = field(default_factory=list)
-    thin: list[Any] = field(default_factory=list)
-    carries: bool = False
-    depth: int = 0
-    id: int = -1
-    qpos: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    dof: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 class MujocoScene:
@@ -198,7 +161,7 @@ class MujocoScene:
         self.holds.find(self.model, self.batch, self.placed, substep)
         self.bushings.find(self.model, self.batch, kinematics)
         self.balls.find(self.model, self.batch, kinematics, substep)
-        self.sums = Sums(self, world.world_count) if kept else None
+        self.sums = Sums(self.model, self.batch, self.joints, self.placed, world.world_count) if kept else None
 
     def set_step(self, step: float) -> None:
         """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
