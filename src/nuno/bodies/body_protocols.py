@@ -38,7 +38,7 @@ class BodyDynamics(Protocol):
 
     @property
     def is_rigid(self) -> bool:
-        """Whether they are those of a rigid body."""
+        """True where they are those of a rigid body."""
 
     @property
     def material(self) -> Material:
@@ -46,7 +46,7 @@ class BodyDynamics(Protocol):
 
     @property
     def resolution(self) -> Resolution | None:
-        """What the substeps make of the material."""
+        """The stiffness that the substeps make of the material."""
 
     def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
@@ -72,7 +72,7 @@ class BodyWorld(Protocol):
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """What is held while the world is read."""
+        """The lock that is held while the world is read."""
 
     @property
     def world_count(self) -> int:

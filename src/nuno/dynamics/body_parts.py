@@ -1,4 +1,4 @@
-"""Body parts: the convex parts of a body, their mass, and where its vertices are while it is rigid."""
+"""Body parts: the convex parts of a body, and their mass."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import numpy as np
 from nuno.dynamics.static_place import one_shape
 from nuno.materials import Rigid
 from nuno.rigid.convex_parts import RigidPart, rigid_shape
-from nuno.shapes.coordinates import Pose
 from nuno.shapes.mass_properties import mass_properties
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.bodies.body_protocols import MovedBody
 
 
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
@@ -46,10 +44,3 @@ def mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarra
         inertia = np.broadcast_to(material.inertia, inertia.shape)
     centre = unit.centre if material.centre_of_mass is None else np.asarray(material.centre_of_mass)
     return mass, inertia, centre
-
-
-def rigid_vertices(body: MovedBody, pose: Pose, world_count: int, some: np.ndarray | None = None) -> np.ndarray:
-    """Return (worlds, n, 3) float64 [m] of a rigid body at a pose, of all vertices or of ``some``, (worlds, n) int."""
-    vertices = body._rigid_vertices(pose)
-    vertices = np.broadcast_to(vertices, (world_count, *vertices.shape[-2:]))
-    return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)

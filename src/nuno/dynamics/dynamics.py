@@ -323,6 +323,13 @@ def touches_itself(rules: ContactRules, body: Body) -> bool:
     return isinstance(body.material, Soft) and body.material.self_contact and rules.touches_itself(body)
 
 
+def rigid_vertices(body: MovedBody, pose: Pose, world_count: int, some: np.ndarray | None = None) -> np.ndarray:
+    """Return (worlds, n, 3) float64 [m] of a rigid body at a pose, of all vertices or of ``some``, (worlds, n) int."""
+    vertices = body._rigid_vertices(pose)
+    vertices = np.broadcast_to(vertices, (world_count, *vertices.shape[-2:]))
+    return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
+
+
 def dynamics_of(body: Body) -> Dynamics | None:
     """Return the dynamics of a body, None while it is static."""
     own = body._dynamics

@@ -11,8 +11,8 @@ import warp as wp
 from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
 from nuno.bodies.body_protocols import WorldSettings
 from nuno.bodies.given_velocity import GivenVelocity
-from nuno.dynamics.body_parts import mass_of, parts_of, rigid_vertices
-from nuno.dynamics.dynamics import Dynamics, State, check_material
+from nuno.dynamics.body_parts import mass_of, parts_of
+from nuno.dynamics.dynamics import Dynamics, State, check_material, rigid_vertices
 from nuno.dynamics.static_place import StaticPlace, same_deformation, what_of
 from nuno.materials import Rigid
 from nuno.rigid.rigid_arrays import PARTS, SAVED
@@ -38,11 +38,11 @@ class RigidWorld(WorldSettings, Protocol):
 
     @property
     def _rules(self) -> ContactRules:
-        """Which pairs touch, and their friction."""
+        """The rules of which pairs touch, and their friction."""
 
     @property
     def _schedule(self) -> Schedule | None:
-        """Where kinematic bodies are in the present run."""
+        """The schedule of kinematic bodies in the present run."""
 
     @property
     def _collider_version(self) -> int:

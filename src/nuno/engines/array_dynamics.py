@@ -14,8 +14,7 @@ from nuno.bodies.body_motion import BodyMotion, motion_of_particles, motion_of_r
 from nuno.bodies.given_velocity import GivenVelocity
 from nuno.bodies.shape_topology import element_count, topology_of
 from nuno.constraints.compliances import vertex_masses
-from nuno.dynamics.body_parts import mass_of, parts_of, rigid_vertices
-from nuno.dynamics.dynamics import Dynamics, State, check_material
+from nuno.dynamics.dynamics import Dynamics, State, check_material, rigid_vertices
 from nuno.engines.world_view import dynamics_of
 from nuno.materials import Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
@@ -171,6 +170,8 @@ class ArrayRigid(ArrayDynamics):
     is_rigid = True
 
     def __init__(self, body: Body, material: Any, friction: Any, world: EngineWorld, values: State) -> None:
+        from nuno.dynamics.body_parts import mass_of, parts_of
+
         super().__init__(body, material, friction, world, values)
         self.parts = parts_of(body, moves=True)
         density = material.resolved(world.world_count)["density"][:, 0]

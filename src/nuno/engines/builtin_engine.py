@@ -18,7 +18,7 @@ from nuno.materials import Material, Rigid
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.dynamics.rigid_dynamics import RigidScene
-    from nuno.engines.builtin_contacts import BuiltinWorld, FrameSteps
+    from nuno.engines.builtin_world import BuiltinWorld, FrameSteps
     from nuno.joints.grip import Grip
     from nuno.numbers.device_array import DeviceArray
 

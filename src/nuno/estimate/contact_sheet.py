@@ -48,7 +48,7 @@ class RankedPicks(Protocol):
 
     @property
     def by_position(self) -> bool:
-        """Whether labels are positions [m]."""
+        """True where labels are positions [m]."""
 
     @property
     def fractions(self) -> np.ndarray:

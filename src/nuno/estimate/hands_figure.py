@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from nuno.estimate.imagined_fold import ImaginedFold
 
 
-class LedFold(Protocol):
+class ShownFold(Protocol):
     """A replayed fold as the picture of the hands takes it; `FoldResult` says what each member is."""
 
     times: np.ndarray
@@ -27,7 +27,7 @@ class LedFold(Protocol):
         """(n, 3) float [m], the cloth at the last frame."""
 
 
-def hands_figure(result: LedFold) -> Figure:
+def hands_figure(result: ShownFold) -> Figure:
     """Draw the paths with Matplotlib, without pyplot; lines are thick while a hand holds the cloth."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure

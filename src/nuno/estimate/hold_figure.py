@@ -50,7 +50,7 @@ class HeldGarment(Protocol):
 
     @property
     def views(self) -> tuple[HoldView, ...]:
-        """What was seen."""
+        """The images, with what was seen in them."""
 
     @property
     def best(self) -> tuple[float, float, str]:

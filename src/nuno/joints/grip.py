@@ -202,7 +202,7 @@ class Grip:
 
 
 class LeaderSchedule(Protocol):
-    """Where static leaders are in a run, `nuno.tables.kinematic_motion.Schedule` as grips see it."""
+    """The places of static leaders in a run: `nuno.tables.kinematic_motion.Schedule` as grips see it."""
 
     @property
     def times(self) -> np.ndarray:
@@ -240,7 +240,7 @@ class GripWorld(WorldSettings, Protocol):
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """What is held while the world is read."""
+        """The lock that is held while the world is read."""
 
     @property
     def engine(self) -> GripEngine:
@@ -248,7 +248,7 @@ class GripWorld(WorldSettings, Protocol):
 
     @property
     def _schedule(self) -> LeaderSchedule | None:
-        """Where kinematic bodies are in the present run."""
+        """The schedule of kinematic bodies in the present run."""
 
     def _change(self, what: str) -> AbstractContextManager[None]:
         """Hold the lock for a call that changes the world."""

@@ -41,7 +41,7 @@ class OriginalRobot(Protocol):
 
     @property
     def is_dynamic(self) -> bool:
-        """Whether its links are moved by forces."""
+        """True where its links are moved by forces."""
 
     def saved(self) -> tuple[RobotState, Any, Any, Any]:
         """Return its state, what is wanted of it, its servo command, and what was found of its way."""

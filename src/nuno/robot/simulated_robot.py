@@ -92,8 +92,7 @@ class SimulatedRobot(SimulatedBody):
         self.world, self._entered = world, links is None
         meshes = "joints" if dynamics else "collision"
         self.links: Links = robot.copy().enter(world, meshes) if links is None else links
-        assert isinstance(self.links.robot, Humanoid)  # which alone enters a world
-        self.actual = self.links.robot
+        self.actual: Humanoid = self.links.robot  # type: ignore[assignment]  # no other robot enters a world
         self.balance = Balance(self.links) if self.links.are_joints else None
         # with dynamics, the robot as its controllers want it, else the actual one
         self.wanted = self.actual if self.balance is None else self.actual.copy()

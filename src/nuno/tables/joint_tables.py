@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class BodySlots(Protocol):
-    """What moves the rigid bodies of a world, `nuno.dynamics.rigid_dynamics.RigidScene`, as tables of joints see it."""
+    """The slots of a world's rigid bodies: `nuno.dynamics.rigid_dynamics.RigidScene` as tables of joints see it."""
 
     @property
     def origin(self) -> np.ndarray:

@@ -39,7 +39,7 @@ class Carries(Protocol):
 
     @property
     def plan(self) -> CarryPlan:
-        """What all trials had in common."""
+        """The plan that all trials had in common."""
 
     @property
     def robot(self) -> Humanoid | None:

@@ -19,11 +19,11 @@ class FramedWorld(Protocol):
 
     @property
     def lock(self) -> FrameLock:
-        """What frames are made under."""
+        """The lock that frames are made under."""
 
     @property
     def _pace(self) -> Pace:
-        """How fast frames may follow each other."""
+        """The pace at which frames may follow each other."""
 
     def _advance(self, duration: float) -> None:
         """Advance everything by ``duration`` [s]."""
