@@ -16,11 +16,11 @@ from nuno.contact.particle.feature_queue import QUEUE, ROOM
 from nuno.numbers.lanes import LANES, lane, lane_int
 from nuno.plans.cpu_groups import launch_groups
 from nuno.plans.group_figures import SHARED_FIGURES
+from nuno.plans.group_kernels import SOFT_THREADS, run_soft_double_grid, run_soft_grid
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.plans.shared_memory import DOUBLE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.plans.soft_block_plan import FAR, FEATURES, FEW_THREADS, MANY_THREADS
-from nuno.plans.soft_group_kernels import THREADS, run_soft_double_grid, run_soft_grid
 from nuno.plans.soft_worlds import (
     run_soft_double_lanes,
     run_soft_double_simd,
@@ -284,8 +284,8 @@ class SoftSolver(ParticleSolver):
         before, after = (self.device_topology, self._surface, self._size), (self.shapes, shared)
         kernels = run_soft_grid, run_soft_double_grid
         return GridPlan(
-            kernels, self.state, before, lambda _: after, self.device, self.world_count, block_groups, blocks, THREADS,
-            self._launch_worlds,
+            kernels, self.state, before, lambda _: after, self.device, self.world_count, block_groups, blocks,
+            SOFT_THREADS, self._launch_worlds,
         )  # fmt: skip
 
     def _forget_launches(self) -> None:
