@@ -4,7 +4,7 @@ import ast
 
 from package_sources import PACKAGE, nodes_of
 
-MOST = 536
+MOST = 426
 """So many are left, after branches that were counted apart; who makes them fewer lowers it, and nothing raises it."""
 
 

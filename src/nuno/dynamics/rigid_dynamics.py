@@ -94,10 +94,10 @@ class RigidScene:
         slots: dict[str, int] = {}
         seen = set()
         for body in world._bodies.values():
-            if body._dynamics is not None:
-                if isinstance(body._dynamics, RigidDynamics):
-                    slots[body.key] = body._dynamics.slot
-                    self.solver.set_groups(body._dynamics.slot, body.group, body.collides_with)
+            if body.is_dynamic:
+                if (own := _dynamics_of(body)) is not None:
+                    slots[body.key] = own.slot
+                    self.solver.set_groups(own.slot, body.group, body.collides_with)
                 continue
             seen.add(body.key)
             slots[body.key] = self.bring_static(body)

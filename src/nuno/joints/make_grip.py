@@ -41,10 +41,11 @@ def make_grip(
         InvalidInputError: points or a target that cannot be used.
     """
     worlds = world.world_count
-    assert body._dynamics is not None
-    if ignored is not None and not body._dynamics.is_rigid:
+    dynamics = body._dynamics
+    assert dynamics is not None
+    if ignored is not None and not dynamics.is_rigid:
         raise InvalidInputError(f"ignore is for rigid bodies only; {body.name!r} touches what holds its points")
-    if body._dynamics.is_rigid:
+    if dynamics.is_rigid:
         if where is not None:
             raise InvalidInputError(f"{body.name!r} is rigid and is gripped as a whole: where must be None")
         hold, local_pose = make_hold(body, to, target, free, compliance, world)
@@ -56,16 +57,16 @@ def make_grip(
         raise InvalidInputError("free is for rigid bodies only")
     if where is None:
         raise InvalidInputError(f"where must say which points of {body.name!r} to grip")
-    if target is not None and target._dynamics is not None:
+    if target is not None and target.is_dynamic:
         tie = make_tie(body, where, target, compliance, world)
         return Grip(body, replace(tie, max_force=force_limit(max_force, worlds, body, target)), target)
     limits = None if max_force is None else force_limit(max_force, worlds)
     vertices, corners, weights = chosen_points(where, len(body.shape.mesh()[0]), body.faces, worlds)
     if vertices is not None:
-        held, valid = body._dynamics.vertices(body, vertices), vertices >= 0
+        held, valid = dynamics.vertices(body, vertices), vertices >= 0
     else:
         assert corners is not None and weights is not None
-        places = body._dynamics.vertices(body, corners.reshape(worlds, -1)).reshape(*corners.shape, 3)
+        places = dynamics.vertices(body, corners.reshape(worlds, -1)).reshape(*corners.shape, 3)
         held = np.einsum("wkc,wkcx->wkx", weights, places)
         valid = corners[..., 0] >= 0
     number = np.maximum(valid.sum(axis=1), 1)[:, None]

@@ -129,7 +129,6 @@ class ParticleSolver(ParticleState):
         self._grips = tuple(grips)
         rows = grip_rows(grips, self.origin, self._inverse_mass)
         _, count, keys, _ = rows.place.shape
-        self._grip_times = rows.times
         s, size = self.state, self._size
         size.keys, size.grips = count * keys, count
         for k, name in enumerate(("grip_x", "grip_y", "grip_z")):

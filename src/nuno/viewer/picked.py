@@ -51,12 +51,12 @@ def height(world: Simulation, body: Body, index: int) -> float:
 
 def speed(world: Simulation, body: Body, index: int) -> float:
     """Return the speed of a body's centre of mass [m/s]; 0 while it is static."""
-    return 0.0 if body._dynamics is None else float(np.linalg.norm(of_world(body.velocity, index)))
+    return 0.0 if not body.is_dynamic else float(np.linalg.norm(of_world(body.velocity, index)))
 
 
 def contact_force(world: Simulation, body: Body, index: int) -> float:
     """Return the size of the sum of the contact forces on a body [N]; 0 while it is static."""
-    if body._dynamics is None:
+    if not body.is_dynamic:
         return 0.0
     contacts = contact_points(world, body)
     return float(np.linalg.norm(contacts.forces[contacts.worlds == index].sum(axis=0)))

@@ -153,7 +153,7 @@ def _join(
         for body in (a, other):
             if body is not None and body._dynamics is not None and not body._dynamics.is_rigid:
                 raise InvalidInputError(f"{body.name!r} deforms; weld or grip its points instead")
-        if a._dynamics is None:
+        if not a.is_dynamic:
             raise BodyStateError(f"{a.name!r} is static; attach it before it is joined, or give the other body first")
         worlds = world.world_count
         pose = tuple(np.broadcast_to(p, (worlds, p.shape[-1])) for p in a.pose())

@@ -68,7 +68,7 @@ def layout_of(world: Simulation) -> RigidLayout | None:
             places.append(_place(solver, body.key, DYNAMIC, dynamics.slot))
     for key, known in scene.static.items():
         static = world._bodies.get(key)
-        fresh = static is not None and static._dynamics is None and known.is_of(static, static._deformed)
+        fresh = static is not None and not static.is_dynamic and known.is_of(static, static._deformed)
         places.append(_place(solver, key, STATIC if fresh else STALE, known.slot))
     current = scene.is_current(world)
     return RigidLayout(solver.origin.copy(), tuple(places), solver.save_listing(), current)

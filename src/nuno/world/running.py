@@ -134,7 +134,7 @@ class Running(Advancing):
             own = self._own(body)
             if self.is_running:
                 raise BodyStateError("a world that runs in the background is not traced; stop it first")
-            if own._dynamics is None:
+            if not own.is_dynamic:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is traced")
             instants = finite_array("times", times, ("k",))
             if not len(instants) or (np.diff(instants) <= 0.0).any() or instants[0] < self._time - SOON:

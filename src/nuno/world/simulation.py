@@ -290,7 +290,7 @@ class Simulation:
             if dynamics.collider_version == self._collider_version:
                 continue
             if static is None:
-                static = [b for b in self._bodies.values() if b._dynamics is None]
+                static = [b for b in self._bodies.values() if not b.is_dynamic]
             touching, friction = self._rules.colliders_of(body, static)
             key = (
                 *(b.key for b in touching),
@@ -320,7 +320,7 @@ class Simulation:
 
     def _kinematic_bodies(self) -> list[Body]:
         if self._kinematic is None:
-            self._kinematic = [b for b in self._bodies.values() if b._dynamics is None and is_kinematic(b)]
+            self._kinematic = [b for b in self._bodies.values() if not b.is_dynamic and is_kinematic(b)]
         return self._kinematic
 
     def _schedule_kinematic(self, start: float, duration: float) -> None:

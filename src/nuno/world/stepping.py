@@ -46,7 +46,7 @@ class Stepping:
         """Advance all dynamic bodies from ``time`` to ``stop`` [s]."""
         world = self._world
         frame = 1.0 / world.frame_rate
-        moving = [body for body in world._bodies.values() if body._dynamics is not None]
+        moving = [body for body in world._bodies.values() if body.is_dynamic]
         if not moving:
             self.careful, self.last = False, []
             return
