@@ -17,6 +17,7 @@ def own_names(nodes):
     protocols = [
         node for node in nodes if isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
     ]
+    protocols = [node for node in classes if "Protocol" in map(ast.unparse, node.bases)]
     asked = {inner for protocol in protocols for inner in ast.walk(protocol)}
     for node in nodes:
         if node in asked:
