@@ -14,9 +14,7 @@ def own_names(nodes):
     Those of a protocol are others' names, which it only asks for.
     """
     found = set()
-    protocols = [
-        node for node in nodes if isinstance(node, ast.ClassDef) and "Protocol" in map(ast.unparse, node.bases)
-    ]
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
     protocols = [node for node in classes if "Protocol" in map(ast.unparse, node.bases)]
     asked = {inner for protocol in protocols for inner in ast.walk(protocol)}
     for node in nodes:
