@@ -127,10 +127,10 @@ MUTATIONS = (
     ("robot", "robot/sensor_model.py", "number(\"latency\", self.latency, low=0.0)", "self.latency",
      "robot/test_sensors.py"),
     # files, snapshots, search
-    ("files", "files/recording.py", "frames.append(frames[-1] if still else vertices)",
+    ("files", "world/recording.py", "frames.append(frames[-1] if still else vertices)",
      "frames.append(frames[-1] if frames else vertices)",
      "files/test_recording.py"),
-    ("files", "files/recording.py", "if len(vertices) not in (1, frames):", "if len(vertices) > frames:",
+    ("files", "world/recording.py", "if len(vertices) not in (1, frames):", "if len(vertices) > frames:",
      "files/test_recording.py"),
     ("files", "files/whole_file.py", "            partial.unlink()", "            pass", "files/test_whole_file.py"),
     ("files", "world/snapshot_file.py", "if version < ORIGIN and moving:", "if version < ORIGIN - 1 and moving:",

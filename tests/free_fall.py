@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import nuno.bodies.dynamics
 import nuno.bodies.shape_topology
+import nuno.dynamics.dynamics
 
 
 def topology_of(shape):
@@ -156,7 +156,7 @@ class FreeFall:
 @pytest.fixture
 def free_fall(monkeypatch):
     """Let worlds use the stand-in."""
-    monkeypatch.setattr(nuno.bodies.dynamics, "backend", lambda: (FreeFall, Colliders))
+    monkeypatch.setattr(nuno.dynamics.dynamics, "backend", lambda: (FreeFall, Colliders))
     monkeypatch.setattr(nuno.bodies.shape_topology, "_cloth_topology", topology_of)
     monkeypatch.setattr(FreeFall, "diverging", False)
     # it never touches itself

@@ -10,9 +10,9 @@ DOOR = {"__init__", "__main__", "errors", "materials", "validation"}
 # From the bottom up: a folder imports from those before it, and from itself.
 LAYERS = (
     "errors", "validation", "materials", "mesh", "numbers", "topology", "state", "constraints", "contact.self",
-    "contact.particle", "shapes", "rigid", "coupled", "plans", "kernels", "files", "joints", "solvers", "tables",
-    "bodies", "engines", "camera", "world", "search", "envs", "estimate", "tracking", "robot", "viewer", "scenes",
-    "tasks", "__init__", "__main__",
+    "contact.particle", "shapes", "rigid", "coupled", "plans", "kernels", "files", "bodies", "joints", "solvers",
+    "tables", "dynamics", "engines", "camera", "world", "search", "envs", "estimate", "tracking", "robot", "viewer",
+    "scenes", "tasks", "__init__", "__main__",
 )  # fmt: skip
 # Words that the field has others for: (part of an identifier or file name, what it is called now).
 REPLACED = {
@@ -44,18 +44,9 @@ def layer_of(module):
 
 
 def imports_of(path, names):
-    """Yield the modules that run-time statements import; those for type checkers alone do not count."""
-    aside = set()
+    """Yield the modules that a module imports anywhere: at its top, in functions, and for its annotations alone."""
     for node in nodes_of(path):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            aside.update(id(inner) for inner in ast.walk(node))
-    for node in nodes_of(path):
-        if (
-            isinstance(node, ast.ImportFrom)
-            and node.module
-            and node.module.split(".")[0] == "nuno"
-            and id(node) not in aside
-        ):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "nuno":
             package = node.module[5:]
             for alias in node.names:
                 inner = f"{package}.{alias.name}".strip(".")
@@ -70,7 +61,7 @@ def edges():
 
 
 def test_folders_import_one_way():
-    """A module imports from its own folder and from those below it."""
+    """A module imports from its own folder and from those below it, for annotations too."""
     rank = {layer: k for k, layer in enumerate(LAYERS)}
     wrong = [
         f"{name} imports {other}"
@@ -82,7 +73,7 @@ def test_folders_import_one_way():
 
 
 def test_modules_import_in_no_circle():
-    """No module imports one that imports it, by whatever way round."""
+    """No module imports one that imports it, by whatever way round, annotations included."""
     left = dict(edges())
     while ready := [name for name, others in left.items() if not others & left.keys()]:
         for name in ready:

@@ -4,14 +4,22 @@ import ast
 
 from package_sources import PACKAGE, nodes_of
 
-MOST = 536
+MOST = 442
 """So many are left, after branches that were counted apart; who makes them fewer lowers it, and nothing raises it."""
 
 
 def own_names(nodes):
-    """Return the names that a module declares: functions, classes, fields, and what it sets on ``self``."""
+    """Return the names that a module declares: functions, classes, fields, and what it sets on ``self``.
+
+    Those of a protocol are others' names, which it only asks for.
+    """
     found = set()
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
+    protocols = [node for node in classes if "Protocol" in map(ast.unparse, node.bases)]
+    asked = {inner for protocol in protocols for inner in ast.walk(protocol)}
     for node in nodes:
+        if node in asked:
+            continue
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
@@ -51,3 +59,5 @@ def test_the_search_sees_what_it_looks_for():
     """A reach into another object counts; one's own names, those of the same module and dunders do not."""
     text = "class A:\n    def f(self, a, b):\n        self._x = a._x + b._y + self._z + b.__dict__\n"
     assert [what for _, what in reaches(list(ast.walk(ast.parse(text))))] == ["b._y"]
+    asking = "class A(Protocol):\n    def _y(self): ...\n\ndef f(a):\n    a._y()\n"
+    assert [what for _, what in reaches(list(ast.walk(ast.parse(asking))))] == ["a._y"]

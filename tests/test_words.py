@@ -58,7 +58,7 @@ ALLOWED = {
     r"known": "public argument of `nuno.fit_material`: the rest of the material",
     r"spread": "public attribute of `nuno.search.minimise.Generation`: a standard deviation",
     r"(is_)?root": "of a tree of joints",
-    r"least": "public attribute of `nuno.solvers.resolution.Resolution`",
+    r"least": "public attribute of `nuno.bodies.resolution.Resolution`",
     r"SpreadTask|spread_task": "a task of `nuno.envs`: a cloth is spread on a table",
     r"(mjJNT_)?BALL|(project_)?ball(_joint)?": "the field's ball joint",
     r"listed_(position|rotation)": "where bodies were when rows were listed: a verb, and in saved states",

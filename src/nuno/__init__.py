@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from nuno.bodies.body import Body
+from nuno.bodies.export import export_body
 from nuno.bodies.garment import Garment, garment
 from nuno.bodies.make_bodies import (
     box,
@@ -24,6 +25,7 @@ from nuno.bodies.make_bodies import (
     soft_tetrahedra,
     sphere,
 )
+from nuno.bodies.resolution import Resolution
 from nuno.camera.camera import Camera
 from nuno.errors import (
     BoardNotFoundError,
@@ -56,8 +58,6 @@ from nuno.errors import (
     WalkError,
     WorkerLostError,
 )
-from nuno.files.export import export_body
-from nuno.files.recording import Recording
 from nuno.joints.grip import Grip
 from nuno.joints.joint import Joint
 from nuno.joints.joint_drives import Motor, Spring
@@ -68,9 +68,9 @@ from nuno.shapes.path import Path
 from nuno.shapes.shape import Box, Capsule, ClothMesh, Cylinder, Plane, Sheet, Sphere, TriangleMesh
 from nuno.shapes.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere, SoftTetrahedra
 from nuno.shapes.surface import SurfacePoints
-from nuno.solvers.resolution import Resolution
 from nuno.world.drawing import Drawing, draw
 from nuno.world.make_joints import ball_joint, fixed_joint, hinge, slider
+from nuno.world.recording import Recording
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 

@@ -8,7 +8,8 @@ import pytest
 
 import nuno
 from nuno.engines.engine import CAPABILITIES
-from nuno.engines.engine_registry import ENGINES, engine_class, engines_with, make_engine
+from nuno.engines.engine_registry import engine_class, make_engine
+from nuno.engines.engine_table import ENGINES, engines_with
 
 DOCS = Path(__file__).parents[2] / "docs" / "engines.md"
 

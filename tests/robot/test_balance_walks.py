@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.robot.support import standing_place
+from nuno.robot.robot_model import standing_place
 
 G = 9.81
 
@@ -122,8 +122,8 @@ def test_it_walks_over_a_board(stood):
         feet = [robot.actual.frame_pose(foot).position[2] for foot in robot.actual.feet]
         highest = max(highest, min(feet))
     assert robot.state().fallen is None
-    # Both feet stood on it, or one did while the other was in the air. Of the four balls by which a sole of G1's touches,
-    # two are on the board and two before or behind it: its middle is half as high.
+    # Both feet stood on it, or one did while the other was in the air. Of the four balls by which a sole of G1's
+    # touches, two are on the board and two before or behind it: its middle is half as high.
     assert highest > {"talos": 0.008, "g1": 0.0045}[name]
     x, y, _ = standing_place(robot.actual)
     assert np.hypot(x - 0.6, y) < 0.02

@@ -167,7 +167,7 @@ def test_contacts_that_find_no_memory_are_told_of(monkeypatch, caplog, scarce):
         world.run(0.1)
         world.run(0.1)
     # what comes of contacts that are passed over is another warning's
-    assert [record.levelname for record in caplog.records if record.name == "nuno.bodies.dynamics"] == ["WARNING"]
+    assert [record.levelname for record in caplog.records if record.name == "nuno.dynamics.dynamics"] == ["WARNING"]
     assert "'cloth'" in caplog.text
     assert cloth.missed_contacts.tolist() == [True, True, True]
     assert np.isfinite(cloth.vertices).all()

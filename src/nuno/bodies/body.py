@@ -25,9 +25,8 @@ from nuno.shapes.surface import SurfacePoints, closest_points, sheet_points
 from nuno.validation import finite_array
 
 if TYPE_CHECKING:
-    from nuno.bodies.dynamics import Dynamics
-    from nuno.solvers.resolution import Resolution
-    from nuno.world.simulation import Simulation
+    from nuno.bodies.body_protocols import BodyDynamics, BodyWorld
+    from nuno.bodies.resolution import Resolution
 
 Color = str | tuple[float, float, float]
 ALL_GROUPS = 0xFFFFFFFF
@@ -77,8 +76,8 @@ class Body(Quantities, Coordinates):
         self.key = uuid.uuid4().hex  # the same for copies of the body in imagined worlds and in files
         self._shape = shape
         self._name = name or shape.kind
-        self._world: Simulation | None = None
-        self._dynamics: Dynamics | None = None
+        self._world: BodyWorld | None = None
+        self._dynamics: BodyDynamics | None = None
         self._links: Any = None  # the robot's links that it is one of
         self._path: Path | None = None  # that the static body follows, whose pose is always that of the world's time
         # Vertices (worlds, n, 3) of a static body that dynamics have deformed, and the pose they belong to.
@@ -227,15 +226,15 @@ class Body(Quantities, Coordinates):
         Raises:
             InvalidInputError: a batch without ``world``, or out of range.
         """
-        from nuno.files.export import to_trimesh
+        from nuno.bodies.surface_file import to_trimesh
 
         return to_trimesh(self, world)
 
     def export(self, path: str | os.PathLike[str], world: int | None = None) -> None:
         """Write the surface as it is now to a .obj, .ply or .glb file; see ``nuno.export_body``."""
-        from nuno.files.export import export_body
+        from nuno.bodies.surface_file import write_surface
 
-        export_body(path, self, world)
+        write_surface(path, self, world)
 
     @property
     def velocities(self) -> np.ndarray:
@@ -295,7 +294,7 @@ class Body(Quantities, Coordinates):
                 self._world._check_worlds(attribute.strip("_"), np.shape(value))
             setattr(self, attribute, value)
             if self._world is not None:
-                self._world._body_changed(self)
+                self._world._body_changed(self.key)
 
     def _vertices(self) -> np.ndarray:
         """Return (n, 3) or (worlds, n, 3), not to be written to."""
@@ -350,7 +349,7 @@ class Body(Quantities, Coordinates):
 
     def _moved(self) -> None:
         if self._world is not None:
-            self._world._body_changed(self)
+            self._world._body_changed(self.key)
         super()._moved()
 
     def _as_static(self) -> Body:

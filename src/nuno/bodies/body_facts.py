@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from nuno.bodies.body import Body
+from nuno.materials import Material
+from nuno.shapes.shape import Shape
 
 
-def body_facts(body: Body) -> list[tuple[str, str]]:
+class DescribedBody(Protocol):
+    """A body as notebooks show it."""
+
+    @property
+    def shape(self) -> Shape:
+        """Its shape."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """(3,) or (worlds, 3) [m]."""
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n, 3), in a batch (worlds, n, 3) [m]."""
+
+    @property
+    def faces(self) -> np.ndarray:
+        """(m, 3) int."""
+
+    @property
+    def material(self) -> Material | None:
+        """The material of its dynamics."""
+
+    @property
+    def mass(self) -> Any:
+        """[kg], a number or (worlds,)."""
+
+
+def body_facts(body: DescribedBody) -> list[tuple[str, str]]:
     """Return names and values of what a body is now, to be read: its shape, place, mesh and material."""
     material = body.material
     found = [
@@ -26,7 +54,7 @@ def body_facts(body: Body) -> list[tuple[str, str]]:
     return found
 
 
-def place_text(body: Body) -> str:
+def place_text(body: DescribedBody) -> str:
     """Return where a body is [m], or in how many worlds."""
     place = np.asarray(body.position)
     return f"{millimetres(place)} m" if place.ndim == 1 else f"in {len(place)} worlds"

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.joints.grip import Grip
 
 
 class ContactRules:
@@ -26,9 +25,9 @@ class ContactRules:
         self.held: set[frozenset[str]] = set()
         self.summed: set[str] = set()
 
-    def set_held(self, grips: Iterable[Grip]) -> None:
-        """Take the pairs of all active grips: what holds a rigid body is no obstacle to it."""
-        self.held = {frozenset((grip.body.key, key)) for grip in grips for key in grip.ignored}
+    def set_held(self, pairs: Iterable[tuple[str, str]]) -> None:
+        """Take the keys of each held body and of what it passes through: what holds a rigid body is no obstacle."""
+        self.held = {frozenset(pair) for pair in pairs}
 
     def touch(self, a: Body, b: Body) -> bool:
         """Return True if two bodies touch each other at all."""

@@ -13,8 +13,7 @@ from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.bodies.body_motion import BodyMotion
-    from nuno.bodies.dynamics import Dynamics
-    from nuno.world.simulation import Simulation
+    from nuno.bodies.body_protocols import BodyDynamics, BodyWorld
 
 
 class Quantities:
@@ -24,8 +23,8 @@ class Quantities:
     """
 
     _name: str
-    _dynamics: Dynamics | None
-    _world: Simulation | None
+    _dynamics: BodyDynamics | None
+    _world: BodyWorld | None
 
     def _guard(self) -> AbstractContextManager[Any]:
         raise NotImplementedError

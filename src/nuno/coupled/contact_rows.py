@@ -3,6 +3,7 @@
 A row says that a weighted sum of particles, less a point of a rigid body where there is one, keeps a distance along
 a normal. Its multipliers add up over the passes of a substep, so that the friction of all passes together stays in
 Coulomb's cone of the push of all passes together: what sticks does not creep, however many passes the push takes.
+(The projections themselves are in `nuno.coupled.row_projections`.)
 
 Where all are solved at once, by many threads, each row sees its particles' and bodies' masses split evenly among the
 rows that press on them (Tonge, Benevolenski and Voroshilov, "Mass splitting for jitter-free parallel rigid body

@@ -1,4 +1,6 @@
-"""Projections of single rows, along their normals and against their slip.
+"""Projections of single contact rows: pushes along their normals, and Coulomb friction against their slip.
+
+Friction between two cloths, or any two bodies that move, is here.
 
 A row asks beforehand how far its particles give way: what lies on a shape not at all (`give_along`), what lies on
 another rigid body as that does (`give_on`).

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_particles, motion_of_rigid
-from nuno.bodies.dynamics import Dynamics, State, check_material
 from nuno.bodies.given_velocity import GivenVelocity
 from nuno.bodies.shape_topology import element_count, topology_of
 from nuno.constraints.compliances import vertex_masses
+from nuno.dynamics.dynamics import Dynamics, State, check_material, rigid_vertices
 from nuno.engines.world_view import dynamics_of
 from nuno.materials import Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
@@ -22,7 +22,8 @@ from nuno.shapes.coordinates import Pose, apply, compose, invert
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.bodies.body_protocols import MovedBody
+    from nuno.engines.world_view import EngineWorld
 
 
 class ArrayDynamics(Dynamics):
@@ -42,7 +43,7 @@ class ArrayDynamics(Dynamics):
 
     NEUTRAL: tuple[str, ...] = ()
 
-    def __init__(self, body: Body, material: Material, friction: Any, world: Simulation, values: State) -> None:
+    def __init__(self, body: Body, material: Material, friction: Any, world: EngineWorld, values: State) -> None:
         check_material(body.shape, material, world.world_count)
         super().__init__(material, friction, world)
         self.shape = body.shape
@@ -88,7 +89,7 @@ class ArrayParticles(ArrayDynamics):
 
     NEUTRAL = ("positions", "velocities")
 
-    def __init__(self, body: Body, material: Any, friction: Any, world: Simulation, values: State) -> None:
+    def __init__(self, body: Body, material: Any, friction: Any, world: EngineWorld, values: State) -> None:
         super().__init__(body, material, friction, world, values)
         self.topology = topology_of(body.shape)
         values_of = material.resolved(world.world_count, element_count(body.shape))
@@ -98,25 +99,25 @@ class ArrayParticles(ArrayDynamics):
             self.mass = np.asarray(vertex_masses(self.topology, values_of["area_density"]), dtype=np.float64)
         self.mass = np.broadcast_to(self.mass, (world.world_count, self.mass.shape[-1]))
 
-    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+    def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
         places = self.values["positions"]
         return places if some is None else np.take_along_axis(places, some[..., None], axis=1)
 
-    def velocities(self, body: Body) -> np.ndarray:
+    def velocities(self, body: MovedBody) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s]."""
         return self.values["velocities"].copy()
 
-    def pose(self, body: Body) -> Pose:
+    def pose(self, body: MovedBody) -> Pose:
         """Return the mean of the vertices, and the orientation that the body was last given."""
         centre = self.values["positions"].mean(axis=-2)
         return centre[0] if len(centre) == 1 else centre, body._quaternion
 
-    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def place(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere as a whole, in its shape; velocities turn along."""
         self.place_worlds(body, position, quaternion, np.arange(self.world_count))
 
-    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+    def place_worlds(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
         """Put the body elsewhere as a whole in some worlds (k,); velocities turn along."""
         motion = compose((position, quaternion), invert(self.pose(body)))
         turned = quat.rotate(motion[1][..., None, :], self.values["velocities"])
@@ -129,11 +130,11 @@ class ArrayParticles(ArrayDynamics):
         for name in own.keys() - set(self.NEUTRAL):
             own[name][worlds] = 0.0
 
-    def motion(self, body: Body) -> BodyMotion:
+    def motion(self, body: MovedBody) -> BodyMotion:
         """Return how the body moves as a whole: the motion of its vertices' masses."""
         return motion_of_particles(self.mass, self.values["positions"], self.values["velocities"])
 
-    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+    def set_velocity(self, body: MovedBody, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
         """Give the vertices velocities, in all worlds or some (k,); they stay where they are."""
         velocities = given.vertices
         if velocities is None:
@@ -141,7 +142,7 @@ class ArrayParticles(ArrayDynamics):
         chosen = np.arange(self.world_count) if worlds is None else worlds
         self.values["velocities"][chosen] = velocities[chosen]
 
-    def elastic_energy(self, body: Body) -> np.ndarray:
+    def elastic_energy(self, body: MovedBody) -> np.ndarray:
         """Return (worlds,) [J], what the deformation stores by Nuno's own measure of it."""
         measures: Any
         if isinstance(self.material, Soft):
@@ -168,15 +169,15 @@ class ArrayRigid(ArrayDynamics):
     NEUTRAL = ("place", "turn", "velocity", "spin")
     is_rigid = True
 
-    def __init__(self, body: Body, material: Any, friction: Any, world: Simulation, values: State) -> None:
-        from nuno.bodies.rigid_dynamics import mass_of, parts_of
+    def __init__(self, body: Body, material: Any, friction: Any, world: EngineWorld, values: State) -> None:
+        from nuno.dynamics.body_parts import mass_of, parts_of
 
         super().__init__(body, material, friction, world, values)
         self.parts = parts_of(body, moves=True)
         density = material.resolved(world.world_count)["density"][:, 0]
         self.mass, self.inertia, self.centre = mass_of(body, material, density)
 
-    def pose(self, body: Body) -> Pose:
+    def pose(self, body: MovedBody) -> Pose:
         """Return where the body's frame is, (3,) and (4,), in a batch (worlds, 3) and (worlds, 4)."""
         place, turn = self.values["place"].copy(), self.values["turn"].copy()
         return (place[0], turn[0]) if self.world_count == 1 else (place, turn)
@@ -186,22 +187,20 @@ class ArrayRigid(ArrayDynamics):
         turn = self.values["turn"]
         return self.values["place"] + quat.rotate(turn, np.broadcast_to(self.centre, (len(turn), 3)))
 
-    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+    def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
-        vertices = body._rigid_vertices(self.pose(body))
-        vertices = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
-        return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
+        return rigid_vertices(body, self.pose(body), self.world_count, some)
 
-    def velocities(self, body: Body) -> np.ndarray:
+    def velocities(self, body: MovedBody) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s] of the vertices."""
         arms = self.vertices(body) - self.middle()[:, None]
         return self.values["velocity"][:, None] + np.cross(self.values["spin"][:, None], arms)
 
-    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def place(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere; its velocities turn along."""
         self.place_worlds(body, position, quaternion, np.arange(self.world_count))
 
-    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+    def place_worlds(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
         """Put the body elsewhere in some worlds (k,); its velocities turn along there."""
         motion = compose((position, quaternion), invert(self.pose(body)))
         turn = np.broadcast_to(motion[1], (self.world_count, 4))
@@ -214,19 +213,19 @@ class ArrayRigid(ArrayDynamics):
         for name, array in new.items():
             self.values[name][worlds] = array[worlds]
 
-    def motion(self, body: Body) -> BodyMotion:
+    def motion(self, body: MovedBody) -> BodyMotion:
         """Return how the body moves."""
         own = self.values
         return motion_of_rigid(self.mass, self.middle(), self.inertia, own["turn"], own["velocity"], own["spin"])
 
-    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+    def set_velocity(self, body: MovedBody, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
         """Give the body a velocity and an angular velocity, in all worlds or some (k,)."""
         middle = self.middle()
         chosen = np.arange(self.world_count) if worlds is None else worlds
         self.values["velocity"][chosen] = given.at(middle[:, None], middle)[:, 0][chosen]
         self.values["spin"][chosen] = given.angular[chosen]
 
-    def elastic_energy(self, body: Body) -> np.ndarray:
+    def elastic_energy(self, body: MovedBody) -> np.ndarray:
         """Return (worlds,) [J]: none, for it does not deform."""
         return np.zeros(self.world_count)
 
@@ -241,7 +240,7 @@ def state_at_rest(body: Body, material: Material, worlds: int) -> State:
     return {"positions": positions, "velocities": np.zeros(positions.shape)}
 
 
-def make_arrays(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> ArrayDynamics:
+def make_arrays(body: Body, material: Material, state: State, friction: Any, world: EngineWorld) -> ArrayDynamics:
     """Return the dynamics of a body's kind, which has copies of the arrays of a state."""
     kind = ArrayRigid if isinstance(material, Rigid) else ArrayParticles
     return kind(body, material, friction, world, state)

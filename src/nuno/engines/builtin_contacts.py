@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import bodies_by_key, dynamics_of, rules_of
 from nuno.materials import Cloth
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.builtin_world import BuiltinWorld
 
 
-def contact_rows(world: Simulation, body: Body, itself: bool) -> list[tuple[Any, ...]]:
+def contact_rows(world: BuiltinWorld, body: Body, itself: bool) -> list[tuple[Any, ...]]:
     """Return a dynamic body's contacts as `Engine.contacts` tells them."""
     dynamics: Any = dynamics_of(body)
     found: list[tuple[Any, ...]] = []
@@ -34,7 +34,7 @@ def contact_rows(world: Simulation, body: Body, itself: bool) -> list[tuple[Any,
     return found
 
 
-def contact_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
+def contact_impulses(world: BuiltinWorld, bodies: Sequence[Body]) -> list[dict[str, np.ndarray]]:
     """Return what contacts gave bodies in the last frame as `Engine.impulses` tells it, read once for all."""
     found: list[dict[str, np.ndarray]] = [{} for _ in bodies]
     rigid: dict[int, Any] = {}
@@ -59,18 +59,18 @@ def contact_impulses(world: Simulation, bodies: Sequence[Body]) -> list[dict[str
     return found
 
 
-def _names(world: Simulation) -> dict[int, str]:
+def _names(world: BuiltinWorld) -> dict[int, str]:
     """Return the names of bodies by their slots among the rigid ones."""
     rigid = world._rigid
     assert rigid is not None
     return {slot: other.name for other, slot in zip(world.bodies, rigid.slots_of(world), strict=True)}
 
 
-def _coupled(world: Simulation) -> list[Any]:
+def _coupled(world: BuiltinWorld) -> list[Any]:
     return list(world._stepping.last)
 
 
-def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+def _on_itself(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
     """Return what a cloth's contacts with itself would do to its particles in the next substep."""
     from nuno.solvers.self_forces import self_contact_forces
 
@@ -82,7 +82,7 @@ def _on_itself(world: Simulation, body: Body, dynamics: ParticleDynamics) -> lis
     return [(points[k, i], normals[k, i], forces[k, i], body.name, int(k)) for k, i in touching]
 
 
-def _on_shapes(world: Simulation, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
+def _on_shapes(world: BuiltinWorld, body: Body, dynamics: ParticleDynamics) -> list[tuple[Any, ...]]:
     """Return what static shapes would do to the body's particles in the next substep.
 
     What other bodies press on a shape is known of the last substep instead, from what the two did together.

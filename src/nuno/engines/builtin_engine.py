@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import Dynamics, ParticleDynamics, State
 from nuno.bodies.given_velocity import GivenVelocity
-from nuno.bodies.make_dynamics import make_dynamics, start_dynamics
+from nuno.dynamics.dynamics import Dynamics, ParticleDynamics, State
+from nuno.dynamics.make_dynamics import make_dynamics, start_dynamics
 from nuno.engines.builtin_contacts import contact_impulses, contact_rows
 from nuno.engines.engine import CAPABILITIES, Engine
 from nuno.engines.world_view import attached, dynamics_of
@@ -17,6 +17,8 @@ from nuno.materials import Material, Rigid
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.dynamics.rigid_dynamics import RigidScene
+    from nuno.engines.builtin_world import BuiltinWorld, FrameSteps
     from nuno.joints.grip import Grip
     from nuno.numbers.device_array import DeviceArray
 
@@ -27,6 +29,8 @@ class BuiltinEngine(Engine):
     name = "nuno"
     capabilities = frozenset(CAPABILITIES)
     is_builtin = True
+
+    world: BuiltinWorld
 
     def allow_dynamics(self, body: Body, material: Material) -> None:
         """Refuse nothing."""
@@ -43,7 +47,7 @@ class BuiltinEngine(Engine):
         if not neutral:
             return make_dynamics(body, material, state, friction, self.world)
         if isinstance(material, Rigid):
-            from nuno.bodies.rigid_dynamics import RigidDynamics
+            from nuno.dynamics.rigid_dynamics import RigidDynamics
 
             return RigidDynamics(body, material, friction, self.world)
         return ParticleDynamics(
@@ -100,11 +104,11 @@ class BuiltinEngine(Engine):
         return not dynamics.is_rigid or dynamics.scene is self._rigid
 
     @property
-    def _rigid(self) -> Any:
+    def _rigid(self) -> RigidScene | None:
         return self.world._rigid
 
     @property
-    def _stepping(self) -> Any:
+    def _stepping(self) -> FrameSteps:
         return self.world._stepping
 
     def positions(self, body: Body) -> DeviceArray:
@@ -114,14 +118,14 @@ class BuiltinEngine(Engine):
 
     def rigid_motions(self, bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return where dynamic rigid bodies are and how they move."""
-        found: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] = self._rigid.motions(bodies)
-        return found
+        assert self._rigid is not None  # there are rigid bodies
+        return self._rigid.motions(bodies)
 
     def velocity_at(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocity of a point of a body that does not deform, and its spin."""
         scene = self._rigid
-        slot = None if body is None or scene is None else scene.slot_of(self.world, body)
-        if slot is None:
+        slot = None if body is None or scene is None else scene.slot_of(body)
+        if scene is None or slot is None:
             return np.zeros_like(point), np.zeros_like(point)
         velocity, spin = scene.solver.velocity(slot)
         middle, _ = scene.solver.pose(slot)

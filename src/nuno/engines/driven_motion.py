@@ -13,10 +13,10 @@ from nuno.shapes.coordinates import Pose
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 
-def kinematic_poses(world: Simulation, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
+def kinematic_poses(world: EngineWorld, body: Body, start: float, end: float, times: np.ndarray) -> Pose:
     """Return where a static body is at ``times`` (k,) [s] of a step: (worlds, k, 3) [m] and (worlds, k, 4)."""
     shape = (world.world_count, len(times))
     schedule = schedule_of(world)
@@ -26,7 +26,7 @@ def kinematic_poses(world: Simulation, body: Body, start: float, end: float, tim
     return _between(*schedule.in_frame(body.key, 0), (times - start) / (end - start), shape)
 
 
-def kinematic_velocity(world: Simulation, body: Body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def kinematic_velocity(world: EngineWorld, body: Body, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the velocity [m/s] of a static body's point in the last step, and its spin [rad/s], (worlds, 3) each."""
     schedule, still = schedule_of(world), np.zeros_like(point)
     if schedule is None or body.key not in schedule.poses or schedule.times[-1] < world.time - 1e-9:

@@ -17,12 +17,12 @@ from nuno.errors import EngineCapabilityError
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.bodies.contact_rules import ContactRules
-    from nuno.bodies.dynamics import Dynamics, State
+    from nuno.dynamics.dynamics import Dynamics, State
+    from nuno.engines.world_view import EngineWorld
     from nuno.joints.grip import Grip
     from nuno.materials import Material
     from nuno.numbers.device_array import DeviceArray
     from nuno.tables.kinematic_motion import Schedule
-    from nuno.world.simulation import Simulation
 
 CAPABILITIES: dict[str, str] = {
     "rigid bodies": "attach with Rigid",
@@ -96,7 +96,7 @@ class Engine(ABC):
     rules: ContactRules
     schedule: Schedule | None = None
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: EngineWorld) -> None:
         self.world = world
 
     def __repr__(self) -> str:
@@ -112,7 +112,7 @@ class Engine(ABC):
         """
         for name in names:
             if name not in self.capabilities:
-                from nuno.engines.engine_registry import engines_with
+                from nuno.engines.engine_table import engines_with
 
                 raise EngineCapabilityError(self.name, name, engines_with(name), hint)
 

@@ -15,10 +15,10 @@ from nuno.materials import Cloth, Material, Rigid, Soft
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 
-def needs_of_dynamics(body: Body, material: Material, world: Simulation) -> list[str]:
+def needs_of_dynamics(body: Body, material: Material, world: EngineWorld) -> list[str]:
     """Return the capabilities that dynamics of a material ask for."""
     needs = []
     worlds = world.world_count

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from nuno.errors import UnknownNameError
+from nuno.engines.engine_table import capabilities_of, named_engine
 from nuno.validation import checked
 
 if TYPE_CHECKING:
     from nuno.bodies.contact_rules import ContactRules
     from nuno.engines.engine import Engine
-    from nuno.world.simulation import Simulation
-
-ENGINES = {
-    "nuno": "nuno.engines.builtin_engine:BuiltinEngine",
-    "mujoco": "nuno.engines.mujoco.mujoco_engine:MujocoEngine",
-    "newton": "nuno.engines.newton.newton_engine:NewtonEngine",
-}
-"""Where the class of each engine is; its module imports the engine's package only when an instance is made."""
+    from nuno.engines.world_view import EngineWorld
 
 
 def engine_class(name: Any) -> type[Engine]:
@@ -27,14 +19,11 @@ def engine_class(name: Any) -> type[Engine]:
     Raises:
         UnknownNameError: there is no such engine.
     """
-    if not isinstance(name, str) or name not in ENGINES:
-        raise UnknownNameError("engine", name, list(ENGINES))
-    module, _, attribute = ENGINES[name].partition(":")
-    found: type[Engine] = getattr(import_module(module), attribute)
+    found: type[Engine] = named_engine(name)
     return found
 
 
-def make_engine(name: Any, world: Simulation, device: str, rules: ContactRules) -> Engine:
+def make_engine(name: Any, world: EngineWorld, device: str, rules: ContactRules) -> Engine:
     """Return an engine for a world.
 
     Args:
@@ -55,11 +44,6 @@ def make_engine(name: Any, world: Simulation, device: str, rules: ContactRules) 
     return made
 
 
-def engines_with(capability: str) -> tuple[str, ...]:
-    """Return the names of the engines that have a capability."""
-    return tuple(name for name in ENGINES if capability in engine_class(name).capabilities)
-
-
 @checked
 def engine_capabilities(engine: str) -> frozenset[str]:
     """Return the names of what an engine can do; its package need not be installed.
@@ -70,4 +54,4 @@ def engine_capabilities(engine: str) -> frozenset[str]:
     Raises:
         UnknownNameError: there is no such engine.
     """
-    return engine_class(engine).capabilities
+    return capabilities_of(engine)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import cv2
 import numpy as np
@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nuno.estimate.pick_result import PickResult
+    from nuno.camera.camera import Camera
+    from nuno.camera.rectangle import ClothRectangle
+    from nuno.estimate.similarity import Silhouette
 
 REAL, IMAGINED, BOTH = (232, 158, 64), (64, 125, 201), (194, 194, 188)
 
@@ -21,7 +23,43 @@ TITLE, GAP = 0.16, 0.05
 """Room above a panel for its title and between panels, as shares of a panel."""
 
 
-def contact_sheet(result: PickResult) -> Figure:
+class RankedPicks(Protocol):
+    """An estimate of a pick as its picture takes it; `PickResult` says what each member is."""
+
+    labels: np.ndarray
+    order: np.ndarray
+    scores: np.ndarray
+    score_name: str
+    eq1: np.ndarray
+    rectangle: ClothRectangle
+    camera: Camera
+    grid: tuple[int, int]
+    turn: float
+    masks: np.ndarray
+    real: Silhouette
+    image_before: np.ndarray | None
+    image_after: np.ndarray | None
+    mask_before: np.ndarray | None
+    mask_after: np.ndarray | None
+
+    @property
+    def best(self) -> tuple[Any, Any]:
+        """The label of the best candidate."""
+
+    @property
+    def by_position(self) -> bool:
+        """True where labels are positions [m]."""
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """(k, 2) float, the candidates as fractions of the sides."""
+
+    @property
+    def confidence(self) -> float:
+        """The probability of the best candidate."""
+
+
+def contact_sheet(result: RankedPicks) -> Figure:
     """Draw the sheet with Matplotlib, without pyplot: it opens no window and leaves no state behind."""
     from matplotlib.figure import Figure
     from matplotlib.gridspec import GridSpec
@@ -48,7 +86,7 @@ def contact_sheet(result: PickResult) -> Figure:
     return figure
 
 
-def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) -> None:
+def _imagined(figure: Figure, axes: Axes, result: RankedPicks, n: int, m: int) -> None:
     """All candidates' futures, in one image: axes of their own for each would take most of the sheet's time."""
     from matplotlib.patches import Rectangle
 
@@ -81,7 +119,7 @@ def _imagined(figure: Figure, axes: Axes, result: PickResult, n: int, m: int) ->
     axes.imshow(image, interpolation="nearest")
 
 
-def _name(result: PickResult, label: Any) -> str:
+def _name(result: RankedPicks, label: Any) -> str:
     """A candidate's label as the sheet shows it: (i, j), fractions, or a position in cm."""
     a, b = label
     if result.by_position:
@@ -98,7 +136,7 @@ def _bare(axes: Axes) -> None:
     axes.set(xticks=[], yticks=[])
 
 
-def _crop(result: PickResult) -> tuple[int, int, int, int]:
+def _crop(result: RankedPicks) -> tuple[int, int, int, int]:
     """The part of the small image in which any silhouette is, with a margin."""
     seen = result.masks.any(axis=0) | result.real.mask
     ys, xs = np.nonzero(seen)
@@ -120,7 +158,7 @@ def _shrunk(image: np.ndarray, axes: Axes) -> np.ndarray:
     return cv2.resize(image, (round(share * width), round(share * height)), interpolation=cv2.INTER_AREA)
 
 
-def _real(axes: Axes, result: PickResult, *, after: bool) -> None:
+def _real(axes: Axes, result: RankedPicks, *, after: bool) -> None:
     """An image with the cloth's outline in it; before, also the grid of candidates."""
     image = result.image_after if after else result.image_before
     mask = result.mask_after if after else result.mask_before

@@ -18,9 +18,9 @@ from nuno.estimate.hand_path import HandPath
 from nuno.estimate.imagined_fold import ImaginedFold
 from nuno.estimate.layers import Layers, find_layers
 from nuno.files.html_table import html_table
-from nuno.files.recording import RecordedBody, Recording
 from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.materials import Cloth
+from nuno.world.recording import RecordedBody, Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

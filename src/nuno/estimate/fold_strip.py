@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -11,10 +11,31 @@ from nuno.estimate.fold_view import hand_spheres, paint
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nuno.estimate.fold_result import FoldResult
+    from nuno.camera.camera import Camera
+    from nuno.world.world import World
 
 
-def fold_strip(result: FoldResult, count: int) -> Figure:
+class ReplayedFold(Protocol):
+    """A replayed fold as its strip of pictures takes it; `FoldResult` says what each member is."""
+
+    times: np.ndarray
+    vertices: np.ndarray
+    faces: np.ndarray
+    masks: np.ndarray
+    real: dict[int, np.ndarray]
+    agreement: dict[int, float]
+    camera: Camera
+    hands_at: np.ndarray
+    hands_seen: np.ndarray
+    hand_radius: float
+    images: dict[int, np.ndarray]
+
+    @property
+    def world(self) -> World:
+        """The world that it was imagined from."""
+
+
+def fold_strip(result: ReplayedFold, count: int) -> Figure:
     """Draw the strip with Matplotlib, without pyplot; the real outline is orange below.
 
     Args:
@@ -57,7 +78,7 @@ def fold_strip(result: FoldResult, count: int) -> Figure:
     return figure
 
 
-def _crop(result: FoldResult) -> tuple[int, int, int, int]:
+def _crop(result: ReplayedFold) -> tuple[int, int, int, int]:
     """The part of the image in which the cloth ever is, with a margin."""
     ever = result.masks.any(axis=0)
     for mask in result.real.values():

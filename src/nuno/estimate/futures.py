@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import ParticleDynamics
 from nuno.bodies.make_bodies import box, plane, sheet
 from nuno.camera.cloth_outline import ClothOutline
 from nuno.camera.rectangle import ClothRectangle
 from nuno.camera.table import Table
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import dynamics_of
 from nuno.estimate.coming_to_rest import LOOK_SECONDS, SETTLE_SECONDS, ComingToRest, mean_speeds, slow_part
 from nuno.estimate.hypotheses import Discretisation, cell_counts

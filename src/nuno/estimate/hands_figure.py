@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nuno.estimate.fold_result import FoldResult
+    from nuno.camera.rectangle import ClothRectangle
+    from nuno.estimate.imagined_fold import ImaginedFold
 
 
-def hands_figure(result: FoldResult) -> Figure:
+class ShownFold(Protocol):
+    """A replayed fold as the picture of the hands takes it; `FoldResult` says what each member is."""
+
+    times: np.ndarray
+    faces: np.ndarray
+    hands_at: np.ndarray
+    rectangle: ClothRectangle
+    fold: ImaginedFold
+
+    @property
+    def final(self) -> np.ndarray:
+        """(n, 3) float [m], the cloth at the last frame."""
+
+
+def hands_figure(result: ShownFold) -> Figure:
     """Draw the paths with Matplotlib, without pyplot; lines are thick while a hand holds the cloth."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure

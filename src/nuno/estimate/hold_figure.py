@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,13 +14,58 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from nuno.estimate.hold_result import HoldResult
+    from nuno.estimate.hold_views import HoldView
+    from nuno.estimate.imagined_holds import Holds
 
 SHOWN = 4
 """Candidates whose silhouettes are drawn, the best ones."""
 
 
-def hold_figure(result: HoldResult) -> Figure:
+class HeldGarment(Protocol):
+    """An estimate of a hold as its picture takes it; `HoldResult` says what each member is."""
+
+    @property
+    def holds(self) -> Holds:
+        """The garment as it hangs from every candidate."""
+
+    @property
+    def order(self) -> np.ndarray:
+        """(k,) int, candidates from best to worst."""
+
+    @property
+    def probabilities(self) -> np.ndarray:
+        """(k,) float by candidate."""
+
+    @property
+    def hand(self) -> np.ndarray:
+        """(3,) the held point [m]."""
+
+    @property
+    def matches(self) -> np.ndarray:
+        """(k, 2) int by candidate, guess and turn."""
+
+    @property
+    def turns(self) -> np.ndarray:
+        """(t,) float [rad]."""
+
+    @property
+    def views(self) -> tuple[HoldView, ...]:
+        """The images, with what was seen in them."""
+
+    @property
+    def best(self) -> tuple[float, float, str]:
+        """Place in the flat garment [m], and the layer."""
+
+    @property
+    def confidence(self) -> float:
+        """The probability of the best candidate."""
+
+    @property
+    def confidence_up_to_symmetry(self) -> float:
+        """That of the best group."""
+
+
+def hold_figure(result: HeldGarment) -> Figure:
     """Draw the picture with Matplotlib, without pyplot: it opens no window and leaves no state behind."""
     from matplotlib.figure import Figure
 
@@ -52,7 +97,7 @@ def hold_figure(result: HoldResult) -> Figure:
     return figure
 
 
-def _flat(axes: Axes, result: HoldResult, layer: int) -> None:
+def _flat(axes: Axes, result: HeldGarment, layer: int) -> None:
     """One layer of the flat garment, seen from outside, with the candidates on it, as large as they are likely."""
     garment, held = result.holds.garment, result.holds.candidates
     side = 1.0 if layer == FRONT else -1.0  # from behind, the wearer's left is on the left

@@ -21,13 +21,12 @@ from nuno.joints.joint_drives import (
     spring_drives,
 )
 from nuno.joints.joint_motion import positions_of, velocities_of
-from nuno.materials import Rigid
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.joints.grip import GripWorld
 
 KINDS = ("fixed", "hinge", "slider", "ball")
 
@@ -184,7 +183,7 @@ class Joint(Grip):
     def spring(self, value: Spring | None) -> None:
         self._set(spring_drives, value)
 
-    def _live(self) -> Simulation:
+    def _live(self) -> GripWorld:
         if self._world is None:
             raise BodyStateError(f"the {self.kind} of {self.body.name!r} was released")
         return self._world
@@ -221,19 +220,3 @@ class Joint(Grip):
     def _motion(self, body: Body | None, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Velocity [m/s] of a body's point and its angular velocity [rad/s], (worlds, 3) each."""
         return self._live().engine.velocity_at(body, point)
-
-
-def check_joined(body: Body, material: Any, world: Simulation) -> None:
-    """Check that a static body to which others are joined becomes no cloth or soft body.
-
-    Raises:
-        BodyStateError: it would.
-    """
-    if isinstance(material, Rigid) or body.is_dynamic:  # a joint with a dynamic body ends as that is detached
-        return
-    for dynamics in world._attached():
-        for grip in dynamics.grips:
-            if isinstance(grip, Joint) and grip.target is body:
-                raise BodyStateError(
-                    f"{grip.body.name!r} is joined to {body.name!r}, which can only become Rigid; release that first"
-                )

@@ -17,8 +17,7 @@ from nuno.validation import as_array, finite_array
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.joints.grip import Grip
-    from nuno.world.simulation import Simulation
+    from nuno.joints.grip import Grip, GripWorld
 
 
 MAX_FORCE = 1e4
@@ -119,7 +118,7 @@ def force_limit(asked: Any, worlds: int, *bodies: Body | None) -> np.ndarray:
     return np.max([np.full(worlds, MAX_FORCE), *(MAX_ACCELERATION * mass for mass in masses)], axis=0)
 
 
-def make_tie(body: Body, where: Any, other: Body, compliance: float, world: Simulation) -> TieSpec:
+def make_tie(body: Body, where: Any, other: Body, compliance: float, world: GripWorld) -> TieSpec:
     """Return what ties points of ``body`` to the nearest points of ``other``, where both are now.
 
     Raises:
@@ -137,11 +136,12 @@ def _tie_of(
     body: Body, corners: np.ndarray, weights: np.ndarray, other: Body, compliance: float, worlds: int
 ) -> TieSpec:
     """Return what ties points of ``body`` to ``other``: see `TieSpec` for the points."""
-    assert other._dynamics is not None
+    dynamics = other._dynamics
+    assert dynamics is not None
     own = np.broadcast_to(body.vertices, (worlds, *body.vertices.shape[-2:]))
     rows = np.arange(worlds)[:, None, None]
     held = np.einsum("wkc,wkcx->wkx", np.where(corners >= 0, weights, 0.0), own[rows, np.maximum(corners, 0)])
-    if other._dynamics.is_rigid:
+    if dynamics.is_rigid:
         places = np.broadcast_to(apply(invert(other.pose()), held), held.shape)
         return TieSpec(corners.astype(np.int32), np.array(weights), None, None, np.array(places), compliance)
     # four particles in all: one of this body, three of the other
@@ -158,7 +158,7 @@ def _tie_of(
 
 
 def make_hold(
-    body: Body, to: Any, target: Body | None, free: Any, compliance: float, world: Simulation
+    body: Body, to: Any, target: Body | None, free: Any, compliance: float, world: GripWorld
 ) -> tuple[HoldSpec, Pose | None]:
     """Return what holds a rigid body, and its pose in the frame of a static leader.
 
@@ -177,7 +177,7 @@ def make_hold(
     if target is not None:
         place, turn = (np.broadcast_to(a, (worlds, a.shape[-1])) for a in compose(invert(target.pose()), (place, turn)))
         spec = HoldSpec(now, place[:, None].copy(), turn[:, None].copy(), "linear", axis, compliance)
-        return spec, None if target._dynamics is not None else (place.copy(), turn.copy())
+        return spec, None if target.is_dynamic else (place.copy(), turn.copy())
     if isinstance(to, Path):
         if to.world_count not in (None, worlds):
             raise InvalidInputError(f"the path is for {to.world_count} worlds, but there are {worlds}")
@@ -226,7 +226,8 @@ def check_leader(leader: Body, deforms: bool, grips: Sequence[Grip]) -> None:
 def tie_to_leader(grip: Grip, worlds: int) -> None:
     """Let a grip by a static body be one by a dynamic body, which that has become: it bears the force from now on."""
     leader, spec = grip.target, grip.spec
-    assert leader is not None and leader._dynamics is not None
+    dynamics = None if leader is None else leader._dynamics
+    assert leader is not None and dynamics is not None
     if isinstance(spec, HoldSpec):
         # its places are in the leader's frame already
         grip.offsets = grip.followed = None
@@ -235,7 +236,7 @@ def tie_to_leader(grip: Grip, worlds: int) -> None:
     if spec.max_force is not None:
         tie = replace(tie, max_force=spec.max_force)
     # at the very places where the leader held them
-    grip.spec = replace(tie, places=grip.offsets) if leader._dynamics.is_rigid else tie
+    grip.spec = replace(tie, places=grip.offsets) if dynamics.is_rigid else tie
     grip.offsets = None
 
 
@@ -246,7 +247,7 @@ def check_weld(a: Body, b: Body) -> None:
         BodyStateError: one of them is static.
     """
     for body in (a, b):
-        if body._dynamics is None:
+        if not body.is_dynamic:
             raise BodyStateError(
                 f"{body.name!r} is static; weld joins two dynamic bodies, grip holds one to a static body"
             )

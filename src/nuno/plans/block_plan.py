@@ -17,7 +17,10 @@ from nuno.plans.shared_memory import (
     SHARED_PARTICLES,
     WHOLE_PARTICLES,
     bring_figures,
+    bring_masses,
     bring_notes,
+    bring_places,
+    bring_starts,
     column,
     counts,
     double_column,
@@ -122,16 +125,10 @@ def advance_blocks_partly(
     t.y = column(SHARED_PARTICLES)
     t.z = column(2 * SHARED_PARTICLES)
     t.w = column(3 * SHARED_PARTICLES)
-    for i in range(rank, n, size):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
-        t.w[i] = outside.w[i]
+    bring_places(t, outside, n, rank, size)
+    bring_masses(t, outside, n, rank, size)
     advance_block(t, t, topo, run, shapes, substeps, rank, size)
-    for i in range(rank, n, size):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
+    bring_places(outside, t, n, rank, size)
 
 
 @wp.kernel(enable_backward=False, launch_bounds=(FEW_THREADS, 1), module="nuno.plans.run_blocks_partly")
@@ -163,24 +160,14 @@ def advance_blocks_shared(
     t.py = column(5 * WHOLE_PARTICLES)
     t.pz = column(6 * WHOLE_PARTICLES)
     t.moved = whole(column(7 * WHOLE_PARTICLES))
-    for i in range(rank, n, size):
-        t.x[i] = outside.x[i]
-        t.y[i] = outside.y[i]
-        t.z[i] = outside.z[i]
-        t.w[i] = outside.w[i]
-        t.px[i] = outside.px[i]
-        t.py[i] = outside.py[i]
-        t.pz[i] = outside.pz[i]
+    bring_places(t, outside, n, rank, size)
+    bring_masses(t, outside, n, rank, size)
+    bring_starts(t, outside, n, rank, size)
     for i in range(rank, 4 * n, size):
         t.moved[i] = 0
     advance_block(t, t, topo, run, shapes, substeps, rank, size)
-    for i in range(rank, n, size):
-        outside.x[i] = t.x[i]
-        outside.y[i] = t.y[i]
-        outside.z[i] = t.z[i]
-        outside.px[i] = t.px[i]
-        outside.py[i] = t.py[i]
-        outside.pz[i] = t.pz[i]
+    bring_places(outside, t, n, rank, size)
+    bring_starts(outside, t, n, rank, size)
 
 
 @wp.func
@@ -273,14 +260,8 @@ def run_double_blocks_partly(
         t.x = double_column(0)
         t.y = double_column(DOUBLE_PARTICLES)
         t.z = double_column(2 * DOUBLE_PARTICLES)
-        for i in range(rank, n, size):
-            t.x[i] = outside.x[i]
-            t.y[i] = outside.y[i]
-            t.z[i] = outside.z[i]
+        bring_places(t, outside, n, rank, size)
         advance_block(t, floats, topo, run, shapes, substeps, rank, size)
-        for i in range(rank, n, size):
-            outside.x[i] = t.x[i]
-            outside.y[i] = t.y[i]
-            outside.z[i] = t.z[i]
+        bring_places(outside, t, n, rank, size)
     else:
         search_for_others(rounded, topo, sizes, run, tid / size - s.worlds, tid % size, size)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -19,9 +18,11 @@ PIECES = 12
 def launch_groups(
     launches: RecordedLaunches, kernel: Any, before: list[Any], shapes: Any, groups: int, run: Settings, substeps: int
 ) -> None:
-    """Run a kernel over every group of lanes.
+    """Run a kernel over every group of lanes, a thread per core.
 
-    A group by itself is a recorded launch: bodies that go together launch it at every substep.
+    A group by itself is a recorded launch: bodies that go together launch it at every substep. Several go through the
+    run piece by piece, so that three groups on two cores take one and a half times as long as one, not twice. Warp's
+    CPU launches release the GIL.
 
     Args:
         launches: Where it is recorded.
@@ -35,29 +36,7 @@ def launch_groups(
     if groups == 1:
         launches.launch(kernel, 1, [*before, run, shapes, 0, substeps])
         return
-
-    def launch(group: int, piece: Settings, count: int) -> None:
-        wp.launch(kernel, dim=1, inputs=[*before, piece, shapes, group, count], device="cpu")
-
-    run_groups(launch, kernel.module, groups, run, substeps)
-
-
-def run_groups(
-    launch: Callable[[int, Settings, int], None], module: Any, groups: int, run: Settings, substeps: int
-) -> None:
-    """Call ``launch`` with every group, settings and a number of substeps, a thread per core.
-
-    Each group goes through the run piece by piece, so that three groups on two cores take one and a half times as long
-    as one, not twice. Warp's CPU launches release the GIL.
-
-    Args:
-        launch: Launches a kernel for a group.
-        module: The kernel's module.
-        groups: How many there are.
-        run: Settings of the run.
-        substeps: Its length.
-    """
-    wp.load_module(module, device="cpu")  # here, for every thread would compile it for itself
+    wp.load_module(kernel.module, device="cpu")  # here, for every thread would compile it for itself
     pieces = [run] if substeps < 2 * PIECES else [_from(run, k * substeps // PIECES) for k in range(PIECES)]
     ends = [piece.first - run.first for piece in pieces[1:]] + [substeps]
     waiting: SimpleQueue[tuple[int, int]] = SimpleQueue()
@@ -70,7 +49,8 @@ def run_groups(
                 group, k = waiting.get_nowait()
             except Empty:
                 return
-            launch(group, pieces[k], ends[k] - (pieces[k].first - run.first))
+            inputs = [*before, pieces[k], shapes, group, ends[k] - (pieces[k].first - run.first)]
+            wp.launch(kernel, dim=1, inputs=inputs, device="cpu")
             if k + 1 < len(pieces):
                 waiting.put((group, k + 1))
 

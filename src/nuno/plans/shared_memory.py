@@ -119,6 +119,15 @@ def bring_speeds(to: Any, of: Any, n: int, rank: int, size: int):
 
 
 @wp.func
+def bring_starts(to: Any, of: Any, n: int, rank: int, size: int):
+    """Copy where all particles began the substep."""
+    for i in range(rank, n, size):
+        to.px[i] = of.px[i]
+        to.py[i] = of.py[i]
+        to.pz[i] = of.pz[i]
+
+
+@wp.func
 def bring_masses(to: Any, of: Any, n: int, rank: int, size: int):
     """The same of inverse masses."""
     for i in range(rank, n, size):

@@ -11,7 +11,7 @@ import numpy as np
 from nuno.errors import InvalidInputError
 from nuno.robot.camera_interface import CameraInterface
 from nuno.robot.goal import Goal, GoalStatus
-from nuno.robot.support import standing_place
+from nuno.robot.robot_model import standing_place
 from nuno.robot.trajectory import JointTrajectory
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Coordinates, Pose, compose, invert

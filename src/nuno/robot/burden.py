@@ -13,6 +13,7 @@ from nuno.robot.sensors import Sensors
 from nuno.robot.support import convex_outline, distance_inside
 
 if TYPE_CHECKING:
+    from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
     from nuno.robot.robot_state import RobotState
 
@@ -37,13 +38,14 @@ class Burden:
     joint, and once for each time that balance is lost, as a warning.
 
     Args:
-        links: The robot's links.
+        robot: The robot.
+        links: Its links.
     """
 
-    def __init__(self, links: Links) -> None:
-        self._links, self._robot = links, links.robot
-        self._sensors = Sensors(links.robot, links)
-        limits = links.robot.effort_limits
+    def __init__(self, robot: Humanoid, links: Links) -> None:
+        self._links, self._robot = links, robot
+        self._sensors = Sensors(robot, links)
+        limits = robot.effort_limits
         self._limits = np.where(np.isfinite(limits) & (limits > 0.0), limits, np.inf)
         frames = links.robot.description.frames
         sizes = [size for foot in links.robot.description.feet if (size := frames[foot].size) is not None]

@@ -10,7 +10,7 @@ import numpy as np
 from nuno.robot.pinocchio import pin
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
 
 LIGHT = 0.05
 """[kg] Less than this is not counted."""
@@ -32,13 +32,13 @@ class Carried:
     mass: float
     place: np.ndarray
 
-    def seen_from(self, robot: Humanoid) -> tuple[float, np.ndarray]:
+    def seen_from(self, robot: Robot) -> tuple[float, np.ndarray]:
         """Return mass [kg] and place (3,) [m] in the frame of the base link, as ``plan_walk`` takes a load."""
         base = pin.XYZQUATToSE3(robot.configuration()[:7])
         return self.mass, np.asarray(base.actInv(self.place))
 
 
-def carried_by(robot: Humanoid, data: Any, q: np.ndarray, loads: np.ndarray | None, gravity: float) -> Carried | None:
+def carried_by(robot: Robot, data: Any, q: np.ndarray, loads: np.ndarray | None, gravity: float) -> Carried | None:
     """Return the load that forces on the joints, in their own frames, amount to; None where there is none.
 
     Args:

@@ -15,7 +15,7 @@ from nuno.shapes.compound import Compound
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Sphere
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
     from nuno.shapes.shape import Shape
 
 
@@ -47,7 +47,7 @@ class LinkHulls:
         radii: (m,) float [m], of those.
     """
 
-    def __init__(self, robot: Humanoid) -> None:
+    def __init__(self, robot: Robot) -> None:
         parts = robot.geometry.shapes("collision")
         self.names = tuple(part.link for part in parts)
         self.joints = np.array([part.joint for part in parts], dtype=int)

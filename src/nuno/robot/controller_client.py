@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from nuno.robot.goal import Goal, Tolerances
 from nuno.robot.trajectory import JointTrajectory
 from nuno.validation import number
 
-if TYPE_CHECKING:
-    from nuno.robot.joint_interface import JointInterface
-
 Controller = dict[str, Any]
 """One controller: "controller_type" (its name here), "controller_action" and "controller_state" (what the wire calls
 its action and the topic of its state), "action_type", and "joint_names"."""
+
+
+class TrajectorySender(Protocol):
+    """A robot to which trajectories are sent; `JointInterface` says what each member does."""
+
+    def send_trajectory(
+        self, controller: Controller, trajectory: JointTrajectory, start_time: float, tolerances: Tolerances | None
+    ) -> Goal:
+        """Send a controller a trajectory, and return its goal."""
+
+    def cancel_trajectories(self, controller: Controller) -> None:
+        """Stop what a controller does."""
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Wait until something is so, and return whether it is."""
 
 
 class ControllerClient:
@@ -24,7 +37,7 @@ class ControllerClient:
         controller: The controller.
     """
 
-    def __init__(self, interface: JointInterface, controller: Controller) -> None:
+    def __init__(self, interface: TrajectorySender, controller: Controller) -> None:
         self.interface, self.controller = interface, controller
         self.goal: Goal | None = None
 

@@ -14,7 +14,7 @@ from nuno.robot.placement import frame_called
 
 if TYPE_CHECKING:
     from nuno.robot.description import HandOnFrame
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot_model import RobotModel
 
 CLOSING = 1
 """The axis of a hand's frame along which its fingers close."""
@@ -63,7 +63,7 @@ class Finger:
         return np.asarray(self.grasp.open + (self.grasp.closed - self.grasp.open) * slide / self.far)
 
 
-def fingers_of(robot: Humanoid) -> tuple[Finger, ...]:
+def fingers_of(robot: RobotModel) -> tuple[Finger, ...]:
     """Return the fingers of all hands of a robot whose description tells them, hand by hand.
 
     Raises:
@@ -119,7 +119,7 @@ class FingerBodies:
         bodies: Of each finger, the numbers of its bodies.
     """
 
-    def __init__(self, robot: Humanoid, links: Sequence[str]) -> None:
+    def __init__(self, robot: RobotModel, links: Sequence[str]) -> None:
         self.fingers = fingers_of(robot)
         self.bodies = [[k for k, link in enumerate(links) if link in finger.links] for finger in self.fingers]
         pairs = [(k, finger) for finger, own in zip(self.fingers, self.bodies, strict=True) for k in own]

@@ -14,10 +14,10 @@ from nuno.errors import NunoError, WalkError
 from nuno.robot.footsteps import middle_of, steps_of_velocity
 from nuno.robot.goal import Goal, GoalStatus, ResultCode
 from nuno.robot.preview_control import TICK
+from nuno.robot.robot_model import standing_place
 from nuno.robot.robot_state import RobotState
 from nuno.robot.running_walk import RunningWalk, landing_after, run_on, set_off
 from nuno.robot.simulated_joints import SimulatedJoints
-from nuno.robot.support import standing_place
 from nuno.robot.walk import TimedMotion, Walk
 from nuno.robot.walk_planner import MARGIN, WalkPlanner
 from nuno.robot.walking import continue_walk, plan_walk, plan_walk_velocity, stop_walk

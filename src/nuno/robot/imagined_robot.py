@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +21,36 @@ from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
     from nuno.robot.balance import Balance
-    from nuno.robot.simulated_robot import SimulatedRobot
+    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.links import Links
+    from nuno.robot.reported_joints import Angles
+    from nuno.robot.simulated_joints import SimulatedJoints
     from nuno.world.world import World
+
+
+class OriginalRobot(Protocol):
+    """The robot that is imagined, as its copies see it; `SimulatedRobot` says what each member is."""
+
+    actual: Humanoid
+    wanted: Humanoid
+    links: Links
+    joints: SimulatedJoints
+    guard: MotionGuard
+    balance: Balance | None
+    collisions: str
+
+    @property
+    def is_dynamic(self) -> bool:
+        """True where its links are moved by forces."""
+
+    def saved(self) -> tuple[RobotState, Any, Any, Any]:
+        """Return its state, what is wanted of it, its servo command, and what was found of its way."""
+
+    def angle_vector_duration(self, start_av: Angles, end_av: Angles) -> Any:
+        """Return the shortest time [s] from one posture to another."""
+
+    def sub_angle_vector(self, a: Angles, b: Angles) -> np.ndarray:
+        """Return the difference of two postures."""
 
 
 class ImaginedRobot:
@@ -43,7 +71,7 @@ class ImaginedRobot:
     """
 
     def __init__(
-        self, original: SimulatedRobot, world: World, of: tuple[ImaginedRobot, int] | None = None
+        self, original: OriginalRobot, world: World, of: tuple[ImaginedRobot, int] | None = None
     ) -> None:  # fmt: skip
         self.original, self.world = original, world
         self.joint_names = original.actual.joint_names

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
 from nuno.joints.joint import Joint
@@ -314,7 +315,7 @@ class LinkDynamics:
 
 def _grips_of(bodies: Iterable[Body]) -> list[Grip]:
     """Return what holds bodies, joints included."""
-    return [grip for body in bodies if body._dynamics is not None for grip in body._dynamics.grips]
+    return [grip for body in bodies if (own := dynamics_of(body)) is not None for grip in own.grips]
 
 
 def _axis_of(joint: Any) -> tuple[bool, np.ndarray]:

@@ -19,7 +19,7 @@ from nuno.shapes.compound import Compound, Part
 from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Shape, Sphere, TriangleMesh
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot_model import RobotModel
 
 logger = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class Geometry:
         robot: Whose; its posture tells which links overlap of themselves.
     """
 
-    def __init__(self, robot: Humanoid) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
         self._data = robot.model.createData()
 

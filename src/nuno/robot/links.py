@@ -17,7 +17,7 @@ from nuno.tables.path_batch import KinematicGroup
 from nuno.validation import checked, number
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
     from nuno.world.world import World
 
 MESHES = ("collision", "visual", "joints")
@@ -48,7 +48,7 @@ class Links:
     """
 
     @checked
-    def __init__(self, robot: Humanoid, world: World, meshes: str = "collision") -> None:
+    def __init__(self, robot: Robot, world: World, meshes: str = "collision") -> None:
         if meshes not in MESHES:
             raise InvalidInputError(f"meshes must be one of {MESHES}, got {meshes!r}")
         if world.world_count != 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.joints.held_points import held_points
 from nuno.materials import Cloth
 from nuno.robot.ground import moment
@@ -86,9 +86,7 @@ class LinkLoads:
         """Return all loads, those of the last frame."""
         world = self._world
         with world.lock:
-            moving: list[Any] = [
-                body for body in world._bodies.values() if body._dynamics is not None and body not in self._index
-            ]
+            moving: list[Any] = [body for body in world._bodies.values() if body.is_dynamic and body not in self._index]
             now = (world.time, tuple(grip.key for body in moving for grip in body._dynamics.grips))
             if now != self._read_at:
                 self._loads = tuple(load for body in moving for load in self._of(body))

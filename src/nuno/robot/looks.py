@@ -13,8 +13,8 @@ from nuno.robot.pinocchio import pin
 from nuno.shapes.coordinates import Pose, compose, invert
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
     from nuno.robot.links import Links
+    from nuno.robot.robot import Robot
 
 logger = logging.getLogger(__name__)
 
@@ -69,7 +69,7 @@ def looks_of(links: Links) -> list[Look]:
     return found
 
 
-def _joint_frames(robot: Humanoid) -> list[Pose]:
+def _joint_frames(robot: Robot) -> list[Pose]:
     """Return where each joint is in the frame of the joint before it, as the robot stands now."""
     data = robot.model.createData()  # not the robot's own, which its program may be using
     pin.forwardKinematics(robot.model, data, robot.configuration())

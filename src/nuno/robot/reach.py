@@ -20,7 +20,7 @@ from nuno.shapes.coordinates import Coordinates
 from nuno.validation import count, finite_array, number
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
 
 STEPS = 60
 """Steps of one attempt. A target in reach takes 5 to 20."""
@@ -65,7 +65,7 @@ class Reach:
 
 
 def reach(
-    robot: Humanoid, targets: Mapping[str, Any], *, stance: Sequence[str] | None = None, tolerance: float = 5e-4,
+    robot: Robot, targets: Mapping[str, Any], *, stance: Sequence[str] | None = None, tolerance: float = 5e-4,
     angle_tolerance: float = 5e-3, margin: float = 0.02, check_collisions: bool = True, attempts: int = 10,
     move: bool = True,
 ) -> Reach:  # fmt: skip
@@ -141,7 +141,7 @@ class _Solver:
     """Attempts at one set of targets."""
 
     def __init__(
-        self, robot: Humanoid, goals: Mapping[str, Goal], held: Sequence[str], outline: np.ndarray | None,
+        self, robot: Robot, goals: Mapping[str, Goal], held: Sequence[str], outline: np.ndarray | None,
         margin: float, tolerance: float, angle_tolerance: float,
     ) -> None:  # fmt: skip
         self.robot, self.goals, self.outline = robot, goals, outline
@@ -265,7 +265,7 @@ def _support_limit(pink: Any, outline: np.ndarray, margin: float) -> Any:
     return SupportLimit()
 
 
-def _shares(robot: Humanoid, held: Sequence[str]) -> np.ndarray:
+def _shares(robot: Robot, held: Sequence[str]) -> np.ndarray:
     """Return the relative weight (n,) of each joint's staying where it is."""
     pin.computeSubtreeMasses(robot.model, robot.scratch)
     carrying = _carrying(robot, held)
@@ -273,13 +273,13 @@ def _shares(robot: Humanoid, held: Sequence[str]) -> np.ndarray:
     return np.where(heavy, TRUNK_SHARE, 1.0)
 
 
-def _carrying(robot: Humanoid, held: Sequence[str]) -> set[int]:
+def _carrying(robot: Robot, held: Sequence[str]) -> set[int]:
     """Return the joints between the base and the frames of the stance."""
     feet = [robot.model.frames[robot.frame_index(frame)].parentJoint for frame in held]
     return {j for foot in feet for j in robot.model.supports[foot]}
 
 
-def _other_start(robot: Humanoid, q: np.ndarray, held: Sequence[str], random: np.random.Generator) -> np.ndarray:
+def _other_start(robot: Robot, q: np.ndarray, held: Sequence[str], random: np.random.Generator) -> np.ndarray:
     """Return a configuration with the joints that carry no held frame anywhere but near their limits."""
     carrying = _carrying(robot, held)
     other = q.copy()
@@ -297,7 +297,7 @@ def _checked_targets(targets: Any) -> Mapping[str, Any]:
     return targets
 
 
-def _goal(robot: Humanoid, frame: str, target: Any) -> Goal:
+def _goal(robot: Robot, frame: str, target: Any) -> Goal:
     robot.frame_index(frame)
     if not isinstance(target, Coordinates):
         return pin.SE3(np.eye(3), finite_array(f"the target of {frame!r}", target, (3,))), False

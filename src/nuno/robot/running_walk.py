@@ -203,6 +203,7 @@ def run_on(walk: TimedMotion, at: int, velocity: np.ndarray) -> RunningWalk:
         InvalidInputError: it is faster than the stride allows.
     """
     planner, schedule = walk.planner, walk.schedule
+    assert isinstance(planner, WalkPlanner)
     k = at - round(float(walk.times[0]) / TICK)
     states = walk.states_at(k)
     landed = next(k for k in range(len(schedule.steps)) if schedule.landing(k) == at) + 1

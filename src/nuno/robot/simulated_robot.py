@@ -13,6 +13,7 @@ from nuno.robot.balance import Balance
 from nuno.robot.burden import Burden
 from nuno.robot.goal import Goal, GoalStatus, ResultCode, Tolerances
 from nuno.robot.hands import hands_of
+from nuno.robot.humanoid import Humanoid
 from nuno.robot.joint_interface import Controller
 from nuno.robot.loads import LinkLoads
 from nuno.robot.motion_guard import MotionGuard
@@ -28,11 +29,10 @@ from nuno.robot.trajectory import JointTrajectory
 from nuno.robot.wanted_motion import WantedMotion
 from nuno.shapes.coordinates import Coordinates
 from nuno.validation import checked, number
-from nuno.world.background import LATE
+from nuno.world.pace import LATE
 
 if TYPE_CHECKING:
     from nuno.robot.head_cameras import HeadCameras
-    from nuno.robot.humanoid import Humanoid
     from nuno.robot.imagined_robot import ImaginedRobot
     from nuno.robot.links import Links
     from nuno.world.world import World
@@ -92,7 +92,7 @@ class SimulatedRobot(SimulatedBody):
         self.world, self._entered = world, links is None
         meshes = "joints" if dynamics else "collision"
         self.links: Links = robot.copy().enter(world, meshes) if links is None else links
-        self.actual = self.links.robot
+        self.actual: Humanoid = self.links.robot  # type: ignore[assignment]  # no other robot enters a world
         self.balance = Balance(self.links) if self.links.are_joints else None
         # with dynamics, the robot as its controllers want it, else the actual one
         self.wanted = self.actual if self.balance is None else self.actual.copy()
@@ -107,7 +107,7 @@ class SimulatedRobot(SimulatedBody):
         self._readings: tuple[float, Readings] | None = None
         self._cameras = SimulatedCameras(self.links, cameras)
         self.loads = LinkLoads(self.links)
-        self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.links)
+        self.guard, self._burden = MotionGuard(self.links, collisions), Burden(self.actual, self.links)
         self.gait.looks = self.guard.velocities_of(self._motion)
         self._servo: Servo | None = None
         self._before: RobotState | None = None  # its state when the frame began

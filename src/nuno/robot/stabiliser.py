@@ -17,7 +17,7 @@ from nuno.robot.sensors import sole_corners
 from nuno.robot.support import convex_outline
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
 
 WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 MOVES = 1e-3
@@ -47,7 +47,7 @@ class Stabiliser:
         gravity: [m/s2].
     """
 
-    def __init__(self, robot: Humanoid, gravity: Any) -> None:
+    def __init__(self, robot: Robot, gravity: Any) -> None:
         self._model = robot.model
         self._data, self._wanted = robot.model.createData(), robot.model.createData()
         self._feet = [robot.frame_index(foot) for foot in robot.description.feet]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nuno.robot.humanoid import IDENTITY
 from nuno.robot.pinocchio import pin
+from nuno.robot.robot_model import IDENTITY
 
 if TYPE_CHECKING:
     from nuno.robot.humanoid import Humanoid

@@ -35,7 +35,7 @@ class StaticBoxes:
         renewed = self._version != self._world._collider_version
         if renewed:
             self._version = self._world._collider_version
-            self.bodies = [b for b in self._world._bodies.values() if b._dynamics is None and b.group]
+            self.bodies = [b for b in self._world._bodies.values() if not b.is_dynamic and b.group]
             corners = np.array([_box(body) for body in self.bodies]).reshape(-1, 2, 3)
             self._halves = 0.5 * (corners[:, 1] - corners[:, 0])
             self._middles = corners[:, 0] + self._halves

@@ -1,25 +1,8 @@
-"""Standing: where a robot stands, the outline of its soles, how far inside a point is, the zero moment point."""
+"""Support: the outline of soles, how far inside a point is, the zero moment point."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
-
-
-def standing_place(robot: Humanoid) -> tuple[float, float, float]:
-    """Return where a robot stands: x and y [m] of the middle between its soles, and where they point [rad].
-
-    Of a robot without legs, those of its base.
-    """
-    poses = [robot.frame_pose(foot) for foot in robot.description.feet] or [robot]
-    ahead = np.sum([pose.rotation[:2, 0] for pose in poses], axis=0)
-    x, y, _ = np.mean([pose.position for pose in poses], axis=0)
-    return float(x), float(y), math.atan2(ahead[1], ahead[0])
 
 
 def convex_outline(points: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,9 +15,20 @@ from nuno.robot.robot_state import RobotState
 from nuno.validation import number
 
 if TYPE_CHECKING:
+    from nuno.robot.stride import Stride
     from nuno.robot.timeline import Schedule
     from nuno.robot.walk_check import WalkMeasures
-    from nuno.robot.walk_planner import States, WalkPlanner
+
+
+States = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Of both passes of preview control: the state (3, 2) at a tick, and the sum of errors (2,) before it."""
+
+
+class WalkSettings(Protocol):
+    """The settings that a motion is planned by; `nuno.robot.walk_planner.WalkPlanner` has them."""
+
+    model: Any
+    stride: Stride
 
 
 class TimedMotion(ABC):
@@ -39,7 +50,7 @@ class TimedMotion(ABC):
 
     @property
     @abstractmethod
-    def planner(self) -> WalkPlanner:
+    def planner(self) -> WalkSettings:
         """The settings that it was planned by."""
 
     @property
@@ -144,10 +155,10 @@ class Walk(TimedMotion):
         return float(self.times[-1] - self.times[0])
 
     @property
-    def planner(self) -> WalkPlanner:
+    def planner(self) -> WalkSettings:
         """The settings that it was planned by."""
-        planner: WalkPlanner = self.plan.planner
-        return planner
+        settings: WalkSettings = self.plan.planner
+        return settings
 
     @property
     def schedule(self) -> Schedule:

@@ -18,7 +18,7 @@ from nuno.robot.preview_control import TICK, PreviewControl
 from nuno.robot.stride import Stride, two_feet
 from nuno.robot.timeline import Schedule, Timeline, smooth, timeline
 from nuno.robot.trajectory import JointTrajectory, Spline
-from nuno.robot.walk import Walk
+from nuno.robot.walk import States, Walk
 from nuno.robot.walk_check import check_measures, measure_walk, motion_of, zero_moments
 from nuno.validation import finite_array, number
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 Arms = Mapping[str, float] | JointTrajectory | None
 LEVEL = 0.01
 """[rad] What a sole may be tilted when a walk begins."""
-States = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""Of both passes of preview control: the state (3, 2) at a tick, and the sum of errors (2,) before it."""
 SAME_HEIGHT = 0.002
 """[m] By which soles may then differ in height."""
 MARGIN = 0.02

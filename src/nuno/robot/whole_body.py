@@ -26,7 +26,7 @@ except ImportError as error:
     raise MissingPackageError("daqp", "robot", "a robot's balance") from error
 
 if TYPE_CHECKING:
-    from nuno.robot.humanoid import Humanoid
+    from nuno.robot.robot import Robot
 
 EDGE = 0.9
 """Share of a sole that is counted on: on its very edge it would roll."""
@@ -78,7 +78,7 @@ class WholeBodyControl:
     """
 
     def __init__(
-        self, robot: Humanoid, gravity: Any = (0.0, 0.0, -9.81), *, friction: float = 0.6, gains: Gains | None = None
+        self, robot: Robot, gravity: Any = (0.0, 0.0, -9.81), *, friction: float = 0.6, gains: Gains | None = None
     ) -> None:
         self._model = robot.model.copy()
         self._model.gravity.linear = np.array(gravity, dtype=float)

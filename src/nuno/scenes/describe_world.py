@@ -19,7 +19,8 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 from nuno.shapes.mass_properties import mass_properties
 from nuno.shapes.shape import Shape, TriangleMesh
-from nuno.world.snapshot import BodyRecord, GripRecord, Snapshot
+from nuno.world.snapshot import Snapshot
+from nuno.world.snapshot_records import BodyRecord, GripRecord
 from nuno.world.world import World
 
 ORIGIN: Pose = (np.zeros(3), quat.IDENTITY)

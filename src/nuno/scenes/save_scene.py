@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from nuno.bodies.surface_file import check_extension
 from nuno.errors import InvalidInputError
-from nuno.files.export import check_extension
 from nuno.files.whole_file import file_path, write_whole
 from nuno.joints.joint import Joint
 from nuno.scenes.describe_world import describe_world

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.camera.camera import Camera
-from nuno.files.recording import Recording
 from nuno.shapes.shape import Plane
+from nuno.world.recording import Recording
 
 if TYPE_CHECKING:
     from nuno.world.world import World

@@ -11,7 +11,7 @@ from weakref import WeakSet
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.engines.world_view import attached
 from nuno.errors import EstimationError, InvalidInputError, NunoError
 from nuno.search.knots import LONGEST

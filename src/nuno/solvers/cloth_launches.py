@@ -6,6 +6,7 @@ from typing import Any
 
 import warp as wp
 
+from nuno.bodies.resolution import Resolution
 from nuno.constraints.compliances import Compliances
 from nuno.contact.self.group_search import make_lists
 from nuno.kernels.module_loads import wait_for_load
@@ -40,7 +41,6 @@ from nuno.plans.shared_memory import DOUBLE_PARTICLES, SHARED_PARTICLES, WHOLE_P
 from nuno.plans.simd_elements import pack_topology
 from nuno.plans.stage_kernels import divide, make_work
 from nuno.solvers.particle_solver import ParticleSolver
-from nuno.solvers.resolution import Resolution
 from nuno.state.cloth_state import Settings
 from nuno.state.double_positions import DOUBLE_RATE
 from nuno.topology.cloth_topology import ClothTopology

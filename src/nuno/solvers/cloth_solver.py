@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.bodies.resolution import Resolution
 from nuno.constraints.compliances import compliances, vertex_masses
 from nuno.constraints.relaxation import PLAIN, RELAXATIONS, softening, stiffness_share, sweeps_for
 from nuno.contact.self.cpu_scratch import listing_room
@@ -21,7 +22,6 @@ from nuno.solvers.cloth_launches import ClothLaunches
 from nuno.solvers.cloth_substeps import bearable_tension, bending_share, default_substeps, wanted_substeps
 from nuno.solvers.coloured_sides import put_sides
 from nuno.solvers.pair_capacity import find_missed, lengthen_lists, size_lists
-from nuno.solvers.resolution import Resolution
 from nuno.state.cloth_state import (
     COUNTS,
     LISTINGS,

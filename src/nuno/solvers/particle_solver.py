@@ -28,7 +28,7 @@ from nuno.state.cloth_state import (
 
 if TYPE_CHECKING:
     from nuno.joints.grip import GripSpec
-    from nuno.tables.colliders import Colliders
+    from nuno.solvers.shape_tables import ShapeTables
 
 
 class ParticleSolver(ParticleState):
@@ -40,7 +40,7 @@ class ParticleSolver(ParticleState):
     Attributes:
         substeps: Substeps a frame.
         self_contact: Whether the body collides with itself.
-        sums: What shapes give the body over a frame, where that is asked for: see `sum_impulses`.
+        sums: What shapes give the body over a frame, where that is asked for.
     """
 
     substeps: int
@@ -83,7 +83,7 @@ class ParticleSolver(ParticleState):
 
     # -- what acts on the particles
 
-    def set_colliders(self, colliders: Colliders | None) -> None:
+    def set_colliders(self, colliders: ShapeTables | None) -> None:
         """The static shapes that the body meets; None for none."""
         if colliders is None:
             shapes = Shapes()
@@ -107,13 +107,6 @@ class ParticleSolver(ParticleState):
         )
         self._forget_launches()
 
-    def sum_impulses(self, on: bool) -> None:
-        """Sum up what shapes give the body, from the next frame on, or no more. The motion keeps its bits."""
-        if on != (self.sums is not None):
-            from nuno.solvers.shape_impulses import ShapeImpulses
-
-            self.sums = ShapeImpulses(self) if on else None
-
     def set_forces(self, forces: np.ndarray | None) -> None:
         """Forces [N] on the vertices, (worlds, n, 3), held until set anew; None for none."""
         s = self.state
@@ -136,7 +129,6 @@ class ParticleSolver(ParticleState):
         self._grips = tuple(grips)
         rows = grip_rows(grips, self.origin, self._inverse_mass)
         _, count, keys, _ = rows.place.shape
-        self._grip_times = rows.times
         s, size = self.state, self._size
         size.keys, size.grips = count * keys, count
         for k, name in enumerate(("grip_x", "grip_y", "grip_z")):

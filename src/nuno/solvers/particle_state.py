@@ -15,7 +15,7 @@ from nuno.state.cloth_state import FASTEST, NOTES, ORIGIN, PARTICLE_ARRAYS, SPEE
 from nuno.state.double_positions import DoublePositions
 
 if TYPE_CHECKING:
-    from nuno.solvers.shape_impulses import ShapeImpulses
+    from nuno.solvers.shape_tables import FrameSums
 
 KEPT = ("x", "y", "z", "vx", "vy", "vz", "notes")
 """Arrays that a run changes and that the next one depends on."""
@@ -68,7 +68,7 @@ class ParticleState:
         self._number: Any = lane if self.lanes > 1 else float
         self._integer: Any = lane_int if self.lanes > 1 else int
         self.missed = np.zeros(self.world_count, dtype=bool)
-        self.sums: ShapeImpulses | None = None
+        self.sums: FrameSums | None = None
         self._counts: wp.array | None = None  # read on CUDA along with `finite`, so that nobody waits twice
         self._counted: np.ndarray | None = None
 

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from nuno.bodies.resolution import Resolution
 from nuno.constraints.tetrahedron import COLUMNS
 from nuno.contact.particle.feature_lists import ROUND
 from nuno.contact.particle.feature_queue import QUEUE, ROOM
 from nuno.numbers.lanes import LANES, lane, lane_int
 from nuno.plans.cpu_groups import launch_groups
 from nuno.plans.group_figures import SHARED_FIGURES
+from nuno.plans.group_kernels import SOFT_THREADS, run_soft_double_grid, run_soft_grid
 from nuno.plans.group_plan import GridPlan, block_groups_of, cores_of
 from nuno.plans.recorded_launches import RecordedLaunches
 from nuno.plans.shared_memory import DOUBLE_PARTICLES, ROOMY_PARTICLES, SHARED_PARTICLES
 from nuno.plans.soft_block_plan import FAR, FEATURES, FEW_THREADS, MANY_THREADS
-from nuno.plans.soft_group_kernels import THREADS, run_soft_double_grid, run_soft_grid
 from nuno.plans.soft_worlds import (
     run_soft_double_lanes,
     run_soft_double_simd,
@@ -30,7 +31,6 @@ from nuno.plans.soft_worlds import (
 )
 from nuno.solvers.coloured_sides import put_sides
 from nuno.solvers.particle_solver import ParticleSolver
-from nuno.solvers.resolution import Resolution
 from nuno.solvers.soft_substeps import modulus_share, soft_substeps, wanted_substeps, wave_speed
 from nuno.state.cloth_state import NOTES, SCALARS, Settings
 from nuno.state.double_positions import DoublePositions
@@ -51,7 +51,7 @@ from nuno.topology.soft_topology import SoftTopology, edge_matrices, moduli, sha
 
 if TYPE_CHECKING:
     from nuno.materials import Soft
-    from nuno.tables.colliders import Colliders
+    from nuno.solvers.shape_tables import ShapeTables
 
 COLLAPSED = 1e-3
 """Width of a body, in cells, below which it is a line or a point, from where no force of its own leads back."""
@@ -146,7 +146,7 @@ class SoftSolver(ParticleSolver):
         """
         super().set_state(loosened(np.asarray(positions, dtype=np.float64), self.cell_size), velocities)
 
-    def set_colliders(self, colliders: Colliders | None) -> None:
+    def set_colliders(self, colliders: ShapeTables | None) -> None:
         """The static shapes that the body meets; None for none."""
         super().set_colliders(colliders)
         # a little more than what kernels take for sharp, of which none may be left undone
@@ -284,8 +284,8 @@ class SoftSolver(ParticleSolver):
         before, after = (self.device_topology, self._surface, self._size), (self.shapes, shared)
         kernels = run_soft_grid, run_soft_double_grid
         return GridPlan(
-            kernels, self.state, before, lambda _: after, self.device, self.world_count, block_groups, blocks, THREADS,
-            self._launch_worlds,
+            kernels, self.state, before, lambda _: after, self.device, self.world_count, block_groups, blocks,
+            SOFT_THREADS, self._launch_worlds,
         )  # fmt: skip
 
     def _forget_launches(self) -> None:

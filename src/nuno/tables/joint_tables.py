@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import warp as wp
@@ -14,24 +14,38 @@ from nuno.tables.joint_trees import ANCHOR, tree_table
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+
+
+class BodySlots(Protocol):
+    """The slots of a world's rigid bodies: `nuno.dynamics.rigid_dynamics.RigidScene` as tables of joints see it."""
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(worlds, 3) [m], what the solver's positions are relative to."""
+
+    def slot_of(self, body: Body) -> int | None:
+        """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
 
 
 class CoupledJoints:
     """Joints of rigid bodies that go together.
 
     Args:
-        world: Whose they are.
         joints: The joints.
         bodies: Those of the group, in the coupling's order.
+        worlds: Worlds in the batch.
+        device: Where the tables live.
+        scene: What moves the world's rigid bodies, None where there are none.
     """
 
-    def __init__(self, world: Simulation, joints: list[Joint], bodies: list[Body]) -> None:
+    def __init__(
+        self, joints: list[Joint], bodies: list[Body], worlds: int, device: str, scene: BodySlots | None
+    ) -> None:
         self.joints = joints
         self.table, self.trees = Joints(), Trees()
         self._specs: list[JointSpec] = []
-        self._device = str(world.device)
-        count, worlds, scene = len(joints), world.world_count, world._rigid
+        self._device = device
+        count = len(joints)
         self.table.count = count
         if not count:
             return
@@ -43,12 +57,12 @@ class CoupledJoints:
             other: Any = None if joint.target is None else joint.target._dynamics
             places.append(spec.place - own.centre)
             # a static body's slot has its shape's frame; the world's is relative to the scene's origin
-            others.append(spec.other_place - (scene.solver.origin if joint.target is None else 0.0))
+            others.append(spec.other_place - (scene.origin if joint.target is None else 0.0))
             if other is not None:
                 others[-1] = spec.other_place - other.centre
         specs: list[JointSpec] = [joint.spec for joint in joints]
-        slots = [scene.slot_of(world, joint.body) for joint in joints]
-        other_slots = [-1 if j.target is None else scene.slot_of(world, j.target) for j in joints]
+        slots = [scene.slot_of(joint.body) for joint in joints]
+        other_slots = [-1 if j.target is None else scene.slot_of(j.target) for j in joints]
         for name, numbers in (
             ("kind", [KINDS.index(spec.kind) for spec in specs]),
             ("body", [bodies.index(joint.body) for joint in joints]),

@@ -160,7 +160,7 @@ def path_for(body: Body, to: Path, world_count: int) -> Path:
     """
     if not isinstance(to, Path):
         raise InvalidInputError(f"a body moves along a Path, or None ends it; got {type(to).__name__}")
-    if body._dynamics is not None:
+    if body.is_dynamic:
         raise BodyStateError(f"{body.name!r} is dynamic and cannot follow a path; grip it instead")
     if body.parent is not None:
         raise BodyStateError(f"{body.name!r} follows another frame; dissoc it first")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,10 +15,16 @@ from nuno.shapes.path import Path
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.world import World
 
 SAME_INSTANT = 1e-8
 """[s] Times that are no farther apart are one."""
+
+
+class PathWorld(Protocol):
+    """A world whose bodies are sent along paths."""
+
+    def move(self, body: Body | str, to: Path | None) -> None:
+        """Let a static body follow a path from now on; see ``World.move``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +179,12 @@ class KinematicGroup:
         self.paths: list[Path] = [GroupPath(self, k) for k in range(len(keys))]
 
     def lead(
-        self, bodies: Sequence[Body], world: World, times: np.ndarray, positions: np.ndarray, quaternions: np.ndarray
+        self,
+        bodies: Sequence[Body],
+        world: PathWorld,
+        times: np.ndarray,
+        positions: np.ndarray,
+        quaternions: np.ndarray,
     ) -> None:
         """Send the bodies on a path each, from now on.
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from nuno.errors import InvalidInputError, ReachError, RobotModelError
 from nuno.robot.placement import quaternion_of
-from nuno.robot.support import distance_inside, standing_place
+from nuno.robot.robot_model import standing_place
+from nuno.robot.support import distance_inside
 from nuno.shapes.coordinates import Coordinates
 from nuno.tasks.fold_motion import FoldMotion
 from nuno.tasks.obstacles import Obstacles

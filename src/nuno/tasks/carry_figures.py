@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nuno.robot.humanoid import Humanoid
-    from nuno.tasks.carry_result import CarryResult
+    from nuno.tasks.carry_trials import CarryPlan, CarryTrial
 
 WIDTH, HEIGHT, FOCAL = 400, 480, 560.0
 """[px] Of each picture."""
@@ -29,7 +30,41 @@ LAMP = np.array([0.3, -0.5, 0.8]) / np.linalg.norm([0.3, -0.5, 0.8])
 AMBIENT = 0.4
 
 
-def carry_strip(result: CarryResult, trial: int, count: int) -> Figure:
+class Carries(Protocol):
+    """Trials as their pictures take them; `CarryResult` says what each member is."""
+
+    @property
+    def trials(self) -> tuple[CarryTrial, ...]:
+        """By arm distance, then offset in x, then in y."""
+
+    @property
+    def plan(self) -> CarryPlan:
+        """The plan that all trials had in common."""
+
+    @property
+    def robot(self) -> Humanoid | None:
+        """The robot; None where its tracks were given."""
+
+    @property
+    def walk_of(self) -> np.ndarray:
+        """(trials,) int, the walk that each took."""
+
+    @property
+    def values(self) -> np.ndarray:
+        """(trials,) float [m s]."""
+
+    @property
+    def failed(self) -> np.ndarray:
+        """(trials,) bool, where the mat fell."""
+
+    def offsets(self) -> np.ndarray:
+        """Return the offsets of each trial, (trials, 2) [m]."""
+
+    def replay(self, trial: int, times: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return the mat's vertices at some times of a trial."""
+
+
+def carry_strip(result: Carries, trial: int, count: int) -> Figure:
     """Draw a trial at ``count`` times, with Matplotlib and without pyplot."""
     from matplotlib.figure import Figure
 
@@ -56,7 +91,7 @@ def carry_strip(result: CarryResult, trial: int, count: int) -> Figure:
     return figure
 
 
-def carry_plot(result: CarryResult) -> Figure:
+def carry_plot(result: Carries) -> Figure:
     """Draw F over the arms' distance, a panel for each offset in x and a line for each in y; crosses where it fell."""
     from matplotlib.figure import Figure
 

@@ -15,33 +15,12 @@ from nuno.errors import InvalidInputError
 from nuno.files.html_table import html_table
 from nuno.files.whole_file import made_folder, replacing, write_figure, write_whole
 from nuno.tasks.arm_tracks import FRAME_RATE
-from nuno.tasks.carry_trials import CarryPlan, carry, make_room
+from nuno.tasks.carry_trials import CarryPlan, CarryTrial, carry, make_room
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nuno.robot.humanoid import Humanoid
-
-
-@dataclass(frozen=True)
-class CarryTrial:
-    """One way of holding the mat, and what came of it.
-
-    Attributes:
-        arm_distance: Between the hands [m].
-        offset_x: From the mat's centre of gravity to the middle between the hands, ahead [m].
-        offset_y: Likewise to the left [m].
-        value: F [m s], the less the steadier; None where the mat fell.
-        failed_at: When it fell [s], from the start of the walk (negative: before it); None where it did not.
-        reason: How it fell, or the error that ended the trial; "" where it was carried to the end.
-    """
-
-    arm_distance: float
-    offset_x: float
-    offset_y: float
-    value: float | None
-    failed_at: float | None
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)

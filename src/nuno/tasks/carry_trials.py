@@ -40,6 +40,27 @@ CALM = 6.0
 """[1/s] Air drag while the mat is laid down, as if by hand: it is not still bouncing when the walk begins."""
 
 
+@dataclass(frozen=True)
+class CarryTrial:
+    """One way of holding the mat, and what came of it.
+
+    Attributes:
+        arm_distance: Between the hands [m].
+        offset_x: From the mat's centre of gravity to the middle between the hands, ahead [m].
+        offset_y: Likewise to the left [m].
+        value: F [m s], the less the steadier; None where the mat fell.
+        failed_at: When it fell [s], from the start of the walk (negative: before it); None where it did not.
+        reason: How it fell, or the error that ended the trial; "" where it was carried to the end.
+    """
+
+    arm_distance: float
+    offset_x: float
+    offset_y: float
+    value: float | None
+    failed_at: float | None
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class CarryPlan(ArmTracks):
     """The plan that all trials share: the arms' tracks, and what they carry how.

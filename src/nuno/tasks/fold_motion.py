@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,13 +16,36 @@ from nuno.validation import finite_array
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.tasks.taught_fold import TaughtFold
     from nuno.world.world import World
 
 MOVED = 0.02
 """[m] A cloth of which a vertex is farther than this from where the motion begins is not as it was planned for."""
 SETTLE = 1.0
 """[s] In which a cloth comes to rest that was let go."""
+
+
+class LearntFold(Protocol):
+    """A taught fold as its motion takes it; `TaughtFold` says what each member is."""
+
+    @property
+    def held(self) -> np.ndarray:
+        """(hands, 2) float, the points (u, v) that were taken."""
+
+    @property
+    def goals(self) -> np.ndarray:
+        """(hands, 2) float, where they were let go."""
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """(n, 3) float, places (u, v, h) of the vertices in the end."""
+
+    @property
+    def faces(self) -> np.ndarray:
+        """(m, 3) int."""
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """(n, 2) float, the points (u, v) that they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +70,7 @@ class FoldMotion:
     times: np.ndarray = field(repr=False)
     ways: np.ndarray = field(repr=False)
     releases: np.ndarray
-    taught: TaughtFold = field(repr=False)
+    taught: LearntFold = field(repr=False)
 
     @property
     def hand_count(self) -> int:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nuno.robot.head_cameras import HeadCameras
+from nuno.robot.robot_model import standing_place
 from nuno.robot.simulated_robot import SimulatedRobot
-from nuno.robot.support import standing_place
 from nuno.tasks.look_at_camera import look_at_camera
 
 if TYPE_CHECKING:

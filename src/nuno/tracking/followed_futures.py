@@ -11,7 +11,8 @@ import numpy as np
 from nuno.bodies.body import Body
 from nuno.bodies.shape_topology import vertex_shares
 from nuno.materials import Cloth
-from nuno.world.snapshot import BodyRecord, Snapshot
+from nuno.world.snapshot import Snapshot
+from nuno.world.snapshot_records import BodyRecord
 from nuno.world.world import World
 
 

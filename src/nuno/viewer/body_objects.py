@@ -126,7 +126,7 @@ class BodyObjects:
     def _read(self) -> None:
         if not self.is_rigid:
             self._raw = (self.body._vertices(), None)
-        elif self.body._dynamics is None and self.body._parent is None:
+        elif not self.body.is_dynamic and self.body._parent is None:
             self._raw = (self.body._position, self.body._quaternion)
         else:
             self._raw = self.body.pose()

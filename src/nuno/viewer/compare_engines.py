@@ -21,11 +21,11 @@ from nuno.errors import (
     MissingPackageError,
     SimulationDiverged,
 )
-from nuno.files.recording import Recording
-from nuno.files.side_by_side import heads_of_columns, side_by_side
 from nuno.files.whole_file import file_path, write_whole
 from nuno.validation import checked, count, number
 from nuno.viewer.film import Film
+from nuno.viewer.side_by_side import heads_of_columns, side_by_side
+from nuno.world.recording import Recording
 from nuno.world.snapshot import Snapshot
 from nuno.world.world import World
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.bodies.surface_file import check_extension, one_world
 from nuno.errors import BodyStateError, InvalidInputError
-from nuno.files.export import check_extension, one_world
 from nuno.files.whole_file import file_path, write_whole
 from nuno.mesh.primitives import PLANE_HALF
 from nuno.shapes.color import rgb
@@ -27,7 +27,7 @@ from nuno.viewer.scene_object import SceneObject, light_of
 from nuno.viewer.viewpoint import FROM, View
 
 if TYPE_CHECKING:
-    from nuno.files.recording import Recording
+    from nuno.world.recording import Recording
 
 logger = logging.getLogger(__name__)
 

@@ -54,7 +54,7 @@ def contact_arrows(world: Simulation, scale: float, indices: list[int]) -> list[
 
     rows: list[list[np.ndarray]] = [[] for _ in indices]
     for body in list(world._bodies.values()):
-        if body._dynamics is None:
+        if not body.is_dynamic:
             continue
         found = contact_points(world, body)
         ends = np.stack([found.points, found.points + scale * found.forces], axis=1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import InvalidInputError
 from nuno.world.contact_points import contact_points
 
@@ -26,7 +27,7 @@ def of_world(array: Any, index: int, axes: int = 1) -> np.ndarray:
 
 def state_rows(world: Simulation, body: Body, index: int) -> list[tuple[str, str]]:
     """Return what a page says of a body, as (label, text); the caller holds the world's lock."""
-    dynamics = body._dynamics
+    dynamics = dynamics_of(body)
     kind = "static" if dynamics is None else f"dynamic, {type(dynamics.material).__name__}"
     x, y, z = of_world(body.pose()[0] if dynamics is None or dynamics.is_rigid else body.centre_of_mass, index)
     rows = [("shape", body.shape.kind), ("state", kind), ("place", f"{x:.3f}, {y:.3f}, {z:.3f} m")]
@@ -50,12 +51,12 @@ def height(world: Simulation, body: Body, index: int) -> float:
 
 def speed(world: Simulation, body: Body, index: int) -> float:
     """Return the speed of a body's centre of mass [m/s]; 0 while it is static."""
-    return 0.0 if body._dynamics is None else float(np.linalg.norm(of_world(body.velocity, index)))
+    return 0.0 if not body.is_dynamic else float(np.linalg.norm(of_world(body.velocity, index)))
 
 
 def contact_force(world: Simulation, body: Body, index: int) -> float:
     """Return the size of the sum of the contact forces on a body [N]; 0 while it is static."""
-    if body._dynamics is None:
+    if not body.is_dynamic:
         return 0.0
     contacts = contact_points(world, body)
     return float(np.linalg.norm(contacts.forces[contacts.worlds == index].sum(axis=0)))

@@ -107,7 +107,7 @@ def vertex_contacts(world: Simulation, body: Body) -> np.ndarray:
 
     vertices = body._vertices()
     found = np.zeros((world.world_count, vertices.shape[-2]))
-    if body._dynamics is None:
+    if not body.is_dynamic:
         return found
     contacts = contact_points(world, body)
     force = np.linalg.norm(contacts.forces, axis=1)

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from nuno.bodies.body import Body, Color
 from nuno.camera.camera import Camera
 from nuno.errors import InvalidInputError, UnknownNameError
-from nuno.files.recording import Recording
 from nuno.shapes.coordinates import compose, invert
 from nuno.validation import checked, finite_array, number
 from nuno.viewer.film import Film
@@ -33,6 +32,7 @@ from nuno.viewer.vertex_values import Quantity
 from nuno.viewer.viewpoint import View
 from nuno.viewer.visual_meshes import VisualMeshes
 from nuno.world.drawing import Mode
+from nuno.world.recording import Recording
 from nuno.world.simulation import Simulation
 
 if TYPE_CHECKING:

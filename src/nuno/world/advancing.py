@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import SOON, Dynamics, ParticleDynamics
+from nuno.dynamics.dynamics import SOON, Dynamics, ParticleDynamics, dynamics_of
 from nuno.errors import SimulationDiverged
 from nuno.tables.kinematic_motion import arrive, make_schedule
 from nuno.world.impacts import are_fast
 from nuno.world.run_start import RunStart
 from nuno.world.simulation import Simulation
+from nuno.world.stepping import Stepping
 
 
 class Advancing(Simulation):
     """A simulation that advances: it goes through a run once more where a list was too short."""
+
+    @cached_property
+    def _stepping(self) -> Stepping:
+        """The bodies in time, with what the last frame told."""
+        return Stepping(self)
 
     def _advance(
         self, duration: float, end: float | None = None, look: Callable[[float], None] | None = None,
@@ -33,7 +40,7 @@ class Advancing(Simulation):
         self._engine.allow_contacts()
         for driver in self.drivers:
             driver.begin_frame(start, finish)
-        moving = {body: body._dynamics for body in self._bodies.values() if body._dynamics is not None}
+        moving = {body: own for body in self._bodies.values() if (own := dynamics_of(body)) is not None}
         self._rests = False
         self._engine.prepare_run()
         before = RunStart(self, moving)
@@ -137,7 +144,7 @@ class Advancing(Simulation):
 
     def _make_room(self) -> bool:
         """Make lists longer that were too short since this was asked last; return whether any is."""
-        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := b._dynamics, ParticleDynamics)])
+        return any([d.make_room(b) for b in self._bodies.values() if isinstance(d := dynamics_of(b), ParticleDynamics)])
 
     def _run_looking(
         self, time: float, stop: float, look: Callable[[float], None], instants: np.ndarray | None,

@@ -5,13 +5,28 @@ from __future__ import annotations
 import threading
 import time
 import weakref
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from nuno.world.advancing import Advancing
-    from nuno.world.pace import Pace
+from nuno.world.pace import LATE, Pace
 
-LATE = 0.25  # a thread that is later than this [s] gives the lost time up instead of rushing after it
+
+class FramedWorld(Protocol):
+    """A world as the thread sees it that makes its frames."""
+
+    @property
+    def frame_rate(self) -> float:
+        """[1/s]."""
+
+    @property
+    def lock(self) -> FrameLock:
+        """The lock that frames are made under."""
+
+    @property
+    def _pace(self) -> Pace:
+        """The pace at which frames may follow each other."""
+
+    def _advance(self, duration: float) -> None:
+        """Advance everything by ``duration`` [s]."""
 
 
 class FrameLock:
@@ -66,7 +81,7 @@ class Background:
         real_time_factor: Simulated over real time; ``inf`` is as fast as possible.
     """
 
-    def __init__(self, world: Advancing, real_time_factor: float) -> None:
+    def __init__(self, world: FramedWorld, real_time_factor: float) -> None:
         self.error: BaseException | None = None
         self._stop = threading.Event()
         self._frame = threading.Condition()
@@ -95,7 +110,7 @@ class Background:
         with self._frame:
             self._frame.wait(0.1)
 
-    def _loop(self, reference: weakref.ref[Advancing], lock: FrameLock, pace: Pace, factor: float) -> None:
+    def _loop(self, reference: weakref.ref[FramedWorld], lock: FrameLock, pace: Pace, factor: float) -> None:
         due = time.perf_counter()
         while not self._stop.is_set():
             if not pace.may_go(timeout=0.05):

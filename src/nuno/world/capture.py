@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import Dynamics
+from nuno.dynamics.dynamics import Dynamics, dynamics_of
 from nuno.joints.grip import Grip
 from nuno.joints.joint import Joint, JointSpec
 from nuno.shapes.coordinates import compose, invert
 from nuno.shapes.shape import Shape
 from nuno.tables.path_batch import GroupPath
 from nuno.world.rigid_layout import bring_static, layout_of, scene_for, settle
-from nuno.world.snapshot import NEUTRAL, BodyRecord, DynamicsRecord, GripRecord, Snapshot
+from nuno.world.snapshot import NEUTRAL, Snapshot
+from nuno.world.snapshot_records import BodyRecord, DynamicsRecord, GripRecord
 
 if TYPE_CHECKING:
+    from nuno.world.advancing import Advancing
     from nuno.world.simulation import Simulation
 
 
@@ -43,7 +45,7 @@ def capture(world: Simulation, engine: str | None = None) -> Snapshot:
     )  # fmt: skip
 
 
-def apply(snapshot: Snapshot, world: Simulation) -> None:
+def apply(snapshot: Snapshot, world: Advancing) -> None:
     """Make ``world`` what the snapshot is. Body and Grip objects that it still knows keep their identity.
 
     Solvers are made before anything changes, so that a failure leaves the world as it was.
@@ -62,7 +64,7 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
     world.world_count = snapshot.world_count
     scene = world._rigid
     try:
-        world._rigid = scene_for(snapshot, bodies, world)
+        world._rigid = scene_for(snapshot.rigid, snapshot.bodies, bodies, world)
         made = {
             record.key: _dynamics_for(record, record.dynamics, bodies[record.key], world, same_settings, neutral)
             for record in snapshot.bodies if record.dynamics is not None
@@ -83,8 +85,8 @@ def apply(snapshot: Snapshot, world: Simulation) -> None:
             body._parent = bodies[record.parent]
             body._parent._children.append(body)
         if record.dynamics is not None:
-            body._dynamics = made[record.key]
-            body._dynamics.pushes = list(record.dynamics.pushes)
+            body._dynamics = dynamics = made[record.key]
+            dynamics.pushes = list(record.dynamics.pushes)
     bring_static(snapshot.rigid, bodies, world)
     for record in snapshot.bodies:
         if record.dynamics is not None:
@@ -119,7 +121,7 @@ def _check_engine(snapshot: Snapshot, world: Simulation) -> None:
         engine.require("batch")
 
 
-def _neutral(snapshot: Snapshot, world: Simulation) -> Snapshot:
+def _neutral(snapshot: Snapshot, world: Advancing) -> Snapshot:
     """Return a snapshot of another engine's world with neutral states, by way of such a world."""
     other = type(world)(device=world._device, engine=snapshot.engine)
     apply(snapshot, other)
@@ -131,12 +133,12 @@ def _neutral(snapshot: Snapshot, world: Simulation) -> Snapshot:
 
 def _body_record(body: Body, world: Simulation, neutral: bool = False) -> BodyRecord:
     dynamics = None
-    if body._dynamics is not None:
-        own = body._dynamics
+    own = dynamics_of(body)
+    if own is not None:
         state = world.engine.neutral_state(body) if neutral else own.state()
         dynamics = DynamicsRecord(own.material, own.friction, state, tuple(own.pushes))
     parent = body._parent if isinstance(body._parent, Body) and body._parent._world is world else None
-    pose = (body._position, body._quaternion) if parent or body._dynamics else body.pose()
+    pose = (body._position, body._quaternion) if parent or own else body.pose()
     deformed, base = body._deformed if body._deformed is not None else (None, (None, None))
     return BodyRecord(
         key=body.key, name=body.name, shape=body.shape, color=body.color, friction=body.friction,
@@ -199,17 +201,17 @@ def _dynamics_for(
 
 def _take_apart(world: Simulation, kept: list[Dynamics]) -> None:
     for body in list(world._bodies.values()):
-        if body._dynamics is not None:
-            for grip in body._dynamics.grips:
+        if (dynamics := dynamics_of(body)) is not None:
+            for grip in dynamics.grips:
                 grip._world = None
-            body._dynamics.grips = []
-            body._dynamics.grips_changed = True
+            dynamics.grips = []
+            dynamics.grips_changed = True
         if isinstance(body._parent, Body):
             parent = body._parent
             parent._children = [child for child in parent._children if child is not body]
             body._parent = None
-        if body._dynamics is not None and body._dynamics not in kept:
-            body._dynamics.release()
+        if (dynamics := dynamics_of(body)) is not None and dynamics not in kept:
+            dynamics.release()
         body._dynamics = body._path = body._world = None
     world._bodies.clear()
 

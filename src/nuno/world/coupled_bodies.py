@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.joints.grip import Grip, GripSpec, warn_unmet
+from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.joint import Joint
+from nuno.joints.make_grip import warn_unmet
 from nuno.joints.tie import HoldSpec
 from nuno.shapes import quaternion as quat
 from nuno.solvers.coupling import Coupling
@@ -47,7 +48,10 @@ class CoupledBodies(CoupledTables):
         slots = [body._dynamics.slot for body in self.rigid]  # type: ignore[union-attr]
         rigid = scene.solver if scene is not None and slots else None
         self._capacity = 0 if rigid is None else int(rigid.state.capacity)
-        self._joints = CoupledJoints(world, [grip for grip in ties if isinstance(grip, Joint)], self.bodies)
+        self._joints = CoupledJoints(
+            [grip for grip in ties if isinstance(grip, Joint)], self.bodies, world.world_count, world.device,
+            world._rigid,
+        )  # fmt: skip
         self.coupling = Coupling(
             solvers,
             rigid,

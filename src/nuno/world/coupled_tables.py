@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from nuno.bodies.dynamics import ParticleDynamics, touches_itself
-from nuno.bodies.rigid_dynamics import RigidDynamics
 from nuno.contact.particle.distances import BOX, CAPSULE, CYLINDER, SOLID_MESH, SPHERE
 from nuno.coupled.tie_constraints import Holds, Ties
+from nuno.dynamics.dynamics import ParticleDynamics, touches_itself
+from nuno.dynamics.rigid_dynamics import RigidDynamics
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.tie import HoldSpec, TieSpec, corners_of
 from nuno.rigid.convex import BOX_PART, CAPSULE_PART, CYLINDER_PART, HULL, SPHERE_PART
@@ -70,7 +70,7 @@ class CoupledTables:
                 np.asarray(body.faces),
                 *_surface_rules(body, solver),
                 solid=body.is_solid,
-                joined=joined_particles(solver.topology.tets) if touches_itself(self._world, body) else None,
+                joined=joined_particles(solver.topology.tets) if touches_itself(self._world._rules, body) else None,
             )
             for body in self.particles
             for solver in [body._dynamics.solver]  # type: ignore[union-attr]
@@ -85,7 +85,7 @@ class CoupledTables:
         for a, one in enumerate(self.bodies):
             for b, other in enumerate(self.bodies):
                 if a == b:
-                    touch[a, b] = touches_itself(self._world, one)
+                    touch[a, b] = touches_itself(self._world._rules, one)
                 elif not (one in self.rigid and other in self.rigid):
                     touch[a, b] = rules.touch(one, other)
                 mu = rules.friction.get(frozenset((one.key, other.key)))

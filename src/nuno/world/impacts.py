@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import SOON, Dynamics
+from nuno.dynamics.dynamics import SOON, Dynamics
 from nuno.materials import Cloth
 from nuno.mesh.crossings import crossing_faces
 from nuno.mesh.untangling import untangle

@@ -23,6 +23,7 @@ from nuno.joints.tie import force_limit
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import compose, invert
 from nuno.validation import checked, finite_array
+from nuno.world.simulation import Simulation
 
 
 @checked
@@ -143,7 +144,7 @@ def _join(
         if not isinstance(body, Body) and not (body is None and body is b):
             raise InvalidInputError(f"a joint needs two bodies, or one and None, got {type(body).__name__}")
     world = a._world
-    if world is None:
+    if not isinstance(world, Simulation):
         raise BodyStateError(f"{a.name!r} is in no world; add and attach it before it is joined")
     with world._change("join"):
         other = None if b is None else world._own(b)
@@ -152,7 +153,7 @@ def _join(
         for body in (a, other):
             if body is not None and body._dynamics is not None and not body._dynamics.is_rigid:
                 raise InvalidInputError(f"{body.name!r} deforms; weld or grip its points instead")
-        if a._dynamics is None:
+        if not a.is_dynamic:
             raise BodyStateError(f"{a.name!r} is static; attach it before it is joined, or give the other body first")
         worlds = world.world_count
         pose = tuple(np.broadcast_to(p, (worlds, p.shape[-1])) for p in a.pose())

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics
 from nuno.errors import NotEnoughMemoryError
 from nuno.mesh.memory_limit import free_bytes
 from nuno.solvers.array_memory import HOST_COPIES, array_bytes
 
 if TYPE_CHECKING:
-    from nuno.world.saving import Saving
     from nuno.world.simulation import Simulation
 
 MEASURED = 16
 """Worlds of the batch that is made to see what a world of one takes."""
 
 
-def check_memory(world: Saving, worlds: int, device: str, chosen: int) -> None:
-    """Check that there is memory for a batch of copies of a world, of a batch the ``chosen`` one.
+def check_memory(world: Simulation, worlds: int, device: str, few: Callable[[int], Simulation]) -> None:
+    """Check that there is memory for a batch of copies of a world; ``few`` makes a batch of so many of them.
 
     Raises:
         NotEnoughMemoryError: it needs more than is free.
@@ -27,7 +27,7 @@ def check_memory(world: Saving, worlds: int, device: str, chosen: int) -> None:
     free = free_bytes(device)
     if worlds > MEASURED and worlds * (each + host) > free:
         # a single world may have room for more than one of a batch has: a few are made to see
-        each, host = world_bytes(world.imagine(MEASURED, device, world=chosen))
+        each, host = world_bytes(few(MEASURED))
     needed = worlds * (each + host) if device == "cpu" else worlds * each
     if needed > free:
         most = int(free // max(needed / worlds, 1))

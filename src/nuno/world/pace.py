@@ -6,9 +6,9 @@ import logging
 import threading
 import time
 
-from nuno.world.background import LATE
-
 logger = logging.getLogger(__name__)
+
+LATE = 0.25  # a thread that is later than this [s] gives the lost time up instead of rushing after it
 
 
 class Pace:

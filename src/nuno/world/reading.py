@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics
+from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.materials import Rigid
 from nuno.validation import flag
@@ -104,9 +104,9 @@ class Reading(Saving):
 
         with self._call():
             own = self._own(body)
-            if own._dynamics is None:
+            dynamics = dynamics_of(own)
+            if dynamics is None:
                 raise BodyStateError(f"{own.name!r} is static and has no state on a device; see its vertices")
-            dynamics = own._dynamics
             names = ("positions", "velocities")
             kept = {} if flag("copy", copy) else self._views.get(dynamics, {})
             if isinstance(dynamics, ParticleDynamics):

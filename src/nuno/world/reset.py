@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics
-from nuno.bodies.push import Push
+from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
+from nuno.dynamics.push import Push
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.rows_of_worlds import SOON, WorldRows, merge_path
 from nuno.shapes.coordinates import Pose
@@ -22,9 +22,11 @@ from nuno.validation import as_array, index_array
 from nuno.world.capture import same_shape
 from nuno.world.reset_grips import merged_grips, set_merged_grips
 from nuno.world.rigid_layout import RigidLayout
-from nuno.world.snapshot import BodyRecord, Snapshot
+from nuno.world.snapshot import Snapshot
+from nuno.world.snapshot_records import BodyRecord
 
 if TYPE_CHECKING:
+    from nuno.world.advancing import Advancing
     from nuno.world.simulation import Simulation
 
 
@@ -47,7 +49,7 @@ def checked_worlds(worlds: Any, world_count: int) -> np.ndarray:
     return found
 
 
-def reset_worlds(world: Simulation, worlds: np.ndarray, snapshot: Snapshot) -> None:
+def reset_worlds(world: Advancing, worlds: np.ndarray, snapshot: Snapshot) -> None:
     """Make some worlds of a batch what a snapshot is.
 
     Args:
@@ -165,7 +167,9 @@ def _matched(world: Simulation, snapshot: Snapshot, at: WorldRows) -> dict[Body,
 
 
 def _check_same(body: Body, record: BodyRecord, at: WorldRows) -> None:
-    from nuno.bodies.rigid_dynamics import RigidDynamics
+    from nuno.dynamics.rigid_dynamics import RigidDynamics
+
+    dynamics = dynamics_of(body)
 
     what = None
     parent = body._parent.key if isinstance(body._parent, Body) and body._parent._world is body._world else None
@@ -175,21 +179,20 @@ def _check_same(body: Body, record: BodyRecord, at: WorldRows) -> None:
         what = "collision group"
     elif parent != record.parent:
         what = "parent"
-    elif (body._dynamics is None) != (record.dynamics is None):
+    elif (dynamics is None) != (record.dynamics is None):
         what = "state: it is static in one and dynamic in the other"
-    elif body._dynamics is None or record.dynamics is None:
+    elif dynamics is None or record.dynamics is None:
         # a rigid solver that is told of them anew forgets what touches the body, in all worlds
         if at.merged(body._friction, record.friction, 0) is not body._friction:
             what = "friction (a snapshot of the batch keeps each world's own)"
         elif body._thickness != record.thickness or not _same_deformation(body._deformed, record.deformation, at):
             what = "deformed shape"
-    elif not _same_material(body._dynamics.material, record.dynamics.material, at):
+    elif not _same_material(dynamics.material, record.dynamics.material, at):
         what = "material (a snapshot of the batch keeps each world's own)"
-    elif at.merged(body._dynamics.friction, record.dynamics.friction, 0) is not body._dynamics.friction:
+    elif at.merged(dynamics.friction, record.dynamics.friction, 0) is not dynamics.friction:
         what = "friction (a snapshot of the batch keeps each world's own)"
-    elif isinstance(body._dynamics, RigidDynamics) and (
-        body._dynamics.thickness != record.thickness
-        or not _same_deformation(body._dynamics.deformed, record.deformation, at)
+    elif isinstance(dynamics, RigidDynamics) and (
+        dynamics.thickness != record.thickness or not _same_deformation(dynamics.deformed, record.deformation, at)
     ):
         what = "deformed shape"
     if what is not None:
@@ -276,9 +279,10 @@ def _pushes(world: Simulation, records: dict[Body, BodyRecord], at: WorldRows) -
     frame = 1.0 / world.frame_rate
     found = {}
     for body, record in records.items():
-        if record.dynamics is None or body._dynamics is None:
+        dynamics = dynamics_of(body)
+        if record.dynamics is None or dynamics is None:
             continue
-        own, other = list(body._dynamics.pushes), list(record.dynamics.pushes)
+        own, other = list(dynamics.pushes), list(record.dynamics.pushes)
         if own == other and not own:
             found[body] = own
             continue

@@ -10,7 +10,8 @@ from nuno.bodies.body import Body
 from nuno.errors import BodyStateError
 from nuno.joints.grip import Grip, GripSpec
 from nuno.joints.rows_of_worlds import WorldRows, merge_spec
-from nuno.world.snapshot import BodyRecord, GripRecord, Snapshot
+from nuno.world.snapshot import Snapshot
+from nuno.world.snapshot_records import BodyRecord, GripRecord
 
 if TYPE_CHECKING:
     from nuno.world.simulation import Simulation

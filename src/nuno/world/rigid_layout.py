@@ -6,7 +6,7 @@ a world runs on to the bit only with the same origin, slots and rows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.bodies.rigid_dynamics import RigidScene
+    from nuno.dynamics.rigid_dynamics import RigidScene
     from nuno.world.simulation import Simulation
-    from nuno.world.snapshot import Snapshot
+    from nuno.world.snapshot_records import BodyRecord
 
 DYNAMIC, STATIC, STALE = "dynamic", "static", "stale"
 
@@ -68,28 +68,30 @@ def layout_of(world: Simulation) -> RigidLayout | None:
             places.append(_place(solver, body.key, DYNAMIC, dynamics.slot))
     for key, known in scene.static.items():
         static = world._bodies.get(key)
-        fresh = static is not None and static._dynamics is None and known.is_of(static, static._deformed)
+        fresh = static is not None and not static.is_dynamic and known.is_of(static, static._deformed)
         places.append(_place(solver, key, STATIC if fresh else STALE, known.slot))
     current = scene.is_current(world)
     return RigidLayout(solver.origin.copy(), tuple(places), solver.save_listing(), current)
 
 
-def scene_for(snapshot: Snapshot, bodies: Mapping[str, Body], world: Simulation) -> RigidScene | None:
+def scene_for(
+    layout: RigidLayout | None, records: Iterable[BodyRecord], bodies: Mapping[str, Body], world: Simulation
+) -> RigidScene | None:
     """Return the scene that a snapshot's rigid bodies go into: the world's own where it is laid out as the saved one.
 
     Else it is a new one, in which each body's place is kept for it; `settle` brings the static ones there.
 
     Args:
-        snapshot: The snapshot, whose settings the world has already.
+        layout: The snapshot's, whose settings the world has already.
+        records: Its bodies.
         bodies: The world's body for each key in the snapshot.
         world: The world.
     """
-    layout = snapshot.rigid
     if layout is None:
         return None
-    if _is_laid_out(snapshot, layout, bodies, world):
+    if _is_laid_out({record.key: record for record in records}, layout, bodies, world):
         return world._rigid
-    from nuno.bodies.rigid_dynamics import RigidScene
+    from nuno.dynamics.rigid_dynamics import RigidScene
 
     # a batch takes no more room than it needs; more is made where bodies come
     scene = RigidScene(world, layout.origin, 1 + max((row for place in layout.places for row in place.rows), default=0))
@@ -125,7 +127,9 @@ def _place(solver: Any, key: str, role: str, slot: int) -> RigidPlace:
     return RigidPlace(key, role, slot, tuple(int(row) for row in solver.part_rows[slot]))
 
 
-def _is_laid_out(snapshot: Snapshot, layout: RigidLayout, bodies: Mapping[str, Body], world: Simulation) -> bool:
+def _is_laid_out(
+    records: Mapping[str, BodyRecord], layout: RigidLayout, bodies: Mapping[str, Body], world: Simulation
+) -> bool:
     """Return True if the world's scene has every body, in the shape that was saved, where the saved one had it."""
     scene = world._rigid
     if scene is None or scene.settings != scene.settings_of(world):
@@ -134,7 +138,6 @@ def _is_laid_out(snapshot: Snapshot, layout: RigidLayout, bodies: Mapping[str, B
         return False
     if len(layout.places) != len(scene.solver.part_rows):
         return False
-    records = {record.key: record for record in snapshot.bodies}
     for place in layout.places:
         if place.role == STALE:
             return False

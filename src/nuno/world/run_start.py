@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.bodies.dynamics import Dynamics
+    from nuno.dynamics.dynamics import Dynamics
     from nuno.world.simulation import Simulation
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from types import TracebackType
 from typing import Self
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import SOON
+from nuno.dynamics.dynamics import SOON
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.mesh.memory_limit import check_host_memory
 from nuno.validation import finite_array, flag, function, instant, number
@@ -133,7 +134,7 @@ class Running(Advancing):
             own = self._own(body)
             if self.is_running:
                 raise BodyStateError("a world that runs in the background is not traced; stop it first")
-            if own._dynamics is None:
+            if not own.is_dynamic:
                 raise BodyStateError(f"{own.name!r} is static; attach it before it is traced")
             instants = finite_array("times", times, ("k",))
             if not len(instants) or (np.diff(instants) <= 0.0).any() or instants[0] < self._time - SOON:
@@ -143,7 +144,7 @@ class Running(Advancing):
             instant("times", float(instants[-1]))
             needed = 3 * len(instants) * own.vertices.nbytes // 2  # float32, in pieces and as a whole
             check_host_memory(f"a trace of {len(instants)} instants", needed, "trace fewer at a time")
-            found = run_traced(self, own, instants)
+            found = run_traced(self, own, instants, partial(self.run, progress=False))
         return found[:, 0] if self.world_count == 1 else found
 
     def start(self, real_time_factor: float = 1.0) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-from typing import TYPE_CHECKING, Any, cast
+from functools import partial
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,6 @@ from nuno.world.snapshot import Snapshot, check_world_index
 
 if TYPE_CHECKING:
     from nuno.world.driver import Driver
-    from nuno.world.world import World
 
 logger = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ class Saving(Running):
     def imagine(
         self, n: int, device: str | None = None, *, world: int | None = None, thorough: bool = True,
         engine: str | None = None,
-    ) -> World:  # fmt: skip
+    ) -> Self:  # fmt: skip
         """Return a batch of ``n`` copies of this world as it is now, with everything in it.
 
         Args:
@@ -118,8 +118,8 @@ class Saving(Running):
         with self._change("imagine"):
             chosen = self._chosen("imagine", world)
             other = self._engine.name if engine is None else engine
-            futures = cast("type[World]", type(self))(device=self._device if device is None else device, engine=other)
-            check_memory(self, worlds, futures.device, chosen)
+            futures = type(self)(device=self._device if device is None else device, engine=other)
+            check_memory(self, worlds, futures.device, partial(self.imagine, device=futures.device, world=chosen))
             snapshot = capture(self, other).pick(chosen)
         apply(snapshot.spread(worlds), futures)
         futures._family, futures._quiet = self._family, self._quiet or not careful
@@ -131,7 +131,7 @@ class Saving(Running):
                 futures.drivers.append(own)
         return futures
 
-    def adopt(self, futures: World, k: int, *, world: int | None = None) -> None:
+    def adopt(self, futures: Self, k: int, *, world: int | None = None) -> None:
         """Become world ``k`` of a batch that was imagined from this one; Body objects keep their identity.
 
         Args:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
-from nuno.bodies.dynamics import ParticleDynamics
 from nuno.bodies.given_velocity import given_velocity
+from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
 from nuno.errors import BodyStateError
 from nuno.shapes import quaternion as quat
 from nuno.tables.kinematic_motion import arrive
@@ -111,10 +111,11 @@ class Setting(Reading):
             old = [np.array(np.broadcast_to(part, (count, part.shape[-1]))) for part in now]
             for kept, given in zip(old, new, strict=True):
                 kept[chosen] = given[chosen]
-            if own._dynamics is None:
+            dynamics = dynamics_of(own)
+            if dynamics is None:
                 own._position, own._quaternion = old
             else:
-                own._dynamics.place_worlds(own, old[0], old[1], chosen)
+                dynamics.place_worlds(own, old[0], old[1], chosen)
                 own._quaternion = old[1]
             own._moved()
             arrive(self._kinematic_bodies(), self._time)

@@ -16,20 +16,21 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
 from nuno.bodies.contact_rules import ContactRules
-from nuno.bodies.dynamics import Dynamics, ParticleDynamics, make_colliders
+from nuno.dynamics.dynamics import Dynamics, ParticleDynamics, dynamics_of, make_colliders
 from nuno.engines.engine import Engine
 from nuno.engines.engine_registry import make_engine
 from nuno.errors import BodyStateError, InvalidInputError, UnknownNameError
 from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint
+from nuno.materials import Rigid
 from nuno.tables.kinematic_motion import Schedule, is_kinematic, make_schedule, path_batches_of
 from nuno.validation import count, finite_array, number
 from nuno.world.background import FrameLock
 from nuno.world.device import checked_device, found_device
 from nuno.world.pace import Pace
-from nuno.world.stepping import Stepping
 
 if TYPE_CHECKING:
-    from nuno.bodies.rigid_dynamics import RigidScene
+    from nuno.dynamics.rigid_dynamics import RigidScene
     from nuno.materials import Material
     from nuno.world.background import Background
     from nuno.world.driver import Driver
@@ -85,7 +86,6 @@ class Simulation:
         self._background: Background | None = None
         self._pace = Pace()
         self._rigid: RigidScene | None = None
-        self._stepping = Stepping(self)
         self._watchers: list[Watcher] = []  # viewers and films: told of each piece of a run
         self._engine = make_engine(engine, self, self._device, self._rules)
 
@@ -186,9 +186,10 @@ class Simulation:
     def _own_dynamics(self, body: Body | str, instead: str) -> tuple[Body, Dynamics]:
         """Return this world's body and its dynamics; a static one is refused, and told what to do ``instead``."""
         own = self._own(body)
-        if own._dynamics is None:
+        dynamics = dynamics_of(own)
+        if dynamics is None:
             raise BodyStateError(f"{own.name!r} is static; {instead}")
-        return own, own._dynamics
+        return own, dynamics
 
     def _pair(self, a: Body | str, b: Body | str) -> frozenset[str]:
         first, second = self._own(a), self._own(b)
@@ -197,7 +198,19 @@ class Simulation:
         return frozenset((first.key, second.key))
 
     def _attached(self) -> list[Dynamics]:
-        return [body._dynamics for body in self._bodies.values() if body._dynamics is not None]
+        return [own for body in self._bodies.values() if (own := dynamics_of(body)) is not None]
+
+    def _check_joined(self, body: Body, material: Any) -> None:
+        """Refuse that a static body to which others are joined becomes a cloth or soft body."""
+        if isinstance(material, Rigid) or body.is_dynamic:  # a joint with a dynamic body ends as that is detached
+            return
+        for dynamics in self._attached():
+            for grip in dynamics.grips:
+                if isinstance(grip, Joint) and grip.target is body:
+                    raise BodyStateError(
+                        f"{grip.body.name!r} is joined to {body.name!r}, which can only become Rigid; "
+                        "release that first"
+                    )
 
     def _check_worlds(self, what: str, axes: tuple[int, ...]) -> None:
         if axes and axes != (self.world_count,):
@@ -208,29 +221,31 @@ class Simulation:
         self._bodies[body.key] = self._bodies_by_key[body.key] = body
 
     def _detach(self, body: Body) -> None:
-        assert body._dynamics is not None
+        dynamics = dynamics_of(body)
+        assert dynamics is not None
         tied = [grip for other in self._attached() for grip in other.grips if grip.is_tie and grip.target is body]
-        for grip in [*body._dynamics.grips, *tied]:
+        for grip in [*dynamics.grips, *tied]:
             self._drop_grip(grip)
-        dynamics, body._thickness = body._dynamics, body.thickness
+        body._thickness = body.thickness
         body._freeze()
         dynamics.release()
         self._colliders_changed()
 
     def _hold(self, grip: Grip) -> None:
-        assert grip.body._dynamics is not None
+        dynamics = dynamics_of(grip.body)
+        assert dynamics is not None
         self._engine.allow_grip(grip.spec, grip.target is not None and grip.target.is_dynamic)
         grip._world = self
         self._grips_by_key[grip.key] = grip
-        grip.body._dynamics.grips.append(grip)
-        grip.body._dynamics.grips_changed = True
+        dynamics.grips.append(grip)
+        dynamics.grips_changed = True
         self._engine.changed()
         if grip.ignored:
             self._colliders_changed()
 
     def _drop_grip(self, grip: Grip) -> None:
         grip._world = None
-        dynamics = grip.body._dynamics
+        dynamics = dynamics_of(grip.body)
         self._engine.changed()
         if dynamics is not None:
             dynamics.grips = [other for other in dynamics.grips if other is not grip]
@@ -241,20 +256,22 @@ class Simulation:
     def _colliders_changed(self) -> None:
         self._collider_version += 1
         self._engine.changed()
-        self._rules.set_held(grip for dynamics in self._attached() for grip in dynamics.grips)
+        grips = [grip for dynamics in self._attached() for grip in dynamics.grips]
+        self._rules.set_held((grip.body.key, key) for grip in grips for key in grip.ignored)
         self._colliders.clear()
         self._kinematic = None
 
-    def _body_changed(self, body: Body) -> None:
+    def _body_changed(self, key: str) -> None:
         """Be told that a body was moved, or its friction or groups changed."""
-        dynamics = body._dynamics
+        body = self._bodies[key]
+        dynamics = dynamics_of(body)
         if dynamics is not None and not np.array_equal(dynamics.friction, body.friction):
             self._renew(body, dynamics.material)  # a solver takes its friction when it is made
         self._colliders_changed()
 
     def _renew(self, body: Body, material: Material) -> None:
         """Give a dynamic body a solver for another material or friction, in the state that it is in."""
-        dynamics = body._dynamics
+        dynamics = dynamics_of(body)
         assert dynamics is not None
         state = dynamics.state()
         renewed = self._engine.make(body, material, state, body.friction)
@@ -266,14 +283,14 @@ class Simulation:
     def _bring_colliders(self) -> None:
         static: list[Body] | None = None
         for body in self._bodies.values():
-            dynamics = body._dynamics
+            dynamics = dynamics_of(body)
             if not isinstance(dynamics, ParticleDynamics):
                 continue
-            dynamics.solver.sum_impulses(body.key in self._rules.summed)
+            dynamics.sum_impulses(body.key in self._rules.summed)
             if dynamics.collider_version == self._collider_version:
                 continue
             if static is None:
-                static = [b for b in self._bodies.values() if b._dynamics is None]
+                static = [b for b in self._bodies.values() if not b.is_dynamic]
             touching, friction = self._rules.colliders_of(body, static)
             key = (
                 *(b.key for b in touching),
@@ -290,7 +307,7 @@ class Simulation:
 
     def _rigid_scene(self, origin: np.ndarray) -> RigidScene:
         """Return what moves the rigid bodies, made anew where the world has become another."""
-        from nuno.bodies.rigid_dynamics import RigidScene
+        from nuno.dynamics.rigid_dynamics import RigidScene
 
         settings = (self.world_count, self.device, self.gravity, self.frame_rate, self.substeps)
         if self._rigid is None or self._rigid.settings != settings:
@@ -303,7 +320,7 @@ class Simulation:
 
     def _kinematic_bodies(self) -> list[Body]:
         if self._kinematic is None:
-            self._kinematic = [b for b in self._bodies.values() if b._dynamics is None and is_kinematic(b)]
+            self._kinematic = [b for b in self._bodies.values() if not b.is_dynamic and is_kinematic(b)]
         return self._kinematic
 
     def _schedule_kinematic(self, start: float, duration: float) -> None:

@@ -7,84 +7,24 @@ Save, restore, imagine and adopt are the same three steps: ``capture`` a world, 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nuno.bodies.dynamics import State
-from nuno.bodies.push import Push
+from nuno.dynamics.push import Push
 from nuno.errors import InvalidInputError
-from nuno.joints.grip import GripSpec
-from nuno.joints.joint import JointSpec
-from nuno.joints.tie import HoldSpec, TieSpec, batched_spec
+from nuno.joints.tie import batched_spec
 from nuno.materials import Material, Rigid
 from nuno.shapes.coordinates import Pose
 from nuno.shapes.path import Path, path_as_it_is
-from nuno.shapes.shape import Shape
 from nuno.tables.kinematic_motion import of_world
 from nuno.validation import checked, index_array, number
 from nuno.world.rigid_layout import RigidLayout
-
-if TYPE_CHECKING:
-    pass
+from nuno.world.snapshot_records import BodyRecord, DynamicsRecord, GripRecord
 
 NEUTRAL = "any"
 """The engine of a snapshot whose states all engines take."""
-
-
-@dataclass(frozen=True, eq=False)
-class DynamicsRecord:
-    """The dynamics of one body; the arrays of the solver's state are (worlds, ...) each."""
-
-    material: Material
-    friction: Any
-    state: State
-    pushes: tuple[Push, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class BodyRecord:
-    """One body. The pose is relative to the parent where that is a body of the world, else to the world."""
-
-    key: str
-    name: str
-    shape: Shape
-    color: Any
-    friction: Any
-    thickness: Any
-    group: int
-    collides_with: int
-    position: np.ndarray
-    quaternion: np.ndarray
-    parent: str | None
-    deformed: np.ndarray | None  # (worlds, n, 3) [m], with the pose that they belong to
-    deformed_position: np.ndarray | None
-    deformed_quaternion: np.ndarray | None
-    dynamics: DynamicsRecord | None
-    path: Path | None = None  # that the body follows
-    # relative to a frame that is no body of the world, which the body follows
-    relative: Pose | None = field(default=None, metadata={"file": False})
-
-    @property
-    def deformation(self) -> tuple[np.ndarray, Pose] | None:
-        """Return a deformed body's vertices, and the pose that they belong to; None where it is not deformed."""
-        if self.deformed is None:
-            return None
-        assert self.deformed_position is not None and self.deformed_quaternion is not None
-        return self.deformed, (self.deformed_position, self.deformed_quaternion)
-
-
-@dataclass(frozen=True, eq=False)
-class GripRecord:
-    """One active grip, on the body with the key ``body``, led by the one with the key ``target``, if any."""
-
-    key: str
-    body: str
-    spec: GripSpec | TieSpec | HoldSpec | JointSpec
-    target: str | None
-    offsets: Any  # of points an array, of a rigid body a place and a turn, or None
-    followed: tuple[float, Pose, Pose] | None = None  # see ``Grip``
 
 
 @dataclass(frozen=True, eq=False)

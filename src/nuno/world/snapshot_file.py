@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from nuno.bodies.push import Push
-from nuno.engines.engine_registry import ENGINES
+from nuno.dynamics.push import Push
+from nuno.engines.engine_table import ENGINES
 from nuno.errors import FileFormatError, NunoError
 from nuno.files.whole_file import replacing
 from nuno.joints.grip import GripSpec
@@ -29,7 +29,8 @@ from nuno.shapes import soft_shape
 from nuno.shapes.compound import Compound
 from nuno.shapes.path import Path
 from nuno.world.rigid_layout import RigidLayout, RigidPlace
-from nuno.world.snapshot import BodyRecord, DynamicsRecord, GripRecord, Snapshot
+from nuno.world.snapshot import Snapshot
+from nuno.world.snapshot_records import BodyRecord, DynamicsRecord, GripRecord
 
 FORMAT = 5
 READABLE = (1, 2, 3, 4, FORMAT)  # 1 has no paths of bodies, 3 no clock of each world, 4 no engine

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import SOON, touches_itself
-from nuno.solvers.resolution import warn_of_overloads
+from nuno.dynamics.dynamics import SOON, touches_itself
+from nuno.solvers.resolution_warnings import warn_of_overloads
 from nuno.world.frame_runs import FrameRuns
 from nuno.world.impacts import Impacts, collides_with_itself, look_at, look_due, next_look
 from nuno.world.islands import Islands, find_islands
@@ -46,7 +46,7 @@ class Stepping:
         """Advance all dynamic bodies from ``time`` to ``stop`` [s]."""
         world = self._world
         frame = 1.0 / world.frame_rate
-        moving = [body for body in world._bodies.values() if body._dynamics is not None]
+        moving = [body for body in world._bodies.values() if body.is_dynamic]
         if not moving:
             self.careful, self.last = False, []
             return
@@ -108,7 +108,7 @@ class Stepping:
         """Return True if two bodies of different solvers could touch, a soft one itself, or any are tied."""
         if any(grip.is_tie for body in moving for grip in body._dynamics.grips):  # type: ignore[union-attr]
             return True
-        if any(touches_itself(self._world, body) for body in moving):
+        if any(touches_itself(self._world._rules, body) for body in moving):
             return True
         particles = [body for body in moving if body not in rigid]
         rules = self._world._rules
@@ -152,7 +152,7 @@ class Stepping:
             bodies = [moving[k] for k in group]
             grips = [grip for body in bodies for grip in body._dynamics.grips]  # type: ignore[union-attr]
             kinds = {body._dynamics.is_rigid for body in bodies}  # type: ignore[union-attr]
-            by_itself = len(bodies) == 1 and not touches_itself(self._world, bodies[0])
+            by_itself = len(bodies) == 1 and not touches_itself(self._world._rules, bodies[0])
             if not any(grip.is_tie for grip in grips) and (by_itself or kinds == {True}):
                 alone += bodies
             else:

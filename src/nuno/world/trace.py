@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import SOON, ParticleDynamics
+from nuno.dynamics.dynamics import SOON, ParticleDynamics
 from nuno.world.simulation import CHUNK
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.running import Running
+    from nuno.world.advancing import Advancing
 
 
 class Trace:
@@ -58,8 +59,11 @@ class Trace:
         return np.asarray(taken)
 
 
-def run_traced(world: Running, body: Body, instants: np.ndarray) -> np.ndarray:
-    """Advance a world through instants (k,) [s]; returns the body's vertices there, (k, worlds, n, 3) float32 [m]."""
+def run_traced(world: Advancing, body: Body, instants: np.ndarray, run: Callable[[float], None]) -> np.ndarray:
+    """Advance a world through instants (k,) [s]; returns the body's vertices there, (k, worlds, n, 3) float32 [m].
+
+    ``run`` lets the world run for some seconds, as its program would.
+    """
     trace, found, ahead = Trace(body, CHUNK), [], instants
     # drivers are asked and viewers told of each run, and paths of bodies are scheduled for it
     apart = bool(world.drivers or world._watchers or world._kinematic_bodies())
@@ -68,7 +72,7 @@ def run_traced(world: Running, body: Body, instants: np.ndarray) -> np.ndarray:
         near = near[near - world.time < CHUNK / world.frame_rate + SOON]
         if apart or not len(near) or near[0] - world.time < SOON:
             near = ahead[:1]
-            world.run(max(0.0, float(near[0]) - world.time), progress=False)
+            run(max(0.0, float(near[0]) - world.time))
             trace.look(world.time)
         else:
             end = float(near[-1])

@@ -10,16 +10,18 @@ from numpy.typing import ArrayLike
 
 from nuno.bodies.body import Body
 from nuno.bodies.body_facts import place_text
-from nuno.bodies.dynamics import check_material, default_material, make_push
 from nuno.bodies.given_velocity import given_velocity, present_velocity
+from nuno.dynamics.dynamics import check_material, default_material
+from nuno.dynamics.push import make_push
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.files.html_table import html_table
-from nuno.joints.grip import Grip, make_grip, warn_shared
-from nuno.joints.joint import Joint, check_joined
+from nuno.joints.grip import Grip
+from nuno.joints.joint import Joint
+from nuno.joints.make_grip import make_grip, warn_shared
 from nuno.joints.tie import check_leader, check_weld, tie_to_leader
 from nuno.materials import Material, Rigid
 from nuno.shapes.path import Path
-from nuno.solvers.resolution import warn_of_resolution
+from nuno.solvers.resolution_warnings import warn_of_resolution
 from nuno.tables.kinematic_motion import arrive, path_for
 from nuno.validation import finite_array, flag, number
 from nuno.world.setting import Setting
@@ -94,7 +96,7 @@ class World(Setting):
         """Take a body out of the world, detached in the shape that it has now, and return it."""
         with self._change("remove"):
             removed = self._own(body)
-            if removed._dynamics is not None:
+            if removed.is_dynamic:
                 self._detach(removed)
             for other in self._attached():
                 for grip in [g for g in other.grips if g.target is removed]:
@@ -144,7 +146,7 @@ class World(Setting):
         with self._change("attach"):
             own = self._own(body)
             flag("keep_velocity", keep_velocity)
-            if own._dynamics is not None and not keep_velocity:
+            if own.is_dynamic and not keep_velocity:
                 raise BodyStateError(
                     f"{own.name!r} is dynamic already; detach it first to change its material, or set keep_velocity"
                 )
@@ -156,8 +158,8 @@ class World(Setting):
                 raise BodyStateError(f"{own.name!r} follows a path; end that with world.move(body, None) first")
             chosen: Any = default_material(own) if material is None else material
             check_material(own.shape, chosen, self.world_count)
-            check_joined(own, chosen, self)
-            given = None if own._dynamics is None else present_velocity(own)
+            self._check_joined(own, chosen)
+            given = None if not own.is_dynamic else present_velocity(own)
             if velocity is not None or angular_velocity is not None:
                 is_rigid = isinstance(chosen, Rigid)
                 given = given_velocity(own, is_rigid, velocity, angular_velocity, self.world_count)
@@ -167,13 +169,13 @@ class World(Setting):
                 for grip in other.grips
                 if grip.target is own and not isinstance(grip, Joint)
             ]
-            if own._dynamics is None:
+            if not own.is_dynamic:
                 check_leader(own, not isinstance(chosen, Rigid), following)
             self._engine.allow_dynamics(own, chosen)
             dynamics = self._engine.attach(own._as_static(), chosen)
             if given is not None:
                 dynamics.set_velocity(own, given)
-            if own._dynamics is not None:
+            if own.is_dynamic:
                 self._detach(own)
                 following = []
             own._friction, own._dynamics = chosen.friction, dynamics
@@ -183,7 +185,8 @@ class World(Setting):
             if not dynamics.is_rigid:
                 own._deformed = None
             self._colliders_changed()
-            warn_of_resolution(own, self)
+            if not self._quiet:
+                warn_of_resolution(own)
         return own
 
     def detach(self, body: Body | str) -> Body:
@@ -240,7 +243,8 @@ class World(Setting):
             own._friction = chosen.friction
             self._renew(own, chosen)
             self._colliders_changed()
-            warn_of_resolution(own, self)
+            if not self._quiet:
+                warn_of_resolution(own)
 
     def grip(
         self, body: Body | str, where: Any = None, *, to: Any, compliance: float = 0.0, free: ArrayLike | None = None,
@@ -275,14 +279,14 @@ class World(Setting):
                 raise InvalidInputError(f"ignore must be a sequence of bodies or names, got {ignore!r}")
             if target is own:
                 raise InvalidInputError(f"{own.name!r} cannot be gripped by itself")
-            if dynamics.is_rigid and target is not None and target._dynamics is not None:
-                if not target._dynamics.is_rigid:
-                    raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
+            leader = None if target is None else target._dynamics
+            if dynamics.is_rigid and target is not None and leader is not None and not leader.is_rigid:
+                raise InvalidInputError(f"{target.name!r} deforms; grip its points to {own.name!r} instead")
             grip = make_grip(
                 own, where, to, number("compliance", compliance, low=0.0), target, free, self, max_force=max_force,
                 ignored=None if ignore is None else [self._own(other) for other in ignore],
             )  # fmt: skip
-            warn_shared(grip)
+            warn_shared(grip, dynamics.grips)
             self._hold(grip)
         return grip
 

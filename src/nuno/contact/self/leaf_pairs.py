@@ -28,7 +28,7 @@ def travelled(topo: Topology):
 
 @wp.func
 def measure_leaves(t: StateFloat, topo: Topology, rank: int, size: int):
-    """The boxes of the leaves' displacements since elements were listed, and the span of all, as `measure_span`."""
+    """The boxes of the leaves' displacements since elements were listed, and the span of all."""
     n = topo.particles
     place = travelled(topo)
     # the box of nothing, upside down, where a thread has no leaf

@@ -112,38 +112,6 @@ def raise_to(values: wp.array(dtype=float), k: int, value: float, rank: int, siz
 
 
 @wp.func
-def raise_to(values: wp.array(dtype=Any), k: int, value: Any, rank: int, size: int):
-    values[k] = maximum(values[k], value)
-
-
-@wp.func
-def measure_span(t: Any, n: int, rank: int, size: int):
-    """The box, around the origin, of all displacements since the list was made: largest, and largest negative."""
-    hx = full_like(t.x[0], -1.0e30)
-    hy = hx
-    hz = hx
-    lx = hx
-    ly = hx
-    lz = hx
-    for i in range(rank, n, size):
-        dx = t.x[i] - t.reference[i]
-        dy = t.y[i] - t.reference[n + i]
-        dz = t.z[i] - t.reference[2 * n + i]
-        hx = maximum(hx, dx)
-        hy = maximum(hy, dy)
-        hz = maximum(hz, dz)
-        lx = maximum(lx, -dx)
-        ly = maximum(ly, -dy)
-        lz = maximum(lz, -dz)
-    raise_to(t.reference, 3 * n, hx, rank, size)
-    raise_to(t.reference, 3 * n + 1, hy, rank, size)
-    raise_to(t.reference, 3 * n + 2, hz, rank, size)
-    raise_to(t.reference, 3 * n + 3, lx, rank, size)
-    raise_to(t.reference, 3 * n + 4, ly, rank, size)
-    raise_to(t.reference, 3 * n + 5, lz, rank, size)
-
-
-@wp.func
 def middles(t: Any, topo: Topology, rank: int, size: int):
     """Centre and radius of each triangle and each edge."""
     third = 1.0 / 3.0

@@ -1,4 +1,4 @@
-"""Cloth against itself: thin contact of vertices with triangles and of edges with edges.
+"""Cloth against itself: contact and Coulomb friction of vertices with triangles and of edges with edges.
 
 Candidates come from groups of neighbouring vertices whose bounding boxes meet, and stay valid until something may
 have moved by half the margin. A contact's normal and weights are taken where the substep began, when nothing crossed:

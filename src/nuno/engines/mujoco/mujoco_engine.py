@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from nuno.bodies.dynamics import Dynamics, State
+from nuno.dynamics.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import make_arrays, state_at_rest
 from nuno.engines.driven_motion import kinematic_poses
 from nuno.engines.engine import CAPABILITIES, Engine
@@ -23,7 +23,7 @@ from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 STEP = 0.0021
 """[s] The longest substep where none are asked for: MuJoCo's default is 2 ms, a frame of 1/60 s has 8 of 2.08 ms."""
@@ -37,7 +37,7 @@ class MujocoEngine(Engine):
     name = "mujoco"
     capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - {"cuda"}
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: EngineWorld) -> None:
         super().__init__(world)
         mujoco_package()
         self._scene: Any = None

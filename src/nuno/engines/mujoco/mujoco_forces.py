@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -17,10 +17,29 @@ from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.engines.mujoco.mujoco_engine import MujocoEngine
+    from nuno.engines.world_view import EngineWorld
 
 
-def forwarded(engine: MujocoEngine) -> list[tuple[Any, Any]]:
+class SceneEngine(Protocol):
+    """The engine as forces are read from it; `MujocoEngine` says what each member is."""
+
+    @property
+    def world(self) -> EngineWorld:
+        """The world."""
+
+    @property
+    def scene(self) -> Any:
+        """The compiled scene."""
+
+    @property
+    def substep(self) -> float:
+        """The time of a substep [s]."""
+
+    def write(self, time: float) -> None:
+        """Bring the state of all bodies to MuJoCo."""
+
+
+def forwarded(engine: SceneEngine) -> list[tuple[Any, Any]]:
     """Return a model and data of each world, with the forces of its present state worked out."""
     mujoco, scene, time = mujoco_package(), engine.scene, engine.world.time
     engine.write(time)
@@ -36,7 +55,7 @@ def forwarded(engine: MujocoEngine) -> list[tuple[Any, Any]]:
     return found
 
 
-def wrench_of(engine: MujocoEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
+def wrench_of(engine: SceneEngine, grip: Grip) -> tuple[np.ndarray, np.ndarray]:
     """Return the force [N] and torque [N m], (worlds, 3) each, that a grip or joint bears."""
     mujoco, scene = mujoco_package(), engine.scene
     worlds = engine.world.world_count
@@ -104,20 +123,20 @@ def _share_of_helper(dynamics: Any, world: int, model: Any, data: Any, at: int) 
     return share, np.cross(quat.rotate(dynamics.values["turn"][world], dynamics.centre), share)
 
 
-def effort_of(engine: MujocoEngine, joint: Any) -> np.ndarray:
+def effort_of(engine: SceneEngine, joint: Any) -> np.ndarray:
     """Return (worlds,) the torque [N m] that keeps the axis of a ball joint in its cone; 0 of a fixed joint."""
     if engine.world.time == 0.0 or not len(engine.scene.balls):
         return np.zeros(engine.world.world_count)
     return np.array([engine.scene.balls.effort(joint, data) for _, data in forwarded(engine)])
 
 
-def contacts_of(engine: MujocoEngine, body: Body, itself: bool) -> list[tuple[Any, ...]]:
+def contacts_of(engine: SceneEngine, body: Body, itself: bool) -> list[tuple[Any, ...]]:
     """Return a dynamic body's contacts: rows of point, normal towards it, force on it, other's name, world."""
     mujoco = mujoco_package()
     found: list[tuple[Any, ...]] = []
     owned = list(engine.scene.placed)
     for world, (model, data) in enumerate(forwarded(engine)):
-        geoms, flexes = owners_of(engine.scene, owned)
+        geoms, flexes = owners_of(engine.scene.model, engine.scene.placed, owned)
         for k in range(data.ncon):
             contact = data.contact[k]
             owners = np.where(contact.geom >= 0, geoms[contact.geom], flexes[contact.flex])

@@ -37,7 +37,7 @@ from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import apply, compose
 
 if TYPE_CHECKING:
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 
 class Holds(SpecElements):
@@ -49,7 +49,7 @@ class Holds(SpecElements):
         balls: Its ball joints with drives.
     """
 
-    def __init__(self, world: Simulation, bushings: Bushings, balls: Balls) -> None:
+    def __init__(self, world: EngineWorld, bushings: Bushings, balls: Balls) -> None:
         super().__init__()
         self._world, self._bushings, self._balls = world, bushings, balls
         self._held: list[Held] = []

@@ -37,7 +37,7 @@ from nuno.joints.joint_drives import DRIVES
 from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 FAR = 1e10
 """[rad, m] Where the stops are of what has none."""
@@ -101,7 +101,7 @@ class Joints(SpecElements):
         qpos, dof, number: Addresses (n,) of their coordinates and velocities in the model, and their numbers there.
     """
 
-    def __init__(self, world: Simulation, bushings: Bushings) -> None:
+    def __init__(self, world: EngineWorld, bushings: Bushings) -> None:
         super().__init__()
         self._world, self._bushings = world, bushings
         self._joined: list[Jointed] = []

@@ -6,7 +6,6 @@ is compiled anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from nuno.engines.mujoco.mujoco_joints import Joints, hang
 from nuno.engines.mujoco.mujoco_kinematics import Kinematics
 from nuno.engines.mujoco.mujoco_leaders import LEADER
 from nuno.engines.mujoco.mujoco_package import mujoco_package, warnings_logged
+from nuno.engines.mujoco.mujoco_placed import Placed
 from nuno.engines.mujoco.mujoco_sums import Sums
 from nuno.engines.mujoco.mujoco_touch import (
     CONTACT,
@@ -38,50 +38,13 @@ from nuno.tables.kinematic_motion import is_kinematic
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
+    from nuno.engines.world_view import EngineWorld
     from nuno.joints.joint import Joint
-    from nuno.world.simulation import Simulation
 
 THIN = 0.02
 """Share of its body's mass that the helper of a joint has that is loose or a ball."""
 LEADING = 0.5 * LEADER
 """[kg] and [kg m2] What has more is a body that leads, or a flywheel."""
-
-
-@dataclass(eq=False)
-class Placed:
-    """The elements that a body is in the spec.
-
-    Attributes:
-        role: "static", "moving" (it follows a path), "rigid" or "flex".
-        signature: What it was made of; another means that it is made anew.
-        bodies: Its bodies in the spec, one, or of a flex one a vertex.
-        geoms, assets: Its geoms, and the meshes that they need.
-        flexes: Its flexes: one that deforms, or rigid ones of what is not convex.
-        mesh: Of one that deforms, its elements.
-        friction: (worlds,), the coefficient of its shapes.
-        helpers: Bodies that are welded to it, each with as much of its mass as is left to itself.
-        thin: Helpers of joints that are loose or balls, each with a fiftieth of its mass.
-        carries: Whether bodies hang on it by joints.
-        depth: Of a rigid one that hangs by a joint, of how many joints its tree has above it; else 0.
-        id: Of the first of its bodies in the model.
-        qpos, dof: Addresses (n,) of each body's coordinates and velocities; empty of a static one.
-    """
-
-    role: str
-    signature: tuple[Any, ...]
-    bodies: list[Any]
-    geoms: list[Any] = field(default_factory=list)
-    assets: list[Any] = field(default_factory=list)
-    flexes: list[Any] = field(default_factory=list)
-    mesh: FlexMesh | None = None
-    friction: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    helpers: list[Any] = field(default_factory=list)
-    thin: list[Any] = field(default_factory=list)
-    carries: bool = False
-    depth: int = 0
-    id: int = -1
-    qpos: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    dof: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
 
 class MujocoScene:
@@ -103,7 +66,7 @@ class MujocoScene:
         world: The world.
     """
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: EngineWorld) -> None:
         self._world = world
         self._mujoco = mujoco_package()
         self._made = 0
@@ -198,7 +161,7 @@ class MujocoScene:
         self.holds.find(self.model, self.batch, self.placed, substep)
         self.bushings.find(self.model, self.batch, kinematics)
         self.balls.find(self.model, self.batch, kinematics, substep)
-        self.sums = Sums(self, world.world_count) if kept else None
+        self.sums = Sums(self.model, self.batch, self.joints, self.placed, world.world_count) if kept else None
 
     def set_step(self, step: float) -> None:
         """Let the substeps to come be so long [s]; `bring` sets them to the engine's."""
@@ -221,7 +184,7 @@ class MujocoScene:
             flex.selfcollide = 4 if _touches_itself(self._world, body) else 0
             own = Placed(role, signature, bodies, flexes=[flex], mesh=mesh)
         else:
-            from nuno.bodies.rigid_dynamics import parts_of
+            from nuno.dynamics.body_parts import parts_of
 
             other = None if joint is None else joint.target
             parent = spec.worldbody if other is None else self.placed[other.key].bodies[0]
@@ -325,7 +288,7 @@ def _share_mass(dynamics: Any, shares: list[tuple[Any, float]]) -> None:
         ]  # fmt: skip
 
 
-def _helped(world: Simulation) -> list[Joint]:
+def _helped(world: EngineWorld) -> list[Joint]:
     """Return the joints whose body, or a helper of it, hangs on the other body."""
     grips = [grip for dynamics in attached(world) for grip in dynamics.grips]
     return [grip for grip in grips if is_of_tree(grip) or is_driven_spherical(grip.spec)]
@@ -337,7 +300,7 @@ def flex_id(model: Any, name: str) -> int:
     return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, name))
 
 
-def _role_and_signature(world: Simulation, body: Body) -> tuple[str, tuple[Any, ...]]:
+def _role_and_signature(world: EngineWorld, body: Body) -> tuple[str, tuple[Any, ...]]:
     role = _role(body)
     return role, _signature(world, body, role)
 
@@ -348,13 +311,13 @@ def _role(body: Body) -> str:
     return "moving" if is_kinematic(body) else "static"
 
 
-def _signature(world: Simulation, body: Body, role: str) -> tuple[Any, ...]:
+def _signature(world: EngineWorld, body: Body, role: str) -> tuple[Any, ...]:
     if dynamics_of(body) is not None:
         # another material makes other dynamics
         return role, id(dynamics_of(body)), rules_of(world).touches_itself(body)
     return role, id(body.shape), body.local_vertices().tobytes() if body.is_deformed else None, body.thickness
 
 
-def _touches_itself(world: Simulation, body: Body) -> bool:
+def _touches_itself(world: EngineWorld, body: Body) -> bool:
     """Return True if the parts of a cloth touch each other, or those of a soft body whose material asks for it."""
     return rules_of(world).touches_itself(body) and getattr(dynamics_of(body).material, "self_contact", True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from nuno.engines.mujoco.mujoco_package import mujoco_package
 
 if TYPE_CHECKING:
-    from nuno.engines.mujoco.mujoco_scene import MujocoScene
+    from nuno.engines.mujoco.mujoco_joints import Joints
+    from nuno.engines.mujoco.mujoco_placed import Placed
     from nuno.joints.grip import Grip
 
 
@@ -18,20 +19,23 @@ class Sums:
     """Sums over the last frame, or the part of one that was advanced last.
 
     Args:
-        scene: The scene as it is compiled.
+        model: The model as it is compiled.
+        batch: Its worlds.
+        joints: The joints whose loads are summed.
+        placed: What each body is, by its key.
         worlds: Number of worlds.
     """
 
-    def __init__(self, scene: MujocoScene, worlds: int) -> None:
-        self._model, self._batch, self._of_joints, self._worlds = scene.model, scene.batch, scene.joints, worlds
-        self._joints: dict[Any, int] = {joint: k for k, joint in enumerate(scene.joints.joints)}
+    def __init__(self, model: Any, batch: Any, joints: Joints, placed: Mapping[str, Placed], worlds: int) -> None:
+        self._model, self._batch, self._of_joints, self._worlds = model, batch, joints, worlds
+        self._joints: dict[Any, int] = {joint: k for k, joint in enumerate(joints.joints)}
         self._borne = np.zeros((worlds, len(self._joints), 6))
         self._along = np.zeros((worlds, len(self._joints)))
         self._duration = 0.0
-        self._keys = list(scene.placed)
+        self._keys = list(placed)
         self._given = np.zeros((worlds, len(self._keys), len(self._keys), 3))
         self._data: Any = None
-        self._owner = owners_of(scene, self._keys)
+        self._owner = owners_of(model, placed, self._keys)
 
     def begin(self) -> None:
         """Forget what was summed up."""
@@ -81,12 +85,12 @@ class Sums:
         return {self._keys[k]: rows[:, k].copy() for k in np.flatnonzero(rows.any(axis=(0, 2)))}
 
 
-def owners_of(scene: MujocoScene, keys: list[str]) -> tuple[np.ndarray, np.ndarray]:
+def owners_of(model: Any, placed: Mapping[str, Placed], keys: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return the places among ``keys`` of the bodies that own each geom and each flex, and -1 at the end."""
-    mujoco, model = mujoco_package(), scene.model
+    mujoco = mujoco_package()
     geoms, flexes = np.full(model.ngeom + 1, -1), np.full(model.nflex + 1, -1)
     for k, key in enumerate(keys):
-        own = scene.placed[key]
+        own = placed[key]
         for found, kind, elements in (
             (geoms, mujoco.mjtObj.mjOBJ_GEOM, own.geoms), (flexes, mujoco.mjtObj.mjOBJ_FLEX, own.flexes),
         ):  # fmt: skip

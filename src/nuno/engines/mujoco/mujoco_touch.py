@@ -18,7 +18,7 @@ from nuno.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ IMPEDANCE = (0.95, 0.995, 0.001, 0.5, 2.0)
 _warned: set[frozenset[str]] = set()
 
 
-def touch_classes(world: Simulation, bodies: Sequence[Body]) -> list[list[int]]:
+def touch_classes(world: EngineWorld, bodies: Sequence[Body]) -> list[list[int]]:
     """Return the bodies by their places in classes that touch the same others, and one another or not.
 
     Raises:
@@ -64,7 +64,7 @@ def touch_classes(world: Simulation, bodies: Sequence[Body]) -> list[list[int]]:
     return classes
 
 
-def set_masks(world: Simulation, bodies: list[tuple[Body, Any]]) -> None:
+def set_masks(world: EngineWorld, bodies: list[tuple[Body, Any]]) -> None:
     """Give all geoms and flexes the masks by which exactly those pairs collide that touch in the world.
 
     MuJoCo's rule is an or, Nuno's an and: each class of bodies that touch the same others has a bit of its own.
@@ -107,7 +107,7 @@ class TouchingPair:
     restitution: np.ndarray
 
 
-def set_pairs(spec: Any, world: Simulation, bodies: list[tuple[Body, Any]]) -> list[TouchingPair]:
+def set_pairs(spec: Any, world: EngineWorld, bodies: list[tuple[Body, Any]]) -> list[TouchingPair]:
     """Give all geoms and flexes the coefficients of their pairs; return the pairs that have numbers of their own.
 
     MuJoCo takes of two the larger coefficient, or that of the shape with the higher priority; Nuno's pair takes the
@@ -165,7 +165,7 @@ def write_pairs(model: Any, batch: Any, pairs: Sequence[TouchingPair]) -> None:
     batch.expand("pair_solref")[:, number], batch.expand("pair_solimp")[:, number] = CONTACT, IMPEDANCE
 
 
-def restitution_of(world: Simulation, body: Body) -> np.ndarray:
+def restitution_of(world: EngineWorld, body: Body) -> np.ndarray:
     """Return a body's restitution (worlds,), 0 of one without a rigid material."""
     dynamics = dynamics_of(body)
     return _by_world(world, getattr(dynamics.material, "restitution", 0.0) if dynamics is not None else 0.0)
@@ -183,7 +183,7 @@ def write_friction(model: Any, batch: Any, bodies: list[tuple[Body, Any]]) -> No
                 batch.expand(name)[:, mujoco.mj_name2id(model, kinds[name], shape.name), 0] = own.friction
 
 
-def pair_friction(world: Simulation, a: Body, b: Body) -> np.ndarray:
+def pair_friction(world: EngineWorld, a: Body, b: Body) -> np.ndarray:
     """Return the coefficient of a pair, (worlds,)."""
     own = rules_of(world).friction.get(frozenset((a.key, b.key)))
     if own is not None:
@@ -191,7 +191,7 @@ def pair_friction(world: Simulation, a: Body, b: Body) -> np.ndarray:
     return np.sqrt(_by_world(world, a.friction) * _by_world(world, b.friction))
 
 
-def _by_world(world: Simulation, value: Any) -> np.ndarray:
+def _by_world(world: EngineWorld, value: Any) -> np.ndarray:
     return np.array(np.broadcast_to(np.asarray(value, dtype=float), (world.world_count,)))
 
 

@@ -19,7 +19,7 @@ from nuno.shapes import quaternion as quat
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 KINDS = ("hinge", "slider")
 """Of joints that are MuJoCo's own; the others are equality constraints."""
@@ -36,12 +36,12 @@ def is_of_tree(grip: Any) -> bool:
     return isinstance(grip, Joint) and grip.kind in KINDS
 
 
-def hinges_and_sliders(world: Simulation) -> list[Joint]:
+def hinges_and_sliders(world: EngineWorld) -> list[Joint]:
     """Return the hinges and sliders of a world."""
     return [grip for dynamics in attached(world) for grip in dynamics.grips if is_of_tree(grip)]
 
 
-def plan_tree(world: Simulation) -> dict[str, Joint]:
+def plan_tree(world: EngineWorld) -> dict[str, Joint]:
     """Return the joint by which each body hangs in the tree, by the body's key."""
     found: dict[str, Joint] = {}
     for body in world.bodies:
@@ -125,7 +125,7 @@ class JointStates:
         depths: (n,), of those whose body hangs by them; -1 of the others.
     """
 
-    def __init__(self, world: Simulation, joints: list[Joint], depths: list[int]) -> None:
+    def __init__(self, world: EngineWorld, joints: list[Joint], depths: list[int]) -> None:
         self._world, self._joints = world, joints
         bodies: dict[Body | None, int] = {None: 0}
         for joint in joints:

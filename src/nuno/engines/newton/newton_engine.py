@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import Dynamics, State
+from nuno.dynamics.dynamics import Dynamics, State
 from nuno.engines.array_dynamics import ArrayParticles, make_arrays, state_at_rest
 from nuno.engines.driven_motion import driven_hold, driven_points, kinematic_poses
 from nuno.engines.engine import Engine
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.engines.newton.newton_model import NewtonModel
     from nuno.engines.newton.newton_substeps import NewtonSubsteps
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 ITERATIONS = 5
 """Of a substep."""
@@ -39,7 +39,7 @@ class NewtonEngine(Engine):
         }
     )  # fmt: skip
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: EngineWorld) -> None:
         super().__init__(world)
         if find_spec("newton") is None:
             raise MissingPackageError("newton", "newton", 'World(engine="newton")')

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.rigid_dynamics import parts_of
+from nuno.dynamics.body_parts import parts_of
 from nuno.engines.array_dynamics import ArrayParticles
 from nuno.engines.newton.hinges import mesh_hinges, sheet_hinges
 from nuno.engines.newton.newton_shapes import add_part
@@ -21,7 +21,7 @@ from nuno.topology.soft_topology import moduli
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 logger = logging.getLogger(__name__)
 
@@ -68,7 +68,7 @@ def membrane(material: dict[str, np.ndarray]) -> tuple[float, float]:
     return mu, stretch * poisson / (1.0 - poisson**2)
 
 
-def build_model(world: Simulation) -> NewtonModel:
+def build_model(world: EngineWorld) -> NewtonModel:
     """Return the model of a world's bodies, in the shapes that they have at rest and where static ones are now."""
     import newton
 
@@ -135,7 +135,7 @@ def _thickness(body: Body) -> float:
     return min(float(np.max(material.thickness)), 0.5 * dynamics_of(body).topology.cell_size)
 
 
-def _add_particles(scene: Any, body: Body, index: int, world: Simulation) -> None:
+def _add_particles(scene: Any, body: Body, index: int, world: EngineWorld) -> None:
     import warp as wp
 
     dynamics: Any = dynamics_of(body) if body.is_dynamic else None
@@ -179,7 +179,7 @@ def _add_particles(scene: Any, body: Body, index: int, world: Simulation) -> Non
 
 
 def _add_shapes(
-    scene: Any, body: Body, index: int, made: NewtonModel, shapes: list[list[int]], world: Simulation
+    scene: Any, body: Body, index: int, made: NewtonModel, shapes: list[list[int]], world: EngineWorld
 ) -> None:
     dynamics: Any = dynamics_of(body) if body.is_dynamic else None
     kinematic = is_kinematic(body) if dynamics is None else bool(dynamics.grips)
@@ -221,7 +221,7 @@ def _transform(place: np.ndarray, turn: np.ndarray) -> Any:
     return wp.transform(wp.vec3(*place.tolist()), wp.quat(*turn[[1, 2, 3, 0]].tolist()))
 
 
-def _filter(scene: Any, world: Simulation, bodies: list[Body], shapes: dict[str, list[list[int]]], index: int) -> None:
+def _filter(scene: Any, world: EngineWorld, bodies: list[Body], shapes: dict[str, list[list[int]]], index: int) -> None:
     """Keep shapes of bodies from touching that are to pass through each other."""
     with_shapes = [body for body in bodies if shapes[body.key]]
     for k, a in enumerate(with_shapes):
@@ -232,7 +232,7 @@ def _filter(scene: Any, world: Simulation, bodies: list[Body], shapes: dict[str,
                         scene.add_shape_collision_filter_pair(one, other)
 
 
-def _warn_of_exceptions(world: Simulation, deforming: list[Body], bodies: list[Body]) -> None:
+def _warn_of_exceptions(world: EngineWorld, deforming: list[Body], bodies: list[Body]) -> None:
     for a in deforming:
         passed = [b.name for b in bodies if b is not a and not rules_of(world).touch(a, b)]
         if passed:

@@ -20,7 +20,7 @@ from nuno.materials import Cloth
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 logger = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ LIMP = 1.2
 _warned: set[str] = set()
 
 
-def substeps_for(world: Simulation) -> int:
+def substeps_for(world: EngineWorld) -> int:
     """Return an even number of substeps of a frame for the cloths of a world, and warn where they do not suffice."""
     rates = {body.key: _rate(body) for body in world.bodies if _is_cloth(body)}
     frame = 1.0 / world.frame_rate

@@ -15,7 +15,7 @@ from nuno.shapes import quaternion as quat
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
     from nuno.engines.newton.newton_model import NewtonModel
-    from nuno.world.simulation import Simulation
+    from nuno.engines.world_view import EngineWorld
 
 SLIP = 1e-4
 """[m/s] below which friction is less than Coulomb's: what sticks creeps by less."""
@@ -30,7 +30,7 @@ class NewtonSubsteps:
         iterations: Of the solver in a substep.
     """
 
-    def __init__(self, made: NewtonModel, world: Simulation, iterations: int) -> None:
+    def __init__(self, made: NewtonModel, world: EngineWorld, iterations: int) -> None:
         import newton
 
         self.made, self.worlds = made, world.world_count
@@ -62,7 +62,7 @@ class NewtonSubsteps:
         self._graphs: dict[tuple[int, float], Any] = {}
         self._drags = self._air_drags(world)
 
-    def _air_drags(self, world: Simulation) -> tuple[np.ndarray, np.ndarray]:
+    def _air_drags(self, world: EngineWorld) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of particles and of bodies [1/s]."""
         of_particles, of_bodies = np.zeros(self.model.particle_count), np.zeros(self.model.body_count)
         for body in world.bodies:

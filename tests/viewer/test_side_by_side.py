@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nuno
-from nuno.files.side_by_side import side_by_side
+from nuno.viewer.side_by_side import side_by_side
 
 
 def falling(seconds=0.1):

@@ -6,24 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nuno.bodies.dynamics import Dynamics, ParticleDynamics, State
+from nuno.dynamics.dynamics import Dynamics, ParticleDynamics, State
 from nuno.materials import Material, Rigid
 from nuno.mesh.memory_limit import CLOTH_BYTES, check_host_memory
 from nuno.shapes.shape import LARGE
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.dynamics.rigid_dynamics import RigidWorld
 
 
-def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: Simulation) -> Dynamics:
+def make_dynamics(body: Body, material: Material, state: State, friction: Any, world: RigidWorld) -> Dynamics:
     """Return dynamics for a body, in a state that dynamics of its kind gave.
 
     Raises:
         InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
     """
     if isinstance(material, Rigid):
-        from nuno.bodies.rigid_dynamics import RigidDynamics
+        from nuno.dynamics.rigid_dynamics import RigidDynamics
 
         return RigidDynamics(body, material, friction, world, state)
     local, origin, velocities = state["local"], state["origin"], state["velocities"]
@@ -35,14 +35,14 @@ def make_dynamics(body: Body, material: Material, state: State, friction: Any, w
     return made
 
 
-def start_dynamics(body: Body, material: Any, world: Simulation) -> Dynamics:
+def start_dynamics(body: Body, material: Any, world: RigidWorld) -> Dynamics:
     """Return dynamics for a static body in the shape that it has now, at rest.
 
     Raises:
         InvalidInputError: the shape has no such dynamics, or the material does not fit the shape or the batch.
     """
     if isinstance(material, Rigid):
-        from nuno.bodies.rigid_dynamics import RigidDynamics
+        from nuno.dynamics.rigid_dynamics import RigidDynamics
 
         return RigidDynamics(body, material, material.friction, world)
     n = len(body.shape.mesh()[0])

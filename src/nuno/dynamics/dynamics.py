@@ -1,6 +1,6 @@
 """Dynamics: what a body has while it is attached, around the solver that moves it.
 
-`ParticleDynamics` moves cloth and soft bodies, `nuno.bodies.rigid_dynamics.RigidDynamics` rigid ones.
+`ParticleDynamics` moves cloth and soft bodies, `nuno.dynamics.rigid_dynamics.RigidDynamics` rigid ones.
 """
 
 from __future__ import annotations
@@ -9,24 +9,23 @@ import logging
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_particles
 from nuno.bodies.given_velocity import GivenVelocity
-from nuno.bodies.push import Push
-from nuno.bodies.shape_topology import element_count, topology_of, vertex_shares
+from nuno.bodies.resolution import Resolution
+from nuno.bodies.shape_topology import element_count, topology_of
+from nuno.dynamics.push import Push
 from nuno.errors import InvalidInputError
 from nuno.joints.grip import Grip
 from nuno.materials import Cloth, Material, Rigid, Soft
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, apply, compose, invert
 from nuno.shapes.shape import Plane, Shape
-from nuno.solvers.resolution import Resolution
-from nuno.validation import finite_array, number
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.simulation import Simulation
+    from nuno.bodies.body_protocols import MovedBody, WorldSettings
+    from nuno.bodies.contact_rules import ContactRules
 
 
 logger = logging.getLogger(__name__)
@@ -52,7 +51,7 @@ class Dynamics:
     is_rigid: ClassVar[bool] = False
     copies_vertices: ClassVar[bool] = False
 
-    def __init__(self, material: Material, friction: Any, world: Simulation) -> None:
+    def __init__(self, material: Material, friction: Any, world: WorldSettings) -> None:
         self.material, self.friction, self.world_count = material, friction, world.world_count
         self.grips: list[Grip] = []
         self.pushes: list[Push] = []
@@ -66,35 +65,35 @@ class Dynamics:
         """Return what the substeps make of the material, or None where there is nothing to say."""
         return None
 
-    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+    def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m], of all vertices or of ``some``, (worlds, n) int."""
         raise NotImplementedError
 
-    def velocities(self, body: Body) -> np.ndarray:
+    def velocities(self, body: MovedBody) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s] of the vertices."""
         raise NotImplementedError
 
-    def pose(self, body: Body) -> Pose:
+    def pose(self, body: MovedBody) -> Pose:
         """Return where the body is."""
         raise NotImplementedError
 
-    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def place(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere as a whole; velocities turn along."""
         raise NotImplementedError
 
-    def motion(self, body: Body) -> BodyMotion:
+    def motion(self, body: MovedBody) -> BodyMotion:
         """Return how the body moves as a whole."""
         raise NotImplementedError
 
-    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+    def set_velocity(self, body: MovedBody, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
         """Give the body velocities, in all worlds or some (k,); it stays where it is."""
         raise NotImplementedError
 
-    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+    def place_worlds(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
         """Put the body elsewhere as a whole in some worlds (k,); velocities turn along."""
         raise NotImplementedError
 
-    def elastic_energy(self, body: Body) -> np.ndarray:
+    def elastic_energy(self, body: MovedBody) -> np.ndarray:
         """Return (worlds,) [J], what the body's deformation stores."""
         raise NotImplementedError
 
@@ -163,7 +162,7 @@ class ParticleDynamics(Dynamics):
         positions: np.ndarray,
         velocities: np.ndarray,
         friction: Any,
-        world: Simulation,
+        world: WorldSettings,
     ) -> None:
         check_material(shape, material, world.world_count)
         super().__init__(material, friction, world)
@@ -184,30 +183,30 @@ class ParticleDynamics(Dynamics):
         found: Resolution = self.solver.resolution
         return found
 
-    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+    def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
         return self.solver.positions(some)
 
-    def velocities(self, body: Body) -> np.ndarray:
+    def velocities(self, body: MovedBody) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s]."""
         return np.stack(self.solver.velocities_apart(), axis=-1, dtype=np.float64)
 
-    def pose(self, body: Body) -> Pose:
+    def pose(self, body: MovedBody) -> Pose:
         """Return the mean of the vertices, and the orientation that the body was last given."""
         centre = self.vertices(body).mean(axis=-2)
         return centre[0] if len(centre) == 1 else centre, body._quaternion
 
-    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def place(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere as a whole, in its shape; velocities turn along."""
         motion = compose((position, quaternion), invert(self.pose(body)))
         turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
         self.solver.set_state(apply(motion, self.vertices(body)), turned.astype(np.float32))
 
-    def motion(self, body: Body) -> BodyMotion:
+    def motion(self, body: MovedBody) -> BodyMotion:
         """Return how the body moves as a whole: the motion of its vertices' masses."""
         return motion_of_particles(self.solver.mass, self.vertices(body), self.velocities(body))
 
-    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+    def set_velocity(self, body: MovedBody, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
         """Give the vertices velocities, in all worlds or some (k,); they stay where they are, to the bit."""
         from nuno.state.cloth_state import SPEED
 
@@ -222,7 +221,7 @@ class ParticleDynamics(Dynamics):
         else:
             self.load_worlds(worlds, {name: array[worlds] for name, array in state.items()})
 
-    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+    def place_worlds(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
         """Put the body elsewhere as a whole in some worlds (k,); velocities turn along."""
         motion = compose((position, quaternion), invert(self.pose(body)))
         turned = quat.rotate(motion[1][..., None, :], self.velocities(body))
@@ -234,7 +233,7 @@ class ParticleDynamics(Dynamics):
 
         self.load_worlds(worlds, state_from(vertices[worlds], velocities[worlds]))
 
-    def elastic_energy(self, body: Body) -> np.ndarray:
+    def elastic_energy(self, body: MovedBody) -> np.ndarray:
         """Return (worlds,) [J], what the body's deformation stores."""
         measures: Any
         if isinstance(self.material, Soft):
@@ -271,6 +270,13 @@ class ParticleDynamics(Dynamics):
         given: dict[str, np.ndarray] = {} if self.solver.sums is None else self.solver.sums.given()
         return given
 
+    def sum_impulses(self, on: bool) -> None:
+        """Sum up what shapes give the body, from the next frame on, or no more. The motion keeps its bits."""
+        if on != (self.solver.sums is not None):
+            from nuno.solvers.shape_impulses import ShapeImpulses
+
+            self.solver.sums = ShapeImpulses(self.solver) if on else None
+
     def _forget_impulses(self) -> None:
         if self.solver.sums is not None:
             self.solver.sums.set_given({})
@@ -303,7 +309,7 @@ class ParticleDynamics(Dynamics):
         """Return (worlds,) bool, whether all positions and velocities are finite."""
         return self.solver.finite()
 
-    def make_room(self, body: Body) -> bool:
+    def make_room(self, body: MovedBody) -> bool:
         """Make lists longer that were too short in the last run; return whether that must be gone through again."""
         known, longer = bool(self.solver.missed.any()), bool(self.solver.make_room())
         if longer:
@@ -317,9 +323,22 @@ class ParticleDynamics(Dynamics):
         return longer
 
 
-def touches_itself(world: Simulation, body: Body) -> bool:
+def touches_itself(rules: ContactRules, body: Body) -> bool:
     """Return True if contacts of a soft body with itself are looked for, which takes it through a frame by parts."""
-    return isinstance(body.material, Soft) and body.material.self_contact and world._rules.touches_itself(body)
+    return isinstance(body.material, Soft) and body.material.self_contact and rules.touches_itself(body)
+
+
+def rigid_vertices(body: MovedBody, pose: Pose, world_count: int, some: np.ndarray | None = None) -> np.ndarray:
+    """Return (worlds, n, 3) float64 [m] of a rigid body at a pose, of all vertices or of ``some``, (worlds, n) int."""
+    vertices = body._rigid_vertices(pose)
+    vertices = np.broadcast_to(vertices, (world_count, *vertices.shape[-2:]))
+    return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
+
+
+def dynamics_of(body: Body) -> Dynamics | None:
+    """Return the dynamics of a body, None while it is static."""
+    own = body._dynamics
+    return own if isinstance(own, Dynamics) else None
 
 
 def default_material(body: Body) -> Material:
@@ -346,31 +365,6 @@ def check_material(shape: Shape, material: Any, world_count: int) -> None:
     material.resolved(world_count, 1 if isinstance(material, Rigid) else element_count(shape))
 
 
-def make_push(body: Body, force: ArrayLike, torque: Any, duration: float | None, world: Simulation) -> Push:
-    """Return a push from now on; see ``World.push``.
-
-    Raises:
-        InvalidInputError: a force or torque that is not finite or of another shape, a torque on a body that is not
-            rigid, or a duration that is not positive.
-    """
-    worlds = world.world_count
-    end = None if duration is None else world.time + number("duration", duration, above=0.0)
-    if body._dynamics is not None and body._dynamics.is_rigid:
-        pair = [
-            np.broadcast_to(finite_array(name, value, (3,), (worlds, 3)), (worlds, 3))
-            for name, value in (("force", force), ("torque", np.zeros(3) if torque is None else torque))
-        ]
-        return Push(np.concatenate(pair, axis=1).astype(np.float32), end)
-    if torque is not None:
-        raise InvalidInputError(f"a torque turns rigid bodies only; {body.name!r} deforms: push its vertices")
-    share = vertex_shares(body.shape)
-    n = len(share)
-    given = finite_array("force", force, (3,), (n, 3), (worlds, 3), (worlds, n, 3))
-    if given.shape in ((3,), (worlds, 3)) and given.shape != (n, 3):
-        given = given[..., None, :] * (share / share.sum())[:, None]
-    return Push(np.array(np.broadcast_to(given, (worlds, n, 3)), dtype=np.float32), end)
-
-
 def backend() -> tuple[Any, Any]:
     """Return the classes of the cloth solver and of static shapes' tables; imported on first use."""
     from nuno.solvers.cloth_solver import ClothSolver
@@ -379,7 +373,7 @@ def backend() -> tuple[Any, Any]:
     return ClothSolver, Colliders
 
 
-def make_colliders(bodies: list[Body], pair_friction: dict[str, Any], world: Simulation) -> Any:
+def make_colliders(bodies: list[Body], pair_friction: dict[str, Any], world: WorldSettings) -> Any:
     """Return what solvers need of the static bodies that they touch; ``pair_friction`` is by name."""
     return backend()[1].from_bodies(bodies, world.world_count, world.device, pair_friction=pair_friction)
 

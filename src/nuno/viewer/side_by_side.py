@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from nuno.errors import InvalidInputError
-from nuno.files.recording import RecordedBody, Recording
 from nuno.mesh.primitives import PLANE_HALF
+from nuno.world.recording import RecordedBody, Recording
 
 GAP = 0.25
 """Between two recordings, of the width of the widest."""

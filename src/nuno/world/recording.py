@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nuno.bodies.surface_file import check_extension, one_world
 from nuno.errors import BodyStateError, FileFormatError, InvalidInputError, UnknownNameError
-from nuno.files.export import check_extension, one_world
 from nuno.files.html_table import html_table
 from nuno.files.whole_file import file_path, replacing, write_whole
 from nuno.mesh.memory_limit import check_host_memory

@@ -1,25 +1,32 @@
-"""Bodies for other programs: as trimesh objects, and as mesh files."""
+"""Surfaces for other programs: as trimesh objects, and as mesh files."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from nuno.errors import InvalidInputError
 from nuno.files.whole_file import file_path, write_whole
 from nuno.shapes.color import rgb
-from nuno.validation import checked
-
-if TYPE_CHECKING:
-    from nuno.bodies.body import Body
 
 EXTENSIONS = (".glb", ".obj", ".ply")
 
 
-def to_trimesh(body: Body, world: int | None = None) -> Any:
+class SkinnedBody(Protocol):
+    """A body with a surface that is drawn."""
+
+    @property
+    def color(self) -> str | tuple[float, float, float]:
+        """A name or (r, g, b) in [0, 1]."""
+
+    def skin(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return vertices (k, 3), in a batch (worlds, k, 3) [m], and faces (m, 3)."""
+
+
+def to_trimesh(body: SkinnedBody, world: int | None = None) -> Any:
     """Return a body's surface as it is now, a ``trimesh.Trimesh`` in the world frame with vertex colours.
 
     Args:
@@ -37,22 +44,8 @@ def to_trimesh(body: Body, world: int | None = None) -> Any:
     return trimesh.Trimesh(points, faces, vertex_colors=np.tile(color, (len(points), 1)), process=False)
 
 
-@checked
-def export_body(path: str | os.PathLike[str], body: Body, world: int | None = None) -> None:
-    """Write a body's surface as it is now to a mesh file; a file that is there is replaced.
-
-    Coordinates are written as they are, metres and z up, so that ``nuno.mesh(path)`` reads them back in place. (glTF
-    calls y up: its viewers show a GLB of one body lying.)
-
-    Args:
-        path: Ends with .obj, .ply or .glb.
-        body: The body; of a soft one, its skin.
-        world: Which world of a batch; None for a single world.
-
-    Raises:
-        InvalidInputError: no body, another extension, a batch without ``world``, or out of range.
-        FileWriteError: no such folder, a read-only one, a full disk; a file that was there stays as it was.
-    """
+def write_surface(path: str | os.PathLike[str], body: SkinnedBody, world: int | None) -> None:
+    """Write a body's surface to a mesh file; see ``nuno.export_body``."""
     goal = file_path(path)
     check_extension(goal, *EXTENSIONS)
     write_whole(goal, to_trimesh(body, world).export(file_type=goal.suffix[1:].lower()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -12,10 +12,34 @@ from nuno.shapes.coordinates import Pose
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.world.snapshot import BodyRecord
+    from nuno.shapes.shape import Shape
 
 SAME_SHAPE = 1e-12
 """[m] What doubles round where the same shape stands elsewhere."""
+
+
+class ShapedBody(Protocol):
+    """A static body, or the record of one, as the solver takes it."""
+
+    @property
+    def shape(self) -> Shape:
+        """Its shape, before anything deformed it."""
+
+    @property
+    def friction(self) -> Any:
+        """Coulomb's coefficient, a number or (worlds,)."""
+
+    @property
+    def group(self) -> int:
+        """Bit mask of the collision groups that it is in."""
+
+    @property
+    def collides_with(self) -> int:
+        """Bit mask of the groups that it touches."""
+
+    @property
+    def thickness(self) -> float:
+        """[m]."""
 
 
 @dataclass
@@ -34,12 +58,12 @@ class StaticPlace:
     deformed: tuple[np.ndarray, Pose] | None
     where: tuple[bytes, bytes] | None
 
-    def is_of(self, body: Body | BodyRecord, deformed: tuple[np.ndarray, Pose] | None) -> bool:
+    def is_of(self, body: ShapedBody, deformed: tuple[np.ndarray, Pose] | None) -> bool:
         """Return True if this is what a body is, or was when it was saved, but for where it is."""
         return self.what == what_of(body) and same_deformation(self.deformed, deformed)
 
 
-def what_of(body: Body | BodyRecord) -> tuple[Any, ...]:
+def what_of(body: ShapedBody) -> tuple[Any, ...]:
     """Return what the solver takes of a static body, besides its pose and how it was deformed."""
     return body.shape, np.asarray(body.friction).tobytes(), body.group, body.collides_with, body.thickness
 

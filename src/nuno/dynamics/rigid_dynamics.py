@@ -2,29 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import warp as wp
 
 from nuno.bodies.body_motion import BodyMotion, motion_of_rigid
-from nuno.bodies.dynamics import Dynamics, State, check_material
+from nuno.bodies.body_protocols import WorldSettings
 from nuno.bodies.given_velocity import GivenVelocity
-from nuno.bodies.static_place import StaticPlace, one_shape, same_deformation, what_of
+from nuno.dynamics.body_parts import mass_of, parts_of
+from nuno.dynamics.dynamics import Dynamics, State, check_material, rigid_vertices
+from nuno.dynamics.static_place import StaticPlace, same_deformation, what_of
 from nuno.materials import Rigid
-from nuno.rigid.convex_parts import RigidPart, rigid_shape
 from nuno.rigid.rigid_arrays import PARTS, SAVED
 from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes import quaternion as quat
 from nuno.shapes.coordinates import Pose, compose, invert
-from nuno.shapes.mass_properties import mass_properties
 from nuno.solvers.rigid_solver import RigidSolver
 
 if TYPE_CHECKING:
     from nuno.bodies.body import Body
-    from nuno.bodies.push import Push
-    from nuno.world.simulation import Simulation
+    from nuno.bodies.body_protocols import MovedBody
+    from nuno.bodies.contact_rules import ContactRules
+    from nuno.dynamics.push import Push
+    from nuno.tables.kinematic_motion import Schedule
+
+
+class RigidWorld(WorldSettings, Protocol):
+    """A world as its rigid bodies see it; the members are those of `nuno.world.simulation.Simulation`."""
+
+    @property
+    def _bodies(self) -> Mapping[str, Body]:
+        """All bodies, by key."""
+
+    @property
+    def _rules(self) -> ContactRules:
+        """The rules of which pairs touch, and their friction."""
+
+    @property
+    def _schedule(self) -> Schedule | None:
+        """The schedule of kinematic bodies in the present run."""
+
+    @property
+    def _collider_version(self) -> int:
+        """A number that is another after each change of what bodies touch."""
+
+    def _rigid_scene(self, origin: np.ndarray) -> RigidScene:
+        """Return what moves the rigid bodies."""
 
 
 class RigidScene:
@@ -42,7 +67,7 @@ class RigidScene:
         parts: Parts that there is room for at first.
     """
 
-    def __init__(self, world: Simulation, origin: np.ndarray, parts: int = PARTS) -> None:
+    def __init__(self, world: RigidWorld, origin: np.ndarray, parts: int = PARTS) -> None:
         self.solver = RigidSolver(
             world.world_count, device=world.device, gravity=world.gravity, frame_rate=world.frame_rate,
             substeps=world.substeps, origin=np.round(np.asarray(origin) * 1024.0) / 1024.0, parts=parts,
@@ -54,25 +79,25 @@ class RigidScene:
         self._version = -1
 
     @staticmethod
-    def settings_of(world: Simulation) -> tuple[Any, ...]:
+    def settings_of(world: RigidWorld) -> tuple[Any, ...]:
         """Return what of a world a scene is made for."""
         return world.world_count, world.device, world.gravity, world.frame_rate, world.substeps
 
-    def is_current(self, world: Simulation) -> bool:
+    def is_current(self, world: RigidWorld) -> bool:
         """Return True if the solver has been told of all that has changed."""
         return self._version == world._collider_version
 
-    def bring(self, world: Simulation) -> None:
+    def bring(self, world: RigidWorld) -> None:
         """Tell the solver what changed among static bodies, and which pairs are exceptions."""
         if self.is_current(world):
             return
         slots: dict[str, int] = {}
         seen = set()
         for body in world._bodies.values():
-            if body._dynamics is not None:
-                if isinstance(body._dynamics, RigidDynamics):
-                    slots[body.key] = body._dynamics.slot
-                    self.solver.set_groups(body._dynamics.slot, body.group, body.collides_with)
+            if body.is_dynamic:
+                if (own := _dynamics_of(body)) is not None:
+                    slots[body.key] = own.slot
+                    self.solver.set_groups(own.slot, body.group, body.collides_with)
                 continue
             seen.add(body.key)
             slots[body.key] = self.bring_static(body)
@@ -88,7 +113,7 @@ class RigidScene:
         self.solver.set_exceptions(pairs)
         self._version = world._collider_version
 
-    def lead(self, world: Simulation, time: float, duration: float) -> list[int]:
+    def lead(self, world: RigidWorld, time: float, duration: float) -> list[int]:
         """Let static bodies that follow paths move at a steady pace for a frame or less; return their slots."""
         schedule, keys = world._schedule, []
         k = None if schedule is None else schedule.frame_at(time)
@@ -137,7 +162,13 @@ class RigidScene:
         if longer:
             solver._list_anew()
 
-    def slot_of(self, world: Simulation, body: Body) -> int | None:
+    @property
+    def origin(self) -> np.ndarray:
+        """(worlds, 3) [m], what the solver's positions are relative to."""
+        origin: np.ndarray = self.solver.origin
+        return origin
+
+    def slot_of(self, body: Body) -> int | None:
         """Return the slot of a rigid or static body, None where the solver was not told of it yet."""
         own = _dynamics_of(body)
         if own is not None:
@@ -153,7 +184,7 @@ class RigidScene:
         arms = -quat.rotate(turns, np.broadcast_to(centres, middles.shape))
         return middles + arms, turns, velocities + np.cross(spins, arms), spins
 
-    def slots_of(self, world: Simulation) -> list[int]:
+    def slots_of(self, world: RigidWorld) -> list[int]:
         """Return the slot of each of the world's bodies, -1 for those that have none."""
         slots = []
         for key, body in world._bodies.items():
@@ -211,7 +242,7 @@ class RigidDynamics(Dynamics):
     is_rigid = True
 
     def __init__(
-        self, body: Body, material: Rigid, friction: Any, world: Simulation, state: State | None = None
+        self, body: Body, material: Rigid, friction: Any, world: RigidWorld, state: State | None = None
     ) -> None:
         check_material(body.shape, material, world.world_count)
         super().__init__(material, friction, world)
@@ -239,25 +270,23 @@ class RigidDynamics(Dynamics):
         """Substeps of a frame, the solver's own."""
         return int(self.solver.substeps)
 
-    def pose(self, body: Body) -> Pose:
+    def pose(self, body: MovedBody) -> Pose:
         """Return where the body's frame is, (3,) and (4,), in a batch (worlds, 3) and (worlds, 4)."""
         middle, turn = self.solver.pose(self.slot)
         place = middle - quat.rotate(turn, np.broadcast_to(self.centre, middle.shape))
         return (place[0], turn[0]) if self.world_count == 1 else (place, turn)
 
-    def vertices(self, body: Body, some: np.ndarray | None = None) -> np.ndarray:
+    def vertices(self, body: MovedBody, some: np.ndarray | None = None) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m]."""
-        vertices = body._rigid_vertices(self.pose(body))
-        vertices = np.broadcast_to(vertices, (self.world_count, *vertices.shape[-2:]))
-        return vertices if some is None else np.take_along_axis(vertices, some[..., None], axis=1)
+        return rigid_vertices(body, self.pose(body), self.world_count, some)
 
-    def velocities(self, body: Body) -> np.ndarray:
+    def velocities(self, body: MovedBody) -> np.ndarray:
         """Return (worlds, n, 3) float64 [m/s] of the vertices."""
         velocity, spin = self.solver.velocity(self.slot)
         middle, _ = self.solver.pose(self.slot)
         return velocity[:, None] + np.cross(spin[:, None], self.vertices(body) - middle[:, None])
 
-    def place(self, body: Body, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def place(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Put the body elsewhere; its velocities turn along."""
         motion = compose((position, quaternion), invert(self.pose(body)))
         velocity, spin = self.solver.velocity(self.slot)
@@ -267,12 +296,12 @@ class RigidDynamics(Dynamics):
         )
         self.solver.set_velocity(self.slot, quat.rotate(turn, velocity), quat.rotate(turn, spin))
 
-    def motion(self, body: Body) -> BodyMotion:
+    def motion(self, body: MovedBody) -> BodyMotion:
         """Return how the body moves."""
         place, turn = self.solver.pose(self.slot)
         return motion_of_rigid(self.mass, place, self.inertia, turn, *self.solver.velocity(self.slot))
 
-    def set_velocity(self, body: Body, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
+    def set_velocity(self, body: MovedBody, given: GivenVelocity, worlds: np.ndarray | None = None) -> None:
         """Give the body a velocity and an angular velocity, in all worlds or some (k,)."""
         place, _ = self.solver.pose(self.slot)
         linear, angular = given.at(place[:, None], place)[:, 0], given.angular
@@ -283,7 +312,7 @@ class RigidDynamics(Dynamics):
             linear, angular = own
         self.solver.set_velocity(self.slot, linear, angular)
 
-    def place_worlds(self, body: Body, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
+    def place_worlds(self, body: MovedBody, position: np.ndarray, quaternion: np.ndarray, worlds: np.ndarray) -> None:
         """Put the body elsewhere in some worlds (k,); its velocities turn along there."""
         before = {name: self.solver._read(name, self.slot).copy() for name in SAVED[:4]}
         self.place(body, position, quaternion)
@@ -291,7 +320,7 @@ class RigidDynamics(Dynamics):
             kept[worlds] = self.solver._read(name, self.slot)[worlds]
             self.solver._write(name, self.slot, kept)
 
-    def elastic_energy(self, body: Body) -> np.ndarray:
+    def elastic_energy(self, body: MovedBody) -> np.ndarray:
         """Return (worlds,) [J]: none, for it does not deform."""
         return np.zeros(self.world_count)
 
@@ -349,40 +378,9 @@ def _padded_alike(a: np.ndarray, b: np.ndarray, name: str) -> tuple[np.ndarray, 
     return np.pad(a, pads[0], constant_values=fill), np.pad(b, pads[1], constant_values=fill)
 
 
-def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
-    """Return the parts of a body in its own frame, in the shape that it has now."""
-    from nuno.shapes.compound import Compound
-    from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
-
-    plain = isinstance(body.shape, Box | Sphere | Capsule | Cylinder | Plane | Compound)
-    # the same bits wherever the body is
-    vertices = None if plain and body._deformed is None else body.local_vertices()
-    if moves and body._deformed is not None:
-        vertices = one_shape(body)
-    return rigid_shape(body.shape, moves=moves, thickness=body.thickness, vertices=vertices, is_solid=body.is_solid)
-
-
 def _dynamics_of(body: Body) -> RigidDynamics | None:
     own = body._dynamics
     return own if isinstance(own, RigidDynamics) else None
-
-
-def mass_of(body: Body, material: Rigid, density: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass (worlds,), inertia (worlds, 3, 3) about the centre of mass, and that (3,)."""
-    if material.mass is not None and material.inertia is not None and material.centre_of_mass is not None:
-        mass = np.broadcast_to(np.asarray(material.mass, dtype=float), density.shape)
-        return mass, np.broadcast_to(material.inertia, (len(mass), 3, 3)), np.asarray(material.centre_of_mass)
-    vertices = one_shape(body) if body._deformed is not None else None
-    unit = mass_properties(body.shape, thickness=body.thickness, vertices=vertices)
-    mass = density * unit.volume
-    inertia = density[:, None, None] * unit.inertia
-    if material.mass is not None:
-        given = np.broadcast_to(np.asarray(material.mass, dtype=float), mass.shape)
-        inertia, mass = inertia * (given / mass)[:, None, None], given
-    if material.inertia is not None:
-        inertia = np.broadcast_to(material.inertia, inertia.shape)
-    centre = unit.centre if material.centre_of_mass is None else np.asarray(material.centre_of_mass)
-    return mass, inertia, centre
 
 
 def _replaced(numbers: np.ndarray, by: dict[int, int]) -> np.ndarray:

@@ -1,0 +1,1 @@
+"""Dynamics: what a body has while it is attached, for particles and for rigid bodies."""
