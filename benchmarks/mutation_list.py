@@ -129,9 +129,9 @@ MUTATIONS = (
     # files, snapshots, search
     ("files", "world/recording.py", "frames.append(frames[-1] if still else vertices)",
      "frames.append(frames[-1] if frames else vertices)",
-     "files/test_recording.py"),
+     "world/test_recording.py"),
     ("files", "world/recording.py", "if len(vertices) not in (1, frames):", "if len(vertices) > frames:",
-     "files/test_recording.py"),
+     "world/test_recording.py"),
     ("files", "files/whole_file.py", "            partial.unlink()", "            pass", "files/test_whole_file.py"),
     ("files", "world/snapshot_file.py", "if version < ORIGIN and moving:", "if version < ORIGIN - 1 and moving:",
      "world/test_snapshot.py"),

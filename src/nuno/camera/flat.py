@@ -106,7 +106,7 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
 
 
 def _covers_rim(blob: np.ndarray, surface: np.ndarray) -> bool:
-    """Return whether a region (h, w) bool goes all around a surface (h, w) bool, so that it is no cloth on it."""
+    """Return True if a region (h, w) bool goes all around a surface (h, w) bool, so that it is no cloth on it."""
     ring = surface & ~shrink(surface, 1)
     return bool((blob & ring).sum() > 0.9 * ring.sum())
 
