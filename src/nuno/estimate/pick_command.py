@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 from nuno.errors import InvalidInputError
@@ -62,7 +60,6 @@ def run_pick(options: argparse.Namespace) -> str:
     check_out_folder(options.out)
     case = read_case(options.case)
     start_warp()
-    Thread(target=_load_drawing, name="nuno-drawing", daemon=True).start()
     grid = (int(parts[0]), int(parts[1]))
     device = device_of_command(options.device, KERNELS) if options.engine == "nuno" else options.device
     result = case.estimate(
@@ -76,10 +73,3 @@ def run_pick(options: argparse.Namespace) -> str:
         f"picked at {place}, confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'} and result.png\n"
     )
-
-
-def _load_drawing() -> None:
-    """Load what draws result.png, while picks are imagined; where it is missing, saving the result says so."""
-    with contextlib.suppress(ImportError):
-        import matplotlib.backends.backend_agg
-        import matplotlib.gridspec  # noqa: F401
