@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from functools import wraps
+from functools import cache, wraps
 from inspect import Parameter, signature
 from typing import Any, ParamSpec, TypeVar
 
@@ -228,10 +228,15 @@ def check_fields(record: Any) -> None:
     Raises:
         InvalidInputError: one is of another type.
     """
-    known = vars(sys.modules[type(record).__module__])
-    for field in fields(record):
-        if field.init:
-            _check(field.name, getattr(record, field.name), _rule(str(field.type), known))
+    for name, rule in _field_rules(type(record)):
+        _check(name, getattr(record, name), rule)
+
+
+@cache
+def _field_rules(kind: type) -> tuple[tuple[str, Rule], ...]:
+    """The rules of a dataclass's fields, which are read once: some are made hundreds of times, as a fit goes on."""
+    known = vars(sys.modules[kind.__module__])
+    return tuple((field.name, _rule(str(field.type), known)) for field in fields(kind) if field.init)
 
 
 def _check(name: str, value: Any, rule: Rule) -> None:

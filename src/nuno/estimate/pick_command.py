@@ -10,7 +10,7 @@ from nuno.errors import InvalidInputError
 from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.files.out_folder import check_out_folder
 from nuno.kernels.command_device import device_of_command
-from nuno.kernels.start_warp import importing_kernels, start_warp
+from nuno.kernels.start_warp import begin_to_start_warp, importing_kernels
 
 KERNELS = "nuno.plans.run_blocks_shared"
 """Of a batch of picks on CUDA, compiled for about a minute."""
@@ -48,6 +48,9 @@ def add_pick(commands: Any) -> argparse.ArgumentParser:
 def run_pick(options: argparse.Namespace) -> str:
     """Estimate where a cloth was picked, write the result, and return what to tell."""
     with importing_kernels():
+        import warp  # noqa: F401 (before a thread does)
+
+        starting = begin_to_start_warp()
         from nuno.estimate.case import read_case
 
     parts = options.candidates.lower().split("x")
@@ -59,7 +62,7 @@ def run_pick(options: argparse.Namespace) -> str:
         raise InvalidInputError(f"--sideways must be a number or none, got {options.sideways!r}") from None
     check_out_folder(options.out)
     case = read_case(options.case)
-    start_warp()
+    starting.result()
     grid = (int(parts[0]), int(parts[1]))
     device = device_of_command(options.device, KERNELS) if options.engine == "nuno" else options.device
     result = case.estimate(
