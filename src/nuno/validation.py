@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from functools import cache, wraps
+from functools import wraps
 from inspect import Parameter, signature
 from typing import Any, ParamSpec, TypeVar
 
@@ -29,6 +29,8 @@ LONGEST_WAIT = 3600.0
 """[s] The longest that a pick is lifted, or a fold or a load waited for, frame by frame in memory."""
 MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
+
+_field_rules: dict[type, list[tuple[str, Rule]]] = {}  # of dataclasses, by field
 
 
 def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError) -> np.ndarray:
@@ -228,15 +230,12 @@ def check_fields(record: Any) -> None:
     Raises:
         InvalidInputError: one is of another type.
     """
-    for name, rule in _field_rules(type(record)):
+    kind = type(record)
+    if kind not in _field_rules:  # once: some are made hundreds of times, as a fit goes on
+        known = vars(sys.modules[kind.__module__])
+        _field_rules[kind] = [(field.name, _rule(str(field.type), known)) for field in fields(kind) if field.init]
+    for name, rule in _field_rules[kind]:
         _check(name, getattr(record, name), rule)
-
-
-@cache
-def _field_rules(kind: type) -> tuple[tuple[str, Rule], ...]:
-    """The rules of a dataclass's fields, which are read once: some are made hundreds of times, as a fit goes on."""
-    known = vars(sys.modules[kind.__module__])
-    return tuple((field.name, _rule(str(field.type), known)) for field in fields(kind) if field.init)
 
 
 def _check(name: str, value: Any, rule: Rule) -> None:

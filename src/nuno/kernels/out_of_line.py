@@ -1,32 +1,29 @@
-"""Functions that the compiler for the CPU is to leave out of line: long ones that are called often in the source.
+"""Phases of a substep that the compiler for the CPU is to leave out of line.
 
-Everything would be put into one kernel, some of it several times: `nuno.numbers.lanes.per_world` in 25 places, the
-distance to a box in five. Most of these functions run once a frame, or for the few particles near an edge; the rest is
-so long that a call does not count. What it brings and costs: docs/reports/profiles.md.
+It would put everything into one function of 100,000 lines and more, on which it takes longer than on its parts. What is
+listed here is long and takes no lanes by value, so that a call does not count beside what it does. What it brings and
+costs: docs/reports/profiles.md.
 """
 
 OUT_OF_LINE = frozenset(
     f"nuno.{module}.{name}"
     for module, names in {
         "constraints.damping": ("damp_bends",),
-        "constraints.grips": ("key_position", "pull_points", "read_loads"),
-        "constraints.membrane": ("stretch_grid_line",),
-        "contact.particle.distances": ("distance_box", "distance_solid", "gap_mesh", "mesh_gap"),
-        "contact.particle.feature_contact": ("find_active_features", "push_active", "push_elements"),
-        "contact.particle.feature_lists": ("mark_features", "stands_between"),
-        "contact.particle.feature_points": (
-            "across_edge", "edge_point", "outermost", "past_box_edge", "triangle_point",
-        ),
-        "contact.particle.feature_pose": ("measured",),
-        "contact.particle.hull": ("distance_hull", "meets_ridges", "outermost_corner", "way_into_hull"),
+        "constraints.grips": ("hold_vertices", "pull_points", "read_loads"),
+        "contact.particle.distances": ("mesh_gap",),
+        "contact.particle.feature_lists": ("mark_features", "slack_of"),
+        "contact.particle.hull": ("outermost_corner",),
         "contact.particle.hull_grid": ("top_of",),
         "contact.particle.hull_ridges": ("hull_edge_point",),
-        "contact.particle.kinematic_pose": ("kinematic_position", "kinematic_rotation"),
-        "contact.particle.shape_contact": ("select_shapes",),
-        "contact.self.list_rebuild": ("rebuild_lists",),
-        "contact.self.narrow_phase": ("closest_on_edges",),
-        "numbers.lanes": ("per_world",),
+        "contact.particle.shape_contact": ("select_shapes", "touch_shape"),
+        "contact.self.cpu_search": ("list_world",),
+        "contact.self.list_rebuild": ("measure_moves", "rebuild_lists"),
+        "contact.self.self_contact": ("take_moves", "touch_edge_edge", "touch_vertex_triangle"),
+        "plans.cloth_elastic": ("bend_sheet", "sweep_membrane"),
+        "plans.substep": ("advance",),
+        "state.cloth_state": ("view",),
+        "state.integrate": ("predict",),
     }.items()
     for name in names
-)  # fmt: skip
+)
 """Their modules and names."""

@@ -38,15 +38,19 @@ def pass_structs_by_reference() -> bool:
             options["inline_hint"] = options.get("inline_hint") or "forceinline"
         elif f"{adj.func.__module__}.{adj.fun_name}" in OUT_OF_LINE:
             options["inline_hint"] = "noinline"
-        return _with_references(adj, write(adj, *args, **options))
+        return _with_references(adj, write(adj, *args, **options), options.get("device", "cpu"))
 
     codegen_func.passes_structs_by_reference = True  # type: ignore[attr-defined]
     codegen.codegen_func = codegen_func
     return True
 
 
-def _with_references(adj: Any, text: str) -> str:
-    """The C++ text of a function with references for the structs that it only reads."""
+def _with_references(adj: Any, text: str, device: str) -> str:
+    """The C++ text of a function with references for the structs that it only reads.
+
+    For the CPU they are also said to be written by nobody else meanwhile: a function out of line would read their
+    fields again after every number that it writes.
+    """
     from warp._src.codegen import Struct
 
     assigned = assignments(adj.tree)
@@ -55,7 +59,8 @@ def _with_references(adj: Any, text: str) -> str:
         if isinstance(arg.type, Struct) and not any(
             name == arg.label and _changes(arg.type, fields, in_array) for name, fields, in_array in assigned
         ):
-            head = head.replace(f"{arg.ctype()} {arg.emit()}", f"{arg.ctype()}& {arg.emit()}", 1)
+            passed = "& __restrict__ " if device == "cpu" else "& "
+            head = head.replace(f"{arg.ctype()} {arg.emit()}", f"{arg.ctype()}{passed}{arg.emit()}", 1)
     return head + brace + body
 
 
