@@ -20,8 +20,6 @@ OUT_OF_LINE = frozenset(
         "contact.self.list_rebuild": ("measure_moves", "rebuild_lists"),
         "contact.self.self_contact": ("take_moves", "touch_edge_edge", "touch_vertex_triangle"),
         "plans.cloth_elastic": ("bend_sheet", "sweep_membrane"),
-        "plans.substep": ("advance",),
-        "state.cloth_state": ("view",),
         "state.integrate": ("predict",),
     }.items()
     for name in names
