@@ -1,9 +1,11 @@
 """CPU seconds of six scenes, this version and another by turns, so that other work on the machine changes neither.
 
     python benchmarks/compare_versions.py OTHER [--scenes picks hang ...] [--rounds 3] [--device cpu] [--json FILE]
+                                          [--caches FOLDER]
 
 OTHER is the src folder of another checkout (git worktree add ../other COMMIT). Each run is a process of its own, which
-warms up for two frames. On CUDA the seconds are by the clock, as the processor waits.
+warms up for two frames. Kernels that both compile otherwise from the same Python text need a cache each (--caches), for
+Warp tells them apart by that text. On CUDA the seconds are by the clock, as the processor waits.
 """
 
 from __future__ import annotations
@@ -137,6 +139,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--caches", type=Path, help="folder with a kernel cache for each (default: one for both)")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -146,10 +149,12 @@ def main() -> None:
         sys.exit(f"no package nuno in {options.other}: give the src folder of another checkout")
     spent: dict[str, tuple[list[float], list[float]]] = {scene: ([], []) for scene in options.scenes}
     for scene, times in tqdm([(scene, spent[scene]) for _ in range(options.rounds) for scene in options.scenes]):
-        for source, own in zip((options.other, HERE), times, strict=True):
+        for name, source, own in zip(("other", "here"), (options.other, HERE), times, strict=True):
             command = [sys.executable, __file__, str(options.other), "--one", "--scenes", scene]
             paths = [str(source.resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
             environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+            if options.caches is not None:
+                environment["WARP_CACHE_PATH"] = str(options.caches.resolve() / name)
             done = subprocess.run(
                 [*command, "--device", options.device], env=environment, capture_output=True, text=True
             )  # fmt: skip

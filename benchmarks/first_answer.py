@@ -32,8 +32,9 @@ AT_MOST = 170.0
 
 
 def environment(cache: str) -> dict[str, str]:
-    """Return the environment of a command with a kernel cache of its own."""
-    return os.environ | {"WARP_CACHE_PATH": cache, "PYTHONPATH": str(ROOT / "src"), "CUDA_CACHE_DISABLE": "1"}
+    """Return the environment of a command with a kernel cache of its own, in which Python keeps its bytecode."""
+    own = {"WARP_CACHE_PATH": cache, "PYTHONPATH": str(ROOT / "src"), "CUDA_CACHE_DISABLE": "1"}
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | own
 
 
 def answer(name: str, cache: str, device: str) -> dict[str, Any]:

@@ -49,13 +49,19 @@ def scene(radius=0):
 
 
 def test_a_small_grid_end_to_end(tmp_path):
-    """``python -m nuno pick`` in a process of its own: status 0, one line, result.json and result.png."""
+    """``python -m nuno pick`` in a process of its own: status 0, one line, both files; without Matplotlib."""
     out = tmp_path / "new" / "out"
-    command = [sys.executable, "-m", "nuno", "pick", str(CASE), "--out", str(out), "--device", "cpu"]
-    done = subprocess.run([*command, "--candidates", "2x2"], capture_output=True, text=True, timeout=500)
+    python = [sys.executable, "-X", "importtime"]
+    command = [*python, "-m", "nuno", "pick", str(CASE), "--out", str(out), "--device", "cpu", "--candidates", "2x2"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("picked at (0, 0), confidence ") and done.stdout.count("\n") == 1
-    assert done.stderr == ""
+    imported, said = [], []
+    for line in done.stderr.splitlines():
+        (imported if line.startswith("import time:") else said).append(line)
+    assert said == []
+    assert any(line.endswith(" warp") for line in imported)
+    assert not any(line.split("|")[-1].strip().startswith("matplotlib") for line in imported)
     check_result(json.loads((out / "result.json").read_text()), 2, 2)
     picture = cv2.imread(str(out / "result.png"))
     assert picture is not None and min(picture.shape[:2]) > 400

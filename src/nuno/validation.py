@@ -30,6 +30,8 @@ LONGEST_WAIT = 3600.0
 MAX_COUNT = 2**31 - 1
 """A count beyond this fits no index of a kernel."""
 
+_field_rules: dict[type, list[tuple[str, Rule]]] = {}  # of dataclasses, by field
+
 
 def finite_array(name: str, value: Any, *shapes: Shape, error: type[Exception] = InvalidInputError) -> np.ndarray:
     """Return ``value`` as a new float64 array of one of the given shapes.
@@ -228,10 +230,12 @@ def check_fields(record: Any) -> None:
     Raises:
         InvalidInputError: one is of another type.
     """
-    known = vars(sys.modules[type(record).__module__])
-    for field in fields(record):
-        if field.init:
-            _check(field.name, getattr(record, field.name), _rule(str(field.type), known))
+    kind = type(record)
+    if kind not in _field_rules:  # once: some are made hundreds of times, as a fit goes on
+        known = vars(sys.modules[kind.__module__])
+        _field_rules[kind] = [(field.name, _rule(str(field.type), known)) for field in fields(kind) if field.init]
+    for name, rule in _field_rules[kind]:
+        _check(name, getattr(record, name), rule)
 
 
 def _check(name: str, value: Any, rule: Rule) -> None:

@@ -1,5 +1,7 @@
 """Kernels compiled ahead: all that an estimate launches on the CPU, and what goes wrong comes to light."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -109,3 +111,40 @@ def test_a_batch_waits_for_its_kernels(monkeypatch, caplog):
         stages.end("imagine")
     assert compiled.is_set() and stages.seconds["compile"] > 0.0
     assert len(caplog.messages) == 1 and module in caplog.text and "waited" in caplog.text
+
+
+@pytest.mark.long
+def test_hashes_do_not_hang_on_what_is_imported_meanwhile():
+    """A module has the same hash, and so is found in the cache, also while all other kernels are being declared."""
+    program = """
+import threading
+from importlib import import_module
+import warp as wp
+wp.config.log_level = wp.LOG_ERROR
+wp.init()
+from nuno.camera import extent, raster
+from nuno.estimate import compile_ahead, pattern, similarity
+from nuno.kernels.kernel_modules import kernel_sources
+from nuno.plans.cloth_worlds import run_lanes
+from nuno.state import pack
+modules = [run_lanes.module, *(wp.get_module(part.__name__) for part in (pack, extent, raster, similarity, pattern))]
+found, done = [], threading.Event()
+def hash_again():
+    while True:
+        over = done.is_set()
+        for module in modules:
+            module.hashers.clear()
+        found.append(tuple(module.get_module_hash(1) for module in modules))
+        if over:
+            return
+thread = threading.Thread(target=hash_again)
+thread.start()
+for source in kernel_sources():
+    import_module(source)
+done.set()
+thread.join()
+print(len(found), len(set(found)))
+"""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=300)
+    times, different = map(int, run.stdout.split())
+    assert times >= 2 and different == 1  # at least one while others were declared, and the last after all

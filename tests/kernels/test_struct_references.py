@@ -2,12 +2,15 @@
 
 import ast
 import re
+from importlib import import_module
 
 import pytest
 import warp as wp
 from warp._src import codegen
 
+from nuno.kernels import struct_references
 from nuno.kernels.kernel_modules import kernel_modules
+from nuno.kernels.out_of_line import OUT_OF_LINE
 from nuno.kernels.struct_references import assignments, pass_structs_by_reference
 
 
@@ -73,8 +76,29 @@ def test_what_changes_its_struct_has_a_copy(by_value, function, kept):
     made.adj.build(None)
     for device in ("cpu", "cuda"):
         head = codegen.codegen_func(made.adj, "f", device=device, inline_hint=None).partition("\n{")[0]
-        assert re.search(r"Holder_\w+ var_t" if kept else r"Holder_\w+& var_t", head)
+        passed = " " if kept else "& __restrict__ " if device == "cpu" else "& "
+        assert re.search(rf"Holder_\w+{passed}var_t", head)
         assert ("WP_FORCEINLINE" in head) == (device == "cuda")
+
+
+def test_out_of_line_on_the_cpu_alone(by_value, monkeypatch):
+    """A function that is listed is kept out of line there; CUDA inlines it like any other."""
+    monkeypatch.setattr(struct_references, "OUT_OF_LINE", {"nuno.tests._count"})
+    assert pass_structs_by_reference()
+    for function in (_read, _count):
+        function.__module__ = "nuno.tests"
+        made = wp.Function(function, function.__name__, "nuno", module=wp.get_module(__name__))
+        made.adj.build(None)
+        text = {device: codegen.codegen_func(made.adj, "f", device=device) for device in ("cpu", "cuda")}
+        assert ("WP_NOINLINE" in text["cpu"]) == (function is _count)
+        assert "WP_NOINLINE" not in text["cuda"]
+
+
+@pytest.mark.parametrize("name", sorted(OUT_OF_LINE))
+def test_every_listed_function_is_there(name):
+    """What is kept out of line is a function of Nuno's kernels; one that is renamed must be renamed in the list."""
+    module, _, function = name.rpartition(".")
+    assert isinstance(getattr(import_module(module), function), wp.Function)
 
 
 def test_functions_of_others_are_left(by_value):

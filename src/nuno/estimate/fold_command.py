@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from nuno.files.out_folder import check_out_folder
-from nuno.kernels.start_warp import start_warp
+from nuno.kernels.start_warp import begin_to_start_warp, importing_kernels
 
 
 def add_fold(commands: Any) -> argparse.ArgumentParser:
@@ -22,11 +22,15 @@ def add_fold(commands: Any) -> argparse.ArgumentParser:
 
 def run_fold(options: argparse.Namespace) -> str:
     """Replay a fold, write the result, and return what to tell."""
-    from nuno.estimate.fold_case import read_fold_case
+    with importing_kernels():
+        import warp  # noqa: F401 (before a thread does)
+
+        starting = begin_to_start_warp()
+        from nuno.estimate.fold_case import read_fold_case
 
     check_out_folder(options.out)
     case = read_fold_case(options.case)
-    start_warp()
+    starting.result()
     result = case.replay(device=options.device, progress=options.progress)
     result.save(options.out, names=case.names)
     agreement = list(result.agreement.values())

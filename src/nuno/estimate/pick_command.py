@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 from nuno.errors import InvalidInputError
 from nuno.estimate.lift_prior import HAND_STD, SIDEWAYS
 from nuno.files.out_folder import check_out_folder
 from nuno.kernels.command_device import device_of_command
-from nuno.kernels.start_warp import importing_kernels, start_warp
+from nuno.kernels.start_warp import begin_to_start_warp, importing_kernels
 
 KERNELS = "nuno.plans.run_blocks_shared"
 """Of a batch of picks on CUDA, compiled for about a minute."""
@@ -50,6 +48,9 @@ def add_pick(commands: Any) -> argparse.ArgumentParser:
 def run_pick(options: argparse.Namespace) -> str:
     """Estimate where a cloth was picked, write the result, and return what to tell."""
     with importing_kernels():
+        import warp  # noqa: F401 (before a thread does)
+
+        starting = begin_to_start_warp()
         from nuno.estimate.case import read_case
 
     parts = options.candidates.lower().split("x")
@@ -61,8 +62,7 @@ def run_pick(options: argparse.Namespace) -> str:
         raise InvalidInputError(f"--sideways must be a number or none, got {options.sideways!r}") from None
     check_out_folder(options.out)
     case = read_case(options.case)
-    start_warp()
-    Thread(target=_load_drawing, name="nuno-drawing", daemon=True).start()
+    starting.result()
     grid = (int(parts[0]), int(parts[1]))
     device = device_of_command(options.device, KERNELS) if options.engine == "nuno" else options.device
     result = case.estimate(
@@ -76,10 +76,3 @@ def run_pick(options: argparse.Namespace) -> str:
         f"picked at {place}, confidence {result.confidence:.2f}, in {result.seconds['total']:.1f} s; "
         f"see {Path(options.out) / 'result.json'} and result.png\n"
     )
-
-
-def _load_drawing() -> None:
-    """Load what draws result.png, while picks are imagined; where it is missing, saving the result says so."""
-    with contextlib.suppress(ImportError):
-        import matplotlib.backends.backend_agg
-        import matplotlib.gridspec  # noqa: F401

@@ -5,8 +5,9 @@ the compiler's optimiser spends most of its time on taking the copies apart agai
 125 s of CPU time by value and 57 s by reference, with the same instructions in the end; of `nuno.plans.run_lanes` on
 the CPU a fifth. Warp has a public annotation for this (``wp.ref[T]``), but not for functions that are generic in the
 type, as most of Nuno's are. So the C++ text of a function's parameters is changed where Warp writes it, and only for
-functions of Nuno; for CUDA all of them are inlined by force as well, as its compiler would leave some apart and the
-state in memory then. A parameter that its function changes, as a whole or in a field, stays a copy.
+functions of Nuno. For CUDA all of them are inlined by force as well, as its compiler would leave some apart and the
+state in memory then; for the CPU some are kept out of line (`nuno.kernels.out_of_line`). A parameter that its function
+changes, as a whole or in a field, stays a copy.
 
 What is changed is private to Warp. Where a version of Warp has another form of it, nothing is changed and kernels take
 longer to compile; `tests/kernels/test_struct_references.py` says so.
@@ -16,6 +17,8 @@ from __future__ import annotations
 
 import ast
 from typing import Any
+
+from nuno.kernels.out_of_line import OUT_OF_LINE
 
 
 def pass_structs_by_reference() -> bool:
@@ -33,15 +36,21 @@ def pass_structs_by_reference() -> bool:
             return write(adj, *args, **options)
         if options.get("device", "cpu") == "cuda":
             options["inline_hint"] = options.get("inline_hint") or "forceinline"
-        return _with_references(adj, write(adj, *args, **options))
+        elif f"{adj.func.__module__}.{adj.fun_name}" in OUT_OF_LINE:
+            options["inline_hint"] = "noinline"
+        return _with_references(adj, write(adj, *args, **options), options.get("device", "cpu"))
 
     codegen_func.passes_structs_by_reference = True  # type: ignore[attr-defined]
     codegen.codegen_func = codegen_func
     return True
 
 
-def _with_references(adj: Any, text: str) -> str:
-    """The C++ text of a function with references for the structs that it only reads."""
+def _with_references(adj: Any, text: str, device: str) -> str:
+    """The C++ text of a function with references for the structs that it only reads.
+
+    For the CPU they are also said to be written by nobody else meanwhile: a function out of line would read their
+    fields again after every number that it writes.
+    """
     from warp._src.codegen import Struct
 
     assigned = assignments(adj.tree)
@@ -50,7 +59,8 @@ def _with_references(adj: Any, text: str) -> str:
         if isinstance(arg.type, Struct) and not any(
             name == arg.label and _changes(arg.type, fields, in_array) for name, fields, in_array in assigned
         ):
-            head = head.replace(f"{arg.ctype()} {arg.emit()}", f"{arg.ctype()}& {arg.emit()}", 1)
+            passed = "& __restrict__ " if device == "cpu" else "& "
+            head = head.replace(f"{arg.ctype()} {arg.emit()}", f"{arg.ctype()}{passed}{arg.emit()}", 1)
     return head + brace + body
 
 
