@@ -14,7 +14,7 @@ from nuno.constraints.taut_lines import excess, turned_among
 from nuno.numbers.element_access import at, corner
 from nuno.numbers.lanes import add, mul, sub  # noqa: F401 (the operators)
 from nuno.numbers.tridiagonal import free_row
-from nuno.numbers.vec3 import Vec3, move, position, vec3
+from nuno.numbers.vec3 import move, position, vec3
 from nuno.numbers.warp_lanes import SHUFFLES, Lane
 from nuno.numbers.warps import any_of_warp
 from nuno.state.cloth_state import Topology
@@ -26,24 +26,21 @@ WARP_EDGES = wp.constant(256)
 """Edges of the longest grid line that a warp takes together: eight rows a thread."""
 
 _NEIGHBOURS = """
-constexpr int ROWS = sizeof(v.data) / sizeof(v.data[0]);
-auto r = v;
-for (int c = 0; c < 3; ++c) {
-    if (shift < 32) {
-        float s[ROWS];
-        for (int j = 0; j < ROWS; ++j) s[j] = shuffle(v.data[j][c], (lane DIRECTION shift) & 31);
-        for (int j = 0; j < ROWS; ++j) {
-            const int i = j DIRECTION 1;
-            const bool within = lane DIRECTION shift >= 0 && lane DIRECTION shift < 32;
-            r.data[j][c] = within ? s[j] : (i >= 0 && i < ROWS && !apart ? s[i >= 0 && i < ROWS ? i : j] : 0.f);
-        }
-    } else {
+constexpr int ROWS = sizeof(v) / sizeof(v[0]);
+wp::vec_t<ROWS, wp::float32> s, r;
+if (shift < 32) {
+    for (int j = 0; j < ROWS; ++j) s[j] = shuffle(v[j], (lane DIRECTION shift) & 31);
+    for (int j = 0; j < ROWS; ++j) {
+        const int i = j DIRECTION 1;
+        const bool within = lane DIRECTION shift >= 0 && lane DIRECTION shift < 32;
+        r[j] = within ? s[j] : (i >= 0 && i < ROWS && !apart ? s[i >= 0 && i < ROWS ? i : j] : 0.f);
+    }
+} else {
+    #pragma unroll
+    for (int j = 0; j < ROWS; ++j) {
+        r[j] = 0.f;
         #pragma unroll
-        for (int j = 0; j < ROWS; ++j) {
-            r.data[j][c] = 0.f;
-            #pragma unroll
-            for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == (DIRECTION shift)) r.data[j][c] = v.data[i][c];
-        }
+        for (int i = 0; i < ROWS; ++i) if (32 * (i - j) == (DIRECTION shift)) r[j] = v[i];
     }
 }
 return r;
@@ -52,51 +49,34 @@ return r;
 
 _BEFORE, _AFTER = (SHUFFLES + _NEIGHBOURS.replace("DIRECTION", sign) for sign in "-+")
 one, two, eight = (wp.types.vector(length=rows, dtype=float) for rows in (1, 2, 8))
-one3, two3, eight3 = (wp.types.matrix(shape=(rows, 3), dtype=float) for rows in (1, 2, 8))
 
 
 @wp.func_native(_BEFORE)
-def rows_before(exchanged: wp.array(dtype=float), lane: int, v: one3, shift: int, apart: bool) -> one3:
-    """The three numbers of each row ``shift`` before; of two grid lines ``apart`` each thread has a row of either."""
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: one, shift: int, apart: bool) -> one:
+    """The values of the rows ``shift`` before; of two grid lines ``apart`` each thread has a row of either."""
     ...
 
 
 @wp.func_native(_BEFORE)
-def rows_before(exchanged: wp.array(dtype=float), lane: int, v: two3, shift: int, apart: bool) -> two3: ...
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: two, shift: int, apart: bool) -> two: ...
 
 
 @wp.func_native(_BEFORE)
-def rows_before(exchanged: wp.array(dtype=float), lane: int, v: eight3, shift: int, apart: bool) -> eight3: ...
+def rows_before(exchanged: wp.array(dtype=float), lane: int, v: eight, shift: int, apart: bool) -> eight: ...
 
 
 @wp.func_native(_AFTER)
-def rows_after(exchanged: wp.array(dtype=float), lane: int, v: one3, shift: int, apart: bool) -> one3:
-    """The three numbers of each row ``shift`` after."""
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: one, shift: int, apart: bool) -> one:
+    """The values of the rows ``shift`` after."""
     ...
 
 
 @wp.func_native(_AFTER)
-def rows_after(exchanged: wp.array(dtype=float), lane: int, v: two3, shift: int, apart: bool) -> two3: ...
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: two, shift: int, apart: bool) -> two: ...
 
 
 @wp.func_native(_AFTER)
-def rows_after(exchanged: wp.array(dtype=float), lane: int, v: eight3, shift: int, apart: bool) -> eight3: ...
-
-
-@wp.func
-def row(rows: Any, j: int):
-    """The vector of row j."""
-    return vec3(rows[j, 0], rows[j, 1], rows[j, 2])
-
-
-@wp.func
-def with_row(rows: Any, j: int, v: Vec3):
-    """The rows with another vector in row j."""
-    changed = rows
-    changed[j, 0] = v.x
-    changed[j, 1] = v.y
-    changed[j, 2] = v.z
-    return changed
+def rows_after(exchanged: wp.array(dtype=float), lane: int, v: eight, shift: int, apart: bool) -> eight: ...
 
 
 def _solver(rows: int, apart: bool) -> Any:
@@ -104,7 +84,7 @@ def _solver(rows: int, apart: bool) -> Any:
 
     Row k of the system is in thread k % 32; of two grid lines apart each thread has a row of either.
     """
-    vector, vectors = {1: (one, one3), 2: (two, two3), 8: (eight, eight3)}[rows]
+    vector = {1: one, 2: two, 8: eight}[rows]
     steps = 5 if apart else (32 * rows).bit_length() - 1
 
     @wp.func(name=f"solve_{rows}_rows{'_apart' * apart}")
@@ -113,8 +93,10 @@ def _solver(rows: int, apart: bool) -> Any:
         rate: float, own: Lane,
     ):  # fmt: skip
         """Solve the ``count`` edges of a grid line from ``first`` on, and where apart ``more`` from ``other`` on."""
-        along = vectors()
-        system = vectors()  # of each row the entries below and above the diagonal, and the right side
+        x = vector()
+        y = vector()
+        z = vector()
+        right = vector()
         scale = vector()
         light = vector()
         goal = vector()
@@ -127,40 +109,58 @@ def _solver(rows: int, apart: bool) -> Any:
             b = corner(table.edge, e, 1, 2)
             direction, length, _inverse = edge_direction(position(t, a), position(t, b))
             light[j] = at(t.w, a) + at(t.w, b)
-            along = with_row(along, j, direction)
+            x[j] = direction.x
+            y[j] = direction.y
+            z[j] = direction.z
             alpha = stretch_alpha(at(t.stretch_compliance, table.edge_compliance[e]), table.edge_scale[e], rate)
             goal[j] = at(rest, e)
-            system[j, 2] = wp.where(mine, goal[j] - length, 0.0)
+            right[j] = wp.where(mine, goal[j] - length, 0.0)
             scale[j] = 1.0 / edge_diagonal(at(t.w, a), at(t.w, b), alpha)
-        before = rows_before(own.exchanged, own.lane, along, 1, wp.static(apart))
+        bx = rows_before(own.exchanged, own.lane, x, 1, wp.static(apart))
+        by = rows_before(own.exchanged, own.lane, y, 1, wp.static(apart))
+        bz = rows_before(own.exchanged, own.lane, z, 1, wp.static(apart))
+        low = vector()
         for j in range(wp.static(rows)):
             k = own.lane + wp.static(0 if apart else 32) * j
             begin = wp.where(wp.static(apart) and j > 0, other, first)
             linked = k > 0 and k < wp.where(wp.static(apart) and j > 0, more, count)
             a = corner(table.edge, wp.where(linked, begin + k, first), 0, 2)
-            coupling = edge_coupling(at(t.w, a), row(before, j), row(along, j))
-            system[j, 0] = wp.where(linked, coupling, 0.0)
-        after = rows_after(own.exchanged, own.lane, system, 1, wp.static(apart))
+            coupling = edge_coupling(at(t.w, a), vec3(bx[j], by[j], bz[j]), vec3(x[j], y[j], z[j]))
+            low[j] = wp.where(linked, coupling, 0.0)
+        high = rows_after(own.exchanged, own.lane, low, 1, wp.static(apart))
         for j in range(wp.static(rows)):
-            system[j, 1] = after[j, 0]
-            system = with_row(system, j, row(system, j) * scale[j])
+            low[j] = low[j] * scale[j]
+            high[j] = high[j] * scale[j]
+            right[j] = right[j] * scale[j]
         # unrolled, so that what a shift asks for is known; steps that are too many find nothing to link
         for p in range(wp.static(steps)):
-            before = rows_before(own.exchanged, own.lane, system, 1 << p, wp.static(apart))
-            after = rows_after(own.exchanged, own.lane, system, 1 << p, wp.static(apart))
+            low_before = rows_before(own.exchanged, own.lane, low, 1 << p, wp.static(apart))
+            high_before = rows_before(own.exchanged, own.lane, high, 1 << p, wp.static(apart))
+            right_before = rows_before(own.exchanged, own.lane, right, 1 << p, wp.static(apart))
+            low_after = rows_after(own.exchanged, own.lane, low, 1 << p, wp.static(apart))
+            high_after = rows_after(own.exchanged, own.lane, high, 1 << p, wp.static(apart))
+            right_after = rows_after(own.exchanged, own.lane, right, 1 << p, wp.static(apart))
             for j in range(wp.static(rows)):
-                low, high, right = free_row(
-                    system[j, 0], system[j, 1], system[j, 2], before[j, 0], before[j, 1], before[j, 2],
-                    after[j, 0], after[j, 1], after[j, 2],
+                freed_low, freed_high, freed_right = free_row(
+                    low[j], high[j], right[j], low_before[j], high_before[j], right_before[j],
+                    low_after[j], high_after[j], right_after[j],
                 )  # fmt: skip
-                system = with_row(system, j, vec3(low, high, right))
+                low[j] = freed_low
+                high[j] = freed_high
+                right[j] = freed_right
         taut = float(0.0)
         for j in range(wp.static(rows)):
-            taut = wp.max(taut, excess(system[j, 2], light[j], goal[j]))
-            along = with_row(along, j, row(along, j) * system[j, 2])
-        after = rows_after(own.exchanged, own.lane, along, 1, wp.static(apart))
+            taut = wp.max(taut, excess(right[j], light[j], goal[j]))
+            x[j] = x[j] * right[j]
+            y[j] = y[j] * right[j]
+            z[j] = z[j] * right[j]
+        nx = rows_after(own.exchanged, own.lane, x, 1, wp.static(apart))
+        ny = rows_after(own.exchanged, own.lane, y, 1, wp.static(apart))
+        nz = rows_after(own.exchanged, own.lane, z, 1, wp.static(apart))
         if any_of_warp(taut > 0.0):
-            before = rows_before(own.exchanged, own.lane, along, 1, wp.static(apart))
+            bx = rows_before(own.exchanged, own.lane, x, 1, wp.static(apart))
+            by = rows_before(own.exchanged, own.lane, y, 1, wp.static(apart))
+            bz = rows_before(own.exchanged, own.lane, z, 1, wp.static(apart))
             for j in range(wp.static(rows)):
                 k = own.lane + wp.static(0 if apart else 32) * j
                 begin = wp.where(wp.static(apart) and j > 0, other, first)
@@ -168,11 +168,15 @@ def _solver(rows: int, apart: bool) -> Any:
                     a = corner(table.edge, begin + k, 0, 2)
                     b = corner(table.edge, begin + k, 1, 2)
                     change = turned_among(
-                        position(t, a) - position(t, b), row(before, j), row(along, j), row(after, j), at(t.w, a),
-                        at(t.w, b), goal[j],
+                        position(t, a) - position(t, b), vec3(bx[j], by[j], bz[j]), vec3(x[j], y[j], z[j]),
+                        vec3(nx[j], ny[j], nz[j]), at(t.w, a), at(t.w, b), goal[j],
                     )  # fmt: skip
-                    along = with_row(along, j, row(along, j) + change)
-            after = rows_after(own.exchanged, own.lane, along, 1, wp.static(apart))
+                    x[j] = x[j] + change.x
+                    y[j] = y[j] + change.y
+                    z[j] = z[j] + change.z
+            nx = rows_after(own.exchanged, own.lane, x, 1, wp.static(apart))
+            ny = rows_after(own.exchanged, own.lane, y, 1, wp.static(apart))
+            nz = rows_after(own.exchanged, own.lane, z, 1, wp.static(apart))
         # all have read their ends before the first exchange, so that nothing is overwritten too soon
         for j in range(wp.static(rows)):
             k = own.lane + wp.static(0 if apart else 32) * j
@@ -180,9 +184,9 @@ def _solver(rows: int, apart: bool) -> Any:
             end = wp.where(wp.static(apart) and j > 0, more, count)
             if k < end:
                 b = corner(table.edge, begin + k, 1, 2)
-                pull = row(along, j)
+                pull = vec3(x[j], y[j], z[j])
                 # rows behind the last pull nothing
-                move(t, b, between_forces(at(t.w, b), row(after, j), pull))
+                move(t, b, between_forces(at(t.w, b), vec3(nx[j], ny[j], nz[j]), pull))
                 if k == 0:
                     a = corner(table.edge, begin, 0, 2)
                     move(t, a, at(t.w, a) * pull)
