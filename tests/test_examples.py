@@ -10,6 +10,8 @@ from PIL import Image
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
+SLOW = ("carry_mat", "hold_garment", "talos_fold")
+"""Those that take 20 to 40 s, and whose steps the long tests of `tests/tasks` and `tests/estimate` go through."""
 
 
 def _pictures_of():
@@ -23,8 +25,11 @@ def _pictures_of():
 pictures_of = _pictures_of()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=pytest.mark.slow if path.stem in SLOW else pytest.mark.long) for path in EXAMPLES],
+    ids=lambda path: path.stem,
+)
 def test_example(path, tmp_path, run_warm):
     """In a process of its own, without a display: its check holds, and a picture is all that it leaves."""
     folder = tmp_path / "here"
