@@ -62,8 +62,7 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     if not rim.any() and table.half_extents is None:
         return _surrounded(small, xy, hint)
     rim = rim if rim.sum() > 30 else surface
-    light = Illumination(small, np.where(rim, 1.0, 0.1) * surface)
-    flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, h), slice(0, w))))
+    flat = _without_light(small, np.where(rim, 1.0, 0.1) * surface)
     distance = _difference(cv2.blur(flat, (3, 3)), rim, surface)
     differs = (distance > _DIFFERENT) & (surface if box is None else surface & box)
     found = cv2.morphologyEx(differs.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
@@ -74,11 +73,10 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     failed = None
     try:
         blob = _choose(found, distance, pixel, xy if hint is None else None)
-        if not _covers_rim(blob, surface):
-            if _likeness(blob, xy) >= RECTANGLE:
-                return blob, surface
-        else:  # it is the table's border that differs from a cloth which covers most of the table
-            failed = ClothNotFoundError("no cloth: what differs from the rest of the table is its border")
+        if _covers_rim(blob, surface):  # the table's border, which differs from a cloth that covers most of the table
+            raise ClothNotFoundError("no cloth: what differs from the rest of the table is its border")
+        if _likeness(blob, xy) >= RECTANGLE:
+            return blob, surface
     except ClothNotFoundError as error:
         failed = error
     # A cloth much like the table may show by less difference over more blocks, and by its texture.
@@ -105,6 +103,12 @@ def first_look(rgb: np.ndarray, camera: Camera, table: Table, hint: np.ndarray |
     return blob, surface
 
 
+def _without_light(small: np.ndarray, weights: np.ndarray, degree: int = 2) -> np.ndarray:
+    """Return the logarithm (h, w, 3) of an image without the table's light, fitted where weights (h, w) are."""
+    light = Illumination(small, weights, degree=degree)
+    return np.asarray(np.log(np.maximum(small, 2.0) / light.field((slice(0, len(small)), slice(0, small.shape[1])))))
+
+
 def _covers_rim(blob: np.ndarray, surface: np.ndarray) -> bool:
     """Return True if a region (h, w) bool goes all around a surface (h, w) bool, so that it is no cloth on it."""
     ring = surface & ~shrink(surface, 1)
@@ -127,8 +131,7 @@ def _unlike_border(
         border = surface & (margin < width)
         if border.sum() < 30:
             continue
-        light = Illumination(small, border.astype(float), degree=1)
-        flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, small.shape[0]), slice(0, small.shape[1]))))
+        flat = _without_light(small, border.astype(float), degree=1)
         distance = _difference(cv2.blur(flat, (3, 3)), border, border)
         with suppress(ClothNotFoundError):
             blob = _choose(((distance > _DIFFERENT) & surface).astype(np.uint8), distance, pixel, xy)
@@ -145,8 +148,7 @@ def _unlike_far_rim(
     far = rim & (away > 0.5 * (away[rim].min() + away[rim].max()))
     if far.sum() < 30:
         raise ClothNotFoundError("no cloth: too little of the table's far rim is seen")
-    light = Illumination(small, far.astype(float), degree=1)
-    flat = np.log(np.maximum(small, 2.0) / light.field((slice(0, small.shape[0]), slice(0, small.shape[1]))))
+    flat = _without_light(small, far.astype(float), degree=1)
     distance = _difference(cv2.blur(flat, (3, 3)), far, surface)
     found = ((distance > _DIFFERENT) & surface).astype(np.uint8)
     blob = _choose(cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), distance, pixel, xy)
