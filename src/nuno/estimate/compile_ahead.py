@@ -7,7 +7,6 @@ compiled beside it.
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable
 
 import warp as wp
@@ -18,6 +17,7 @@ from nuno.kernels.kernel_cache import is_cached
 from nuno.kernels.module_loads import load_ahead, wait_for_load
 from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS, run_blocks_many, run_blocks_shared
 from nuno.plans.cloth_worlds import run_lanes
+from nuno.plans.cpu_threads import core_count
 from nuno.state import pack
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def compile_ahead(device: str) -> Callable[[], None]:
                 "compiling the kernels of %s beside the estimate, for about a minute: they are kept for later runs",
                 " and ".join(module.name for module, _ in batches),
             )
-        threads = max(2, len(os.sched_getaffinity(0)))
+        threads = max(2, core_count())
         load_ahead([*batches, *((part, None) for part in parts)], device, threads)
 
     def wait() -> None:

@@ -6,7 +6,6 @@ The state that comes out tells what vision alone cannot see: which parts lie und
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -31,6 +30,7 @@ from nuno.estimate.hypotheses import cell_counts
 from nuno.estimate.imagined_fold import ImaginedFold, imagine_fold
 from nuno.kernels.compile_watch import Stages, compiling_watched
 from nuno.materials import Cloth
+from nuno.plans.cpu_threads import core_count
 from nuno.validation import checked, count, finite_array, number
 from nuno.world.device import checked_device, found_device
 from nuno.world.progress import with_bar
@@ -322,7 +322,7 @@ def _segmented(
 
     found = {}
     # each image by itself, on a thread a core: NumPy and OpenCV let others run meanwhile
-    with ThreadPoolExecutor(min(max(len(near), 1), len(os.sched_getaffinity(0)), SEEING)) as threads:
+    with ThreadPoolExecutor(min(max(len(near), 1), core_count(), SEEING)) as threads:
         looking = {frame: threads.submit(look, frame) for frame in near}
         for frame in with_bar(list(near), "looking for the cloth", progress, "frame"):
             seen = looking[frame].result()

@@ -6,7 +6,6 @@ The experiment is that of Ueda et al. on the state of a picked-up cloth, its eq.
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -33,6 +32,7 @@ from nuno.estimate.rotations import TURNS
 from nuno.estimate.seeing import begin_to_see
 from nuno.estimate.table_doubt import TableDoubt, with_view_of_table
 from nuno.kernels.compile_watch import Stages, compiling_watched
+from nuno.plans.cpu_threads import core_count
 from nuno.validation import choice, number
 from nuno.world.progress import with_clock
 
@@ -171,7 +171,7 @@ def estimate_pick(
     wait_for_seen = begin_to_see(
         images.before, images.after, images.mask_before, images.mask_after, camera=settings.camera,
         table=settings.table, rectangle=rectangle, hand=settings.hand, hand_radius=hand_radius, hidden=images.hidden,
-        with_pattern=score == "evidence", meanwhile=settings.device != "cpu" or len(os.sched_getaffinity(0)) > 1,
+        with_pattern=score == "evidence", meanwhile=settings.device != "cpu" or core_count() > 1,
     )  # fmt: skip
     stages.end("see")
     with with_clock("compiling kernels, which are kept for later runs", progress):

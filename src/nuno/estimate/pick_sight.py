@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -22,6 +21,7 @@ from nuno.estimate.futures import DRAWN_THICKNESS, Futures
 from nuno.estimate.pattern import Pattern, begin_pattern
 from nuno.estimate.rotations import STILL, UNMOVED, Pose, turn, view_of_turned
 from nuno.estimate.similarity import Silhouette, begin_scores
+from nuno.plans.cpu_threads import core_count
 
 MARGIN = 4
 """[px] around a cloth's vertices: it is drawn thicker than they tell."""
@@ -88,7 +88,7 @@ def score_futures(
 
 def _at_each(begin: Callable[[Pose], Callable[[], Scores]], poses: list[Pose], device: str) -> list[Scores]:
     """The scores at every pose: on CUDA all are begun before any is waited for, on the CPU each core takes one."""
-    cores = len(os.sched_getaffinity(0))
+    cores = core_count()
     if min(cores, len(poses)) == 1 or not wp.get_device(device).is_cpu:
         return [wait() for wait in [begin(pose) for pose in poses]]
     for module in (raster, similarity, pattern):

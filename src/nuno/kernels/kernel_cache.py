@@ -7,7 +7,6 @@ most of the wait.
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from collections.abc import Callable, Collection
@@ -18,6 +17,7 @@ from typing import Any
 from nuno.errors import InvalidInputError
 from nuno.kernels.kernel_modules import WHEN_NAMED, KernelModule, kernel_modules
 from nuno.kernels.struct_references import pass_structs_by_reference
+from nuno.plans.cpu_threads import core_count
 
 
 def compile_kernels(
@@ -63,7 +63,7 @@ def compile_kernels(
             _compile_for_cuda(module, numbers)
         return time.perf_counter() - started
 
-    pool = ThreadPoolExecutor(jobs or len(os.sched_getaffinity(0)), thread_name_prefix="nuno-compile")
+    pool = ThreadPoolExecutor(jobs or core_count(), thread_name_prefix="nuno-compile")
     try:
         waiting = {pool.submit(work, module): module.name for module in chosen}
         for done in as_completed(waiting):
