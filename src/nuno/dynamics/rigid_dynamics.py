@@ -111,6 +111,7 @@ class RigidScene:
                 a, b = pair
                 pairs[slots[a], slots[b]] = mu
         self.solver.set_exceptions(pairs)
+        self.solver.set_order(list(slots.values()))
         self._version = world._collider_version
 
     def lead(self, world: RigidWorld, time: float, duration: float) -> list[int]:

@@ -153,6 +153,15 @@ def list_rows(s: RigidState, parts: Parts, c: Contacts, rules: Rules, world: int
 
 
 @wp.func
+def stands_in_row_of(s: RigidState, parts: Parts, world: int, p: int, q: int):
+    """Return True if the pair is in the row of part p, which moves: if q is larger, or nothing moves it."""
+    larger = parts.radius[q] > parts.radius[p]
+    if parts.radius[q] == parts.radius[p]:
+        larger = parts.rank[q] > parts.rank[p]
+    return larger or s.inverse_mass[world * s.capacity + parts.slot[q]] == 0.0
+
+
+@wp.func
 def list_row(s: RigidState, parts: Parts, c: Contacts, rules: Rules, world: int, p: int, a: int, reach: float):
     """The row of part p, of body a."""
     first = (world * c.parts + p) * c.row
@@ -160,7 +169,7 @@ def list_row(s: RigidState, parts: Parts, c: Contacts, rules: Rules, world: int,
         q = c.partner[first + k]
         if q >= 0:
             stays = int(0)
-            if parts.slot[q] >= 0:
+            if parts.slot[q] >= 0 and stands_in_row_of(s, parts, world, p, q):
                 if apart(s, parts, world, p, q) <= reach and pair_friction(rules, s, world, a, parts.slot[q]) >= 0.0:
                     stays = 1
             if stays == 0:
@@ -169,8 +178,7 @@ def list_row(s: RigidState, parts: Parts, c: Contacts, rules: Rules, world: int,
     for q in range(parts.count):
         b = parts.slot[q]
         if b >= 0 and b != a:
-            larger = parts.radius[q] > parts.radius[p] or (parts.radius[q] == parts.radius[p] and q > p)
-            if larger or s.inverse_mass[world * s.capacity + b] == 0.0:
+            if stands_in_row_of(s, parts, world, p, q):
                 if apart(s, parts, world, p, q) <= reach:
                     mu = pair_friction(rules, s, world, a, b)
                     if mu >= 0.0:

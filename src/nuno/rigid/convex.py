@@ -32,6 +32,7 @@ class Parts:
     capacity: int
     mesh_stride: int
     slot: wp.array(dtype=int)  # the body, or -1
+    rank: wp.array(dtype=int)  # by which ties are broken: rows depend on what came and went before, this does not
     kind: wp.array(dtype=int)
     half: wp.array(dtype=wp.vec3)  # box: half sides; others: radius, half height
     inset: wp.array(dtype=float)

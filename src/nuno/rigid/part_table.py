@@ -61,6 +61,12 @@ class PartTable:
         self.parts.count = len(self.rows)
         return list(rows)
 
+    def set_ranks(self, rows: Sequence[int]) -> None:
+        """Give parts in these rows the ranks 0, 1, 2 ..., all others later ones."""
+        ranks = np.arange(self.parts.capacity, 2 * self.parts.capacity, dtype=np.int32)
+        ranks[list(rows)] = np.arange(len(rows))
+        self.parts.rank.assign(ranks)
+
     def remove(self, rows: Sequence[int]) -> None:
         """Free the rows of a body."""
         for row in rows:
@@ -97,8 +103,8 @@ class PartTable:
         place = (np.zeros(3) if part.position is None else part.position) - centre
         turn = np.array([1.0, 0.0, 0.0, 0.0]) if part.quaternion is None else part.quaternion
         for name, value in (
-            ("slot", slot), ("kind", part.kind), ("half", part.half), ("inset", part.inset), ("rim", part.rim),
-            ("place", place), ("turn", np.roll(turn, -1)), ("low", part.low), ("high", part.high),
+            ("slot", slot), ("rank", row), ("kind", part.kind), ("half", part.half), ("inset", part.inset),
+            ("rim", part.rim), ("place", place), ("turn", np.roll(turn, -1)), ("low", part.low), ("high", part.high),
             ("radius", part.radius), ("smallest", _smallest(part)),
         ):  # fmt: skip
             self._put(name, row, value)
@@ -165,8 +171,8 @@ class PartTable:
     def _grow(self, capacity: int) -> None:
         old = self.parts.capacity
         kinds = dict(
-            slot=int, kind=int, half=wp.vec3, inset=float, rim=float, place=wp.vec3, turn=wp.quat, low=wp.vec3,
-            high=wp.vec3, radius=float, smallest=float, corners=wp.vec2i, cores=wp.vec2i, faces=wp.vec2i,
+            slot=int, rank=int, kind=int, half=wp.vec3, inset=float, rim=float, place=wp.vec3, turn=wp.quat,
+            low=wp.vec3, high=wp.vec3, radius=float, smallest=float, corners=wp.vec2i, cores=wp.vec2i, faces=wp.vec2i,
         )  # fmt: skip
         for name, kind in kinds.items():
             wider = wp.zeros(capacity, dtype=kind, device=self.device)

@@ -2,7 +2,8 @@
 
 One after the other, what is lower comes first, so that in one pass the ground carries the lowest body, that the next,
 and so on up. A colour is a set of manifolds of which no two move the same body, so that the order within it does not
-matter.
+matter. Both orders go by the ranks of parts: the rows in which parts are listed depend on what came and went before,
+and two worlds that are alike must go on alike.
 """
 
 from typing import Any
@@ -44,28 +45,34 @@ def height_of(s: RigidState, parts: Parts, c: Contacts, world: int, e: int, up: 
 
 
 @wp.func
-def comes_after(c: Contacts, a: int, b: int):
-    """Return True if entry a comes after entry b: by height, then part, partner and patch."""
+def rank_of_partner(parts: Parts, c: Contacts, e: int):
+    """A number by which the entries of one part are in order: by their partners' ranks, and patch by patch."""
+    return parts.rank[c.partner[e]] * 16 + c.patch[e]
+
+
+@wp.func
+def comes_after(parts: Parts, c: Contacts, base: int, a: int, b: int):
+    """Return True if entry a comes after entry b: by height, then by the ranks of part and partner, and patch."""
     result = c.height[a] > c.height[b]
     if c.height[a] == c.height[b]:
-        first = a / c.row
-        second = b / c.row
+        first = parts.rank[(a - base) / c.row]
+        second = parts.rank[(b - base) / c.row]
         result = first > second
         if first == second:
-            result = c.partner[a] * 16 + c.patch[a] > c.partner[b] * 16 + c.patch[b]
+            result = rank_of_partner(parts, c, a) > rank_of_partner(parts, c, b)
     return result
 
 
 @wp.func
-def sift(c: Contacts, base: int, root: int, end: int):
+def sift(parts: Parts, c: Contacts, base: int, root: int, end: int):
     """Let an entry sink to its place in the heap of the first ``end``."""
     at = int(root)
     while 2 * at + 1 < end:
         child = 2 * at + 1
         if child + 1 < end:
-            if comes_after(c, c.order[base + child + 1], c.order[base + child]):
+            if comes_after(parts, c, base, c.order[base + child + 1], c.order[base + child]):
                 child = child + 1
-        if comes_after(c, c.order[base + child], c.order[base + at]):
+        if comes_after(parts, c, base, c.order[base + child], c.order[base + at]):
             kept = c.order[base + at]
             c.order[base + at] = c.order[base + child]
             c.order[base + child] = kept
@@ -87,13 +94,13 @@ def line_up(s: RigidState, parts: Parts, c: Contacts, world: int, up: wp.vec3):
                 c.order[base + count] = e
                 count = count + 1
     for k in range(count / 2):
-        sift(c, base, count / 2 - 1 - k, count)
+        sift(parts, c, base, count / 2 - 1 - k, count)
     for k in range(count - 1):
         last = count - 1 - k
         kept = c.order[base]
         c.order[base] = c.order[base + last]
         c.order[base + last] = kept
-        sift(c, base, 0, last)
+        sift(parts, c, base, 0, last)
     c.counts[world * COUNTS + ENTRIES] = count
     c.counts[world * COUNTS + COLOURS] = 1
     c.bounds[base] = 0
@@ -101,14 +108,14 @@ def line_up(s: RigidState, parts: Parts, c: Contacts, world: int, up: wp.vec3):
 
 
 @wp.func
-def priority(c: Contacts, world: int, e: int):
+def priority(parts: Parts, c: Contacts, world: int, e: int):
     """A number for each manifold, like a die's but always the same, and no two alike (Jones and Plassmann 1993).
 
     By height it would take as many colours as the heap is deep, several times as many.
     """
     local = e - world * c.parts * c.row
-    mixed = wp.uint32(local / c.row) * wp.uint32(0x1E3779B1)
-    mixed = (mixed ^ (mixed >> wp.uint32(15))) + wp.uint32(c.partner[e] * 16 + c.patch[e] + 1)
+    mixed = wp.uint32(parts.rank[local / c.row]) * wp.uint32(0x1E3779B1)
+    mixed = (mixed ^ (mixed >> wp.uint32(15))) + wp.uint32(rank_of_partner(parts, c, e) + 1)
     mixed = mixed * wp.uint32(0x05EBCA77)
     mixed = mixed ^ (mixed >> wp.uint32(13))
     return (wp.uint64(mixed) << wp.uint64(32)) | wp.uint64(local + 1)
@@ -144,7 +151,7 @@ def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int
         for k in range(rank, waiting, size):
             e = c.waiting[base + k]
             if e >= 0:
-                bid = priority(c, world, e)
+                bid = priority(parts, c, world, e)
                 i = bodies + parts.slot[(e - base) / c.row]
                 j = bodies + parts.slot[c.partner[e]]
                 if s.weight[i] > 0.0:
@@ -155,7 +162,7 @@ def sort_colours(s: RigidState, parts: Parts, c: Contacts, world: int, rank: int
         for k in range(rank, waiting, size):
             e = c.waiting[base + k]
             if e >= 0:
-                bid = priority(c, world, e)
+                bid = priority(parts, c, world, e)
                 i = bodies + parts.slot[(e - base) / c.row]
                 j = bodies + parts.slot[c.partner[e]]
                 if (s.weight[i] == 0.0 or c.winner[i] == bid) and (s.weight[j] == 0.0 or c.winner[j] == bid):

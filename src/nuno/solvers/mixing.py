@@ -81,14 +81,17 @@ def mix_particles(solver: ParticleSolver, made: list[tuple[Copied, np.ndarray]])
 
 
 def move_particles(solver: ParticleSolver, moved: dict[int, np.ndarray]) -> None:
-    """Put the particles of some worlds elsewhere: positions (n, 3) [m] by world. They go on as fast as they were."""
+    """Put the particles of some worlds elsewhere: positions (n, 3) [m] by world. They go on as fast as they were.
+
+    Positions are rounded to floats, also where other worlds of the batch go on in doubles: alone, a world may not.
+    """
     if not moved:
         return
     made, worlds = copy_particles(solver), np.zeros(solver.world_count, dtype=bool)
     for world, positions in moved.items():
         worlds[world] = True
         for axis, name in enumerate("xyz"):
-            local = positions[:, axis] - solver.origin[world, axis]
+            local = (positions[:, axis] - solver.origin[world, axis]).astype(np.float32)
             for kept in (name, f"double_{name}"):
                 if kept in made:
                     made[kept][world] = local

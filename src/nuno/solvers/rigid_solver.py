@@ -81,6 +81,7 @@ class RigidSolver(RigidContacts):
         self._crowded = False  # whether the device once had no room for block groups
         self.settings = RigidSettings()
         self._mass: dict[int, np.ndarray] = {}
+        self._ranked: list[int] = []  # rows of the table of parts in the order that `set_order` gave
         self._loaded: dict[int, Mapping[str, np.ndarray]] = {}
         self.set_exceptions({})
         self._dt, self._opened = 0.0, False
@@ -142,6 +143,17 @@ class RigidSolver(RigidContacts):
         self._write("drag", slot, air_drag)
         return slot
 
+    def set_order(self, slots: Sequence[int]) -> None:
+        """Let bodies that are as high, or as large, come in this order.
+
+        Without it they come in the order of their rows, which depends on what came and went before.
+        """
+        rows = [row for slot in slots for row in self.part_rows[slot]]
+        if rows != self._ranked:
+            self.table.set_ranks(rows)
+            self._ranked = rows
+            self._list_anew()
+
     def reserve(self, slot: int, rows: Sequence[int]) -> None:
         """Take a free slot and free rows of the table of parts for no body at all, until the slot is removed."""
         self._take(slot, self.table.take_rows(rows))
@@ -150,6 +162,7 @@ class RigidSolver(RigidContacts):
         while slot >= self.state.capacity:
             self._grow_bodies(2 * self.state.capacity)
         self.part_rows[slot] = rows
+        self._ranked = []
         if self.table.parts.capacity > self.manifolds.parts:
             self._grow_rows(self.table.parts.capacity, self.manifolds.row)
         self._forget_rows(rows)
