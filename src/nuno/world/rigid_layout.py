@@ -1,7 +1,7 @@
 """The layout of a world's rigid solver: the slots of its bodies, as part of a snapshot.
 
-Positions on the device are relative to the solver's origin, and contacts are solved in the order of its rows. A copy of
-a world runs on to the bit only with the same origin, slots and rows.
+Positions on the device are relative to the solver's origin: a copy of a world runs on to the bit only with the same
+one. Its contacts are written back by the slots that bodies had.
 """
 
 from __future__ import annotations
