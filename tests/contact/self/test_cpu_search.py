@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from crossing import edge_edge_distances, vertex_triangle_distances
+from listed_pairs import listed_pairs
 
 import nuno
 from few_variants import few
@@ -57,7 +58,7 @@ def listed(positions: np.ndarray, plan: str, thickness: float, margin: float) ->
     made.run(0.0, 1e-4)
     count = made.pair_counts[-1]
     assert count[0] <= size.vertex_triangle and count[1] <= size.edge_edge
-    rows = made.candidate_pairs(len(positions) - 1)
+    rows = listed_pairs(made, len(positions) - 1)
     return rows, float(made.scalars[-1, THICKNESS]) + margin
 
 
