@@ -10,7 +10,7 @@ from package_sources import PACKAGE, docstrings, identifiers
 FOLDERS = (
     "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
     "numbers", "state", "constraints", "plans", "solvers", "topology", "rigid", "coupled", "bodies", "world",
-    "envs", "engines", "scenes", "tracking", "robot",
+    "envs", "engines", "scenes", "tracking", "robot", "dynamics",
 )  # fmt: skip
 """Where nothing is left; `tests/test_imports.py` looks for the first of the words in all folders."""
 
