@@ -6,21 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nuno.topology.cloth_topology import (
-    ELEMENT_KINDS,
-    RIGIDITY,
-    SHEAR,
-    STIFFNESS,
-    ClothTopology,
-    Elements,
-    uniform_count,
-)
+from nuno.topology.cloth_topology import ELEMENT_KINDS, RIGIDITY, SHEAR, STIFFNESS, ClothTopology, Elements
 from nuno.topology.grid_lines import find_grid_lines
 
 SOFTEST = 1.0e-12
 """The least stiffness [N/m] and rigidity [N m], so that a cloth without any has a finite compliance."""
-UNIFORM_BENDS, UNIFORM_SHEARS = uniform_count("bend"), uniform_count("shear")
-"""Numbers in ``bend`` and ``shear`` where all elements of a kind and direction have the same."""
+UNIFORM_BENDS, UNIFORM_SHEARS = (
+    sum(2 * len(kind.stiffness) - 1 for kind in ELEMENT_KINDS if kind.compliance == own) for own in ("bend", "shear")
+)
+"""Numbers in ``bend`` and ``shear`` where all elements of a kind and direction have the same: three of each kind that
+has directions."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from nuno.state.cloth_state import Settings, StateDouble, StateFloat, Topology
 from nuno.topology.cloth_topology import PLAIN_KINDS
 
 PLAIN = wp.constant(len(PLAIN_KINDS))
+"""Kinds of elements that every plan solves colour by colour."""
 STRETCH_KINDS = wp.constant(2)
 """Numbers in ``stretch_compliance`` where they are the same for all edges of a direction."""
 

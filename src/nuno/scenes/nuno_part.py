@@ -141,10 +141,10 @@ def _shape(scene: SceneDescription, body: SceneBody, said: dict[str, Any]) -> Sh
         except NunoError:
             scene.note("a hull that the file's numbers round to no convex one is a mesh", body.name)
             return body.shape
-    known = RESTORED | {each.__name__: each for each in Shape.__subclasses__()}
-    made: Shape = known[kind](**{name: _tuple(value) for name, value in said.items()})
-    if made.formula is not None:
-        return made if _is_mesh_of(body.shape, made) else body.shape
+    by_formula = {each.__name__: each for each in Shape.__subclasses__() if each.formula is not Shape.formula}
+    made: Shape = (RESTORED | by_formula)[kind](**{name: _tuple(value) for name, value in said.items()})
+    if made.formula is not None and _is_mesh_of(body.shape, made):
+        return made
     if body.vertices is None or len(made.mesh()[0]) != len(body.vertices):
         scene.note("its mesh is no longer what Nuno saved, and is taken from the file", body.name)
         return body.shape

@@ -129,11 +129,6 @@ row here, a file in `nuno.constraints`, and its place in `nuno.plans.cloth_elast
 PLAIN_KINDS = tuple(kind for kind in ELEMENT_KINDS if kind.plain)
 
 
-def uniform_count(table: str) -> int:
-    """Numbers in a table of compliances where all elements of a kind have the same: three of each with directions."""
-    return sum(2 * len(kind.stiffness) - 1 for kind in ELEMENT_KINDS if kind.compliance == table)
-
-
 def _elements(
     vertices: np.ndarray, scale: Any, axis: Any, faces: np.ndarray, colours: np.ndarray, **extra: np.ndarray
 ) -> Elements:
