@@ -3,6 +3,6 @@
 import signal
 
 
-def heed_interrupts():
+def obey_interrupts():
     """Undo what a shell does to programs that it runs in the background: they ignore Ctrl-C, and all they start too."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

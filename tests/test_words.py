@@ -1,13 +1,16 @@
 """The field's words: none of those that this project once used instead names a thing, but in a plain sense."""
 
 import re
+from pathlib import Path
+
+import pytest
 
 from package_sources import PACKAGE, docstrings, identifiers
 
 FOLDERS = (
     "contact", "tables", "estimate", "camera", "search", "tasks", "mesh", "shapes", "files", "kernels", "joints",
     "numbers", "state", "constraints", "plans", "solvers", "topology", "rigid", "coupled", "bodies", "world",
-    "envs", "engines", "scenes", "tracking", "robot",
+    "envs", "engines", "scenes", "tracking", "robot", "dynamics",
 )  # fmt: skip
 """Where nothing is left; `tests/test_imports.py` looks for the first of the words in all folders."""
 
@@ -119,16 +122,62 @@ def test_every_exception_is_used():
     assert not [pattern for pattern in ALLOWED if not any(re.fullmatch(pattern, name) for name in names)]
 
 
+INVENTED = re.compile(
+    r"\b(yarns?|party|parties|convoys?|teams?|verdict|lessened|heed|haste|swift|crumpled|wardrobe|actors?|onlooker|awake|"
+    r"soonest|led (frame|body|bodies)|flat windows?|taking turns|idle motion)\b", re.IGNORECASE
+)  # fmt: skip
+"""Words that this project had made up where the field has one."""
+ROOT = Path(__file__).parents[1]
+
+
 def test_docstrings_begin_without_invented_words():
-    """No docstring's first line has a word that this project had made up where the field has one."""
-    invented = re.compile(
-        r"\b(yarns?|star|party|parties|convoys?|teams?|verdict|lessened|heed|haste|swift|crumpled|wardrobe|actors?|"
-        r"onlooker|ghost|awake|soonest|led (frame|body|bodies)|flat windows?|taking turns|idle motion)\b", re.IGNORECASE
-    )  # fmt: skip
+    """No docstring's first line has such a word, nor what is named a ghost or a star where the field has another."""
+    word = re.compile(INVENTED.pattern + r"|\b(star|ghost)\b", re.IGNORECASE)
     lines = [
         f"{path.relative_to(PACKAGE).as_posix()}: {text}"
         for path in sorted(PACKAGE.rglob("*.py"))
         for text in docstrings(path)
-        if invented.search(text)
+        if word.search(text)
     ]
     assert not lines
+
+
+@pytest.mark.parametrize("folder", ["tests", "benchmarks", "examples"])
+def test_programs_have_no_invented_words(folder):
+    """Nor have tests, benchmarks and examples, in names of files and identifiers or docstrings' first lines."""
+    found = [
+        f"{path.relative_to(ROOT).as_posix()}: {text}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for text in (path.stem, *identifiers(path), *docstrings(path))
+        if INVENTED.search(text.replace("_", " "))
+    ]
+    assert not found
+
+
+def test_documentation_has_no_invented_words():
+    """Nor have the pages, beside those that say what the words were."""
+    found = [
+        f"{page.relative_to(ROOT).as_posix()}: {line}"
+        for page in sorted((ROOT / "docs").rglob("*.md"))
+        for line in page.read_text("utf-8").splitlines()
+        if INVENTED.search(line)
+    ]
+    assert not found
+
+
+def test_documentation_names_files_that_are_there():
+    """A file in backticks, with its folder or without, is one of the sources."""
+    names = {
+        path.name for folder in ("src", "tests", "benchmarks", "examples") for path in (ROOT / folder).rglob("*.py")
+    }
+    found = [
+        f"{page.relative_to(ROOT).as_posix()}: {place}"
+        for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+        for place in re.findall(r"`((?:\w+/)*\w+\.py)`", page.read_text("utf-8"))
+        if place.rpartition("/")[2] not in names
+        or (
+            "/" in place
+            and not any((base / place).exists() for base in (ROOT, PACKAGE, PACKAGE.parent, ROOT / "tests"))
+        )
+    ]
+    assert not found

@@ -173,7 +173,7 @@ def test_thickness_widens_a_sheet_seen_edge_on():
     np.testing.assert_array_equal(rows, np.arange(44, 54))
 
 
-def _crumpled(worlds, n=17, seed=5):
+def _wrinkled(worlds, n=17, seed=5):
     rng = np.random.default_rng(seed)
     x, y = np.meshgrid(np.linspace(-0.2, 0.2, n), np.linspace(-0.15, 0.15, n))
     flat = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
@@ -185,7 +185,7 @@ def _crumpled(worlds, n=17, seed=5):
 @pytest.mark.parametrize("ids", [False, True])
 def test_batch_has_the_bits_of_single_worlds(ids):
     """World k of a batch is, bit for bit, what it is alone, and the order of triangles does not matter."""
-    positions, faces = _crumpled(7)
+    positions, faces = _wrinkled(7)
     together = _draw(PLAIN, positions, faces, ids=ids).numpy()
     shuffled = np.random.default_rng(0).permutation(faces)
     for k in range(7):
@@ -194,7 +194,7 @@ def test_batch_has_the_bits_of_single_worlds(ids):
 
 def test_threads_have_the_bits_of_one():
     """Slices of worlds drawn by several threads at once give the same keys."""
-    positions, faces = _crumpled(12)
+    positions, faces = _wrinkled(12)
     expected = _draw(PLAIN, positions, faces).numpy()
     raster.load("cpu")
     seen = view(PLAIN)
@@ -215,7 +215,7 @@ def test_threads_have_the_bits_of_one():
 @pytest.mark.parametrize("ids", [False, True])
 def test_cuda_repeats_its_bits_and_agrees_with_the_cpu(ids):
     """On CUDA every run and every batch position gives the same bits; the CPU differs by rounding only."""
-    positions, faces = _crumpled(64)
+    positions, faces = _wrinkled(64)
     region = Region.full(PLAIN)
 
     def drawn(batch):
@@ -235,7 +235,7 @@ def test_cuda_repeats_its_bits_and_agrees_with_the_cpu(ids):
 
 def test_region_is_a_cutout_of_the_whole_image():
     """Drawing a region gives the same pixels as cutting them out."""
-    positions, faces = _crumpled(2)
+    positions, faces = _wrinkled(2)
     region = Region(37, 21, 50, 33)
     whole = _draw(PLAIN, positions, faces).numpy()
     part = _draw(PLAIN, positions, faces, region=region).numpy()

@@ -42,7 +42,7 @@ def energies(solver, gravity):
 @pytest.mark.parametrize("substeps", few([40, 80], 40))
 @pytest.mark.parametrize("where", ["weightless", "held", "floor", "held over a floor"])
 def test_energy_never_grows(substeps, where):
-    """Invariant: from random crumpled, moving states, without damping or drag, energy only falls."""
+    """Invariant: from random scrambled, moving states, without damping or drag, energy only falls."""
     topology = ClothTopology.sheet(CELLS, SIZE)
     random = np.random.default_rng(3)
     worlds = 4

@@ -55,7 +55,7 @@ def test_a_pull_on_a_fitted_ball_is_uniform():
     assert np.abs(stretch - stretch.mean()).max() < 0.05 * stretch.mean()
 
 
-def test_crumpled_bodies_recover():
+def test_scrambled_bodies_recover():
     """Bodies let go with every vertex anywhere in them come back to their shape, to 0.1 % of a cell and rounding."""
     body = block((0.1, 0.1, 0.1), (4, 4, 4), mean_strain=True)
     seeds = np.stack([np.random.default_rng(seed).uniform(-0.05, 0.05, body.rest.shape) for seed in range(3)])

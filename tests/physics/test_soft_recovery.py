@@ -1,4 +1,4 @@
-"""A soft body comes back from anything: crumpled at random, flat, or all of it at a point."""
+"""A soft body comes back from anything: scrambled at random, flat, or all of it at a point."""
 
 import numpy as np
 import pytest

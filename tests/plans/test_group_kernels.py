@@ -92,7 +92,7 @@ def keep_half_busy():
 
 @pytest.mark.cuda
 def test_where_blocks_find_no_room_each_world_has_one():
-    """Promise: whatever else the device does, nothing hangs and no substep is lost; the bits are the team's."""
+    """Promise: whatever else the device does, nothing hangs and no substep is lost; the bits are the block group's."""
     busy, undisturbed = folded(), folded()
     for made in (busy, undisturbed):
         made.run(0.0, 1.0 / 60.0)
@@ -129,7 +129,7 @@ def test_parts_of_substeps_that_found_no_room_are_gone_through_again(monkeypatch
 
 @pytest.mark.cuda
 def test_a_cloth_that_meets_a_box_has_the_same_bits_in_any_batch():
-    """Promise: substeps by parts too, whether a world is a team's of few or a block's of many."""
+    """Promise: substeps by parts too, whether few worlds go to block groups or many to blocks."""
     world = nuno.World(device="cuda:0", substeps=30)
     world.add(nuno.plane())
     cloth = world.add(nuno.sheet((0.4, 0.4), cells=(47, 47), position=(0.0, 0.0, 0.02)))

@@ -363,8 +363,8 @@ def test_cuda_tells_cells_apart_in_sheets_of_any_shape(cells):
 def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
     """Promise: same input, same bits, in any place of a batch, self-contact included.
 
-    Many worlds run with fewer threads, or fewer blocks, each than few do; of 150 a team takes several in turn, and so
-    does a block of 150 and of 1,000, but not of 300, on a device with 132 multiprocessors.
+    Many worlds run with fewer threads, or fewer blocks, each than few do; of 150 a block group takes several in turn,
+    and so does a block of 150 and of 1,000, but not of 300, on a device with 132 multiprocessors.
     """
     alone = outcome(solver("sheet", plan, device="cuda:0", self_contact=True))
     for worlds in (1, 5, *{"fused": (150, 300, 1000), "grid": (150,)}[plan]):
@@ -375,8 +375,8 @@ def test_cuda_repeats_bit_for_bit_and_world_by_world(plan):
 
 @pytest.mark.cuda
 @pytest.mark.parametrize("kind", ["sheet", "mesh"])
-def test_worlds_by_teams_have_the_bits_of_worlds_by_blocks(kind):
-    """Promise: same bits in any batch of a cloth that is a team's where worlds are few, and a block's where many."""
+def test_block_groups_have_the_bits_of_blocks(kind):
+    """Promise: same bits of a cloth in any batch, by block groups where worlds are few, by blocks where many."""
     found = []
     for worlds, plan in ((1, "grid"), (5, "grid"), (140, "fused")):
         made = solver(kind, "auto", worlds, device="cuda:0", self_contact=True, cells=(47, 43), substeps=DOUBLES)

@@ -34,7 +34,7 @@ def grip(positions, vertices, compliance=0.0):
 
 
 def solver(plan, worlds=1, different=False, device="cpu", body=BODY):
-    """A block over a ball and a table, held at a corner and by a spring, pushed, moduli by element, and crumpled."""
+    """A block over a ball and a table, held at a corner and by a spring, pushed, moduli by element, and wrinkled."""
     random = np.random.default_rng(1)
     x = body.rest + random.normal(scale=0.01, size=body.rest.shape) + [0.0, 0.0, 0.07]
     positions = np.repeat(x[None], worlds, axis=0)
@@ -164,7 +164,7 @@ def test_shared_memory_changes_no_bit(cells, worlds):
 @pytest.mark.cuda
 @pytest.mark.parametrize("substeps", [16, 30])
 @pytest.mark.parametrize("worlds", [1, 5, 140])
-def test_teams_of_multiprocessors_change_no_bit(worlds, substeps):
+def test_block_groups_change_no_bit(worlds, substeps):
     """Promise: how many multiprocessors share a world is of no account, with floats (16 substeps) and doubles."""
     body = SoftTopology.of(*box_tetrahedra((0.36,) * 3, (12,) * 3))
     found = []

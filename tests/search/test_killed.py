@@ -14,7 +14,7 @@ import pytest
 import searched
 
 import nuno.search as search
-from interrupts import heed_interrupts
+from interrupts import obey_interrupts
 from nuno.errors import FileWriteError, ResultsInUseError
 from nuno.search.parameters import make_parameters
 from nuno.search.results_file import ResultsFile, make_header
@@ -27,7 +27,7 @@ def begin(results, marks, trials, seconds, way, held_from=math.inf):
     """Start the program that sweeps, as the head of a group of processes; trials from a number on do not end."""
     command = [sys.executable, str(PROGRAM), str(results), str(marks), str(trials), str(seconds), way]
     return subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=obey_interrupts,
         env=os.environ | {"HELD_FROM": str(held_from)},
     )  # fmt: skip
 

@@ -43,7 +43,7 @@ DEVICES = pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks
 @DEVICES
 @pytest.mark.parametrize(("layers", "worlds"), [(4, 1), (8, 1), (4, 3)])
 def test_layers_fit_the_lists(device, layers, worlds):
-    """Four layers have more than twice the candidates of the room for crumpled cloth, 6 and 16 a vertex."""
+    """Four layers have more than twice the candidates of the room for wrinkled cloth, 6 and 16 a vertex."""
     solver = accordion(device, layers=layers, worlds=worlds)
     listed = solver.pair_counts
     least = (6 * solver.particle_count, 16 * solver.particle_count)
@@ -53,7 +53,7 @@ def test_layers_fit_the_lists(device, layers, worlds):
 
 
 def test_many_worlds_have_less_room(monkeypatch):
-    """Where memory is short each gets what a crumpled cloth needs at first."""
+    """Where memory is short each gets what a wrinkled cloth needs at first."""
     monkeypatch.setattr(pair_capacity, "LISTS", 1.0e6)
     solver = folded("cpu", worlds=3).find("cloth")._dynamics.solver
     n = solver.particle_count

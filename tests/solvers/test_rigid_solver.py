@@ -212,8 +212,8 @@ def test_cuda_gives_the_same_bits_every_time_and_in_a_batch():
 
 
 @pytest.mark.cuda
-def test_teams_of_multiprocessors_change_no_bit():
-    """Promise: a world of many parts is a team's, with the bits of a block."""
+def test_block_groups_change_no_bit():
+    """Promise: a world of many parts goes to a block group, with the bits of a block."""
     runs = []
     for crowded in (False, True):
         random = np.random.default_rng(5)

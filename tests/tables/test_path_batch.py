@@ -1,4 +1,4 @@
-"""Convoys: paths that are worked out together give what each gives alone, to the bit."""
+"""Batches of paths: paths that are worked out together give what each gives alone, to the bit."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from nuno.tables.kinematic_motion import arrive, make_schedule, path_batches_of
 from nuno.tables.path_batch import KinematicGroup, PathBatch
 
 
-def convoy_of(bodies, seed=0):
+def path_batch_of(bodies, seed=0):
     """Return a path batch of bodies with two keys, and set them on it."""
     random = np.random.default_rng(seed)
     turns = random.normal(size=(len(bodies), 2, 4))
@@ -22,7 +22,7 @@ def convoy_of(bodies, seed=0):
 def test_a_schedule_is_that_of_the_paths_alone():
     """Positions and turns of all times, and where the bodies arrive; a body between breaks none of it."""
     bodies = [nuno.box((0.1, 0.1, 0.1), name=str(k)) for k in range(7)]
-    convoy_of(bodies)
+    path_batch_of(bodies)
     other = nuno.box((0.1, 0.1, 0.1), name="other")
     other._path = nuno.Path([0.0, 0.2], [[0, 0, 0], [1, 0, 0]])
     together = make_schedule([other, *bodies], 0.03, 0.09, 1 / 60)
@@ -46,7 +46,7 @@ def test_a_schedule_is_that_of_the_paths_alone():
 def test_a_path_batch_with_one_gone_is_taken_apart():
     """Where a body follows another path, or is not there, the others are worked out one by one."""
     bodies = [nuno.box((0.1, 0.1, 0.1), name=str(k)) for k in range(4)]
-    convoy_of(bodies)
+    path_batch_of(bodies)
     whole, others = path_batches_of(bodies)
     assert len(whole) == 1 and not others
     assert path_batches_of(bodies[:3]) == ([], bodies[:3])
@@ -63,7 +63,7 @@ def test_a_company_goes_where_its_last_path_batch_goes():
     kinematic_group = KinematicGroup(tuple(body.key for body in bodies))
     kept = []
     for seed in range(2):
-        kinematic_group.path_batch = convoy_of(bodies, seed)
+        kinematic_group.path_batch = path_batch_of(bodies, seed)
         expected = make_schedule(bodies, 0.03, 0.09, 1 / 60)
         for body, path in zip(bodies, kinematic_group.paths, strict=True):
             body._path = path
@@ -77,7 +77,7 @@ def test_a_company_goes_where_its_last_path_batch_goes():
         np.testing.assert_array_equal([path.positions for path in paths], path_batch.positions)
     # a snapshot keeps where they went when it was taken
     saved = world.save()
-    kinematic_group.path_batch = convoy_of(bodies, 7)
+    kinematic_group.path_batch = path_batch_of(bodies, 7)
     for body, path in zip(bodies, kinematic_group.paths, strict=True):
         body._path = path
     world.restore(saved)

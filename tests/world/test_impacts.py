@@ -1,4 +1,4 @@
-"""Cloth that is thrown, dropped and crumpled does not pass through itself, however fast."""
+"""Cloth that is thrown, dropped and scrambled does not pass through itself, however fast."""
 
 import numpy as np
 import pytest
@@ -85,7 +85,7 @@ LONG = (2, 6, 11, 12, 14, 15, 18, 26, 32, 39, 44, 50)
 
 
 @pytest.mark.parametrize("seed", [0, 4, 33, *(pytest.param(seed, marks=pytest.mark.long) for seed in LONG)])
-def test_nothing_thrown_dropped_or_crumpled_stays_crossed(seed):
+def test_nothing_thrown_dropped_or_scrambled_stays_crossed(seed):
     """Exact: no edge is inside of a triangle 1 s later; eleven of these left 2 to 21 crossings before."""
     assert left_after_a_second(seed) == 0
 

@@ -11,8 +11,11 @@ from nuno.topology.grid_lines import find_grid_lines
 
 SOFTEST = 1.0e-12
 """The least stiffness [N/m] and rigidity [N m], so that a cloth without any has a finite compliance."""
-UNIFORM_BENDS = sum(2 * len(kind.stiffness) - 1 for kind in ELEMENT_KINDS if kind.compliance == "bend")
-"""Numbers in ``bend`` where all elements of a kind and direction have the same: three of each that has directions."""
+UNIFORM_BENDS, UNIFORM_SHEARS = (
+    sum(2 * len(kind.stiffness) - 1 for kind in ELEMENT_KINDS if kind.compliance == own) for own in ("bend", "shear")
+)
+"""Numbers in ``bend`` and ``shear`` where all elements of a kind and direction have the same: three of each kind that
+has directions."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +69,10 @@ def compliances(topology: ClothTopology, values: dict[str, np.ndarray]) -> Compl
         place[kind.name] = index + sum(part.shape[1] for part in table)
         table.append(own)
     made = {name: np.concatenate(parts, axis=1) for name, parts in tables.items()}
-    if _differ(columns(RIGIDITY)):
-        # the strips on CUDA tell by the count that elements have their own numbers, however few there are
-        made["bend"] = np.pad(
-            made["bend"], ((0, 0), (0, max(0, UNIFORM_BENDS + 1 - made["bend"].shape[1]))), mode="edge"
-        )
+    for name, stiffness, uniform in (("bend", RIGIDITY, UNIFORM_BENDS), ("shear", SHEAR, UNIFORM_SHEARS)):
+        if _differ(columns(stiffness)) and made[name].shape[1] <= uniform:
+            # the strips on CUDA tell by the count that elements have their own numbers, however few there are
+            made[name] = np.pad(made[name], ((0, 0), (0, uniform + 1 - made[name].shape[1])), mode="edge")
     return Compliances(**made, place={k: np.ascontiguousarray(v, dtype=np.int32) for k, v in place.items()})
 
 

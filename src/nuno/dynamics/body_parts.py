@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 def parts_of(body: Body, *, moves: bool) -> tuple[RigidPart, ...]:
     """Return the parts of a body in its own frame, in the shape that it has now."""
     from nuno.shapes.compound import Compound
-    from nuno.shapes.shape import Box, Capsule, Cylinder, Plane, Sphere
 
-    plain = isinstance(body.shape, Box | Sphere | Capsule | Cylinder | Plane | Compound)
+    plain = body.shape.formula is not None or isinstance(body.shape, Compound)
     # the same bits wherever the body is
     vertices = None if plain and body._deformed is None else body.local_vertices()
     if moves and body._deformed is not None:

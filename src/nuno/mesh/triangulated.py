@@ -115,9 +115,3 @@ def quality(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     double = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     squares = sum(((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a)))
     return np.asarray(2.0 * np.sqrt(3.0) * double / squares)
-
-
-def euler_characteristic(faces: np.ndarray) -> int:
-    """Return vertices - edges + faces of a mesh (m, 3): 1 of a disc, 0 of a tube, 2 of a sphere."""
-    pairs = np.unique(np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
-    return len(np.unique(faces)) - len(pairs) + len(faces)

@@ -10,7 +10,7 @@ changes.
 
 import warp as wp
 
-from nuno.numbers.element_access import at, factor_like, put
+from nuno.numbers.element_access import at, put
 from nuno.numbers.lanes import (
     add,
     choose,
@@ -236,10 +236,6 @@ def gather(x: wp.array(dtype=float64), i: int):
     return x[i]
 
 
-@wp.func_native("return x.data[i];")
-def gather(x: wp.array(dtype=double_lane), i: int) -> double_lane: ...
-
-
 @wp.func_native(_gather(_OWN, "x.data[i[l]][l]"))
 def gather(x: wp.array(dtype=double_lane), i: lane_int) -> double_lane: ...
 
@@ -251,21 +247,6 @@ def place(x: wp.array(dtype=float64), i: int, value: float64):
 
 @wp.func_native(_scatter(_OWN, "x.data[i[l]][l]"))
 def place(x: wp.array(dtype=double_lane), i: lane_int, value: double_lane): ...
-
-
-@wp.func
-def factor_like(like: float64, value: float):
-    return value
-
-
-@wp.func
-def factor_like(like: double_lane, value: float):
-    return lane(value)
-
-
-@wp.func
-def factor_like(like: double_lane, value: lane):
-    return value
 
 
 @wp.func

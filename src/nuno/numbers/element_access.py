@@ -94,10 +94,6 @@ def corner(table: wp.array(dtype=wp.vec4i), k: int, which: int, count: int) -> i
 def corner(table: wp.array(dtype=wp.vec3), k: int, which: int, count: int) -> float: ...
 
 
-@wp.func_native("return table.data[k][which];")
-def corner(table: wp.array(dtype=wp.vec4), k: int, which: int, count: int) -> float: ...
-
-
 @wp.func
 def corner(table: wp.array(dtype=lane_int), k: int, which: int, count: int):
     return table[k * count + which]

@@ -24,7 +24,10 @@ from nuno.plans.grid_lines_by_warp import PAIR_EDGES, WARP_EDGES, stretch_double
 from nuno.plans.sheet_strips import bend_in_strips, fits_strips
 from nuno.plans.simd_elements import SimdElements
 from nuno.state.cloth_state import Settings, StateDouble, StateFloat, Topology
+from nuno.topology.cloth_topology import PLAIN_KINDS
 
+PLAIN = wp.constant(len(PLAIN_KINDS))
+"""Kinds of elements that every plan solves colour by colour."""
 STRETCH_KINDS = wp.constant(2)
 """Numbers in ``stretch_compliance`` where they are the same for all edges of a direction."""
 
@@ -61,6 +64,12 @@ def bend_patches(t: Any, table: Any, run: Settings, first: int, last: int, rank:
     for k in range(first + rank, last, size):
         alpha = product(at(t.bend_compliance, table.patch_compliance[k]), rate)
         bend_patch(t, table, k, alpha)
+
+
+@wp.func
+def plain_colours(table: Any, kind: int):
+    """The starts of the colours of a plain kind, a number of `PLAIN_KINDS`."""
+    return table.patch_colour
 
 
 @wp.func
@@ -238,8 +247,10 @@ def sweep_membrane(t: Any, table: Any, run: Settings, crew: Crew):
 @wp.func
 def solve_cloth(t: Any, table: Any, run: Settings, crew: Crew):
     """One pass over all elastic constraints, or more over those in the cloth's plane."""
-    for c in range(table.patch_colour.shape[0] - 1):
-        bend_patches(t, table, run, table.patch_colour[c], table.patch_colour[c + 1], crew.rank, crew.size)
-        wait_for(crew)
+    for kind in range(PLAIN):
+        colour = plain_colours(table, kind)
+        for c in range(colour.shape[0] - 1):
+            solve_plain(t, table, run, kind, colour[c], colour[c + 1], crew.rank, crew.size)
+            wait_for(crew)
     bend(t, table, run, crew)
     sweep_membrane(t, table, run, crew)

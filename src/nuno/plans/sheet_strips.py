@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 from nuno.constraints.bending import bend_alpha, project_line, project_twist
-from nuno.constraints.compliances import UNIFORM_BENDS
+from nuno.constraints.compliances import UNIFORM_BENDS, UNIFORM_SHEARS
 from nuno.constraints.membrane import project_cell, shear_alpha
 from nuno.numbers.crew import barrier
 from nuno.numbers.element_access import at
@@ -24,7 +24,7 @@ from nuno.state.cloth_state import Settings, StateFloat, Topology
 
 STRIP_COLUMNS, LINE_VERTICES = wp.constant(64), wp.constant(192)
 """Vertices of the longest strip and of the longest line that the 32 threads of a warp take together."""
-BEND_KINDS = wp.constant(UNIFORM_BENDS)
+BEND_KINDS, SHEAR_KINDS = wp.constant(UNIFORM_BENDS), wp.constant(UNIFORM_SHEARS)
 
 
 @wp.func
@@ -273,7 +273,7 @@ def shear_strips(t: Any, table: Topology, odd: int, same: float, rate: float, ow
     """`cell_strips` of shears."""
     cell_strips(
         t, t.shear_compliance, table.cell_scale, table.cell_compliance, table.cell_colour, table.columns,
-        table.particles / table.columns, odd, same, t.shear_compliance.shape[0] > 1, rate, own, shear_alpha,
+        table.particles / table.columns, odd, same, t.shear_compliance.shape[0] > SHEAR_KINDS, rate, own, shear_alpha,
         shear_in_strip,
     )  # fmt: skip
 

@@ -12,14 +12,18 @@ from nuno.errors import FileFormatError, NunoError
 from nuno.joints.joint_drives import Motor, Spring
 from nuno.materials import Cloth, Rigid, Soft
 from nuno.scenes.scene_description import SceneBody, SceneDescription, SceneGrip
-from nuno.shapes.shape import Hull, Shape, Sheet, TriangleMesh
+from nuno.shapes.shape import Box, Capsule, Cylinder, Hull, Plane, Shape, Sheet, Sphere, TriangleMesh
 from nuno.shapes.soft_shape import SoftBox, SoftCapsule, SoftCylinder, SoftMesh, SoftSphere
 
 VERSION = 1
 RESTORED: dict[str, Any] = {
     kind.__name__: kind for kind in (Sheet, SoftBox, SoftSphere, SoftCylinder, SoftCapsule, SoftMesh)
 }
-"""Shapes of which a format holds the vertices alone."""
+"""Deformable shapes of which a format holds the vertices alone."""
+NATIVE = (Box, Sphere, Cylinder, Capsule, Plane)
+"""Shapes that formats have a word for; others with a formula are meshes there."""
+ROUNDED = 1e-5
+"""Of a shape's size, by how much a mesh of it may come back otherwise."""
 MATERIALS: dict[str, Any] = {"Cloth": Cloth, "Soft": Soft, "Rigid": Rigid}
 
 
@@ -92,7 +96,8 @@ def _body_part(scene: SceneDescription, body: SceneBody) -> dict[str, Any]:
         "color": body.color, "friction": body.friction, "thickness": body.thickness,
         "group": body.group, "collides_with": body.collides_with,
     }  # fmt: skip
-    if type(body.shape).__name__ in RESTORED:
+    by_formula = body.shape.formula is not None and not isinstance(body.shape, NATIVE)
+    if type(body.shape).__name__ in RESTORED or by_formula:
         names = [item.name for item in fields(body.shape) if item.init]  # type: ignore[arg-type]
         part["shape"] = {"kind": type(body.shape).__name__} | {name: getattr(body.shape, name) for name in names}
     elif isinstance(body.shape, Hull):
@@ -136,11 +141,20 @@ def _shape(scene: SceneDescription, body: SceneBody, said: dict[str, Any]) -> Sh
         except NunoError:
             scene.note("a hull that the file's numbers round to no convex one is a mesh", body.name)
             return body.shape
-    made: Shape = RESTORED[kind](**{name: _tuple(value) for name, value in said.items()})
+    by_formula = {each.__name__: each for each in Shape.__subclasses__() if each.formula is not Shape.formula}
+    made: Shape = (RESTORED | by_formula)[kind](**{name: _tuple(value) for name, value in said.items()})
+    if made.formula is not None and _is_mesh_of(body.shape, made):
+        return made
     if body.vertices is None or len(made.mesh()[0]) != len(body.vertices):
         scene.note("its mesh is no longer what Nuno saved, and is taken from the file", body.name)
         return body.shape
     return made
+
+
+def _is_mesh_of(shape: Shape, made: Shape) -> bool:
+    """Return True if a shape is the mesh of another with a formula, about the same origin."""
+    points, own = np.sort(shape.mesh()[0], axis=0), np.sort(made.mesh()[0], axis=0)
+    return points.shape == own.shape and bool(np.abs(points - own).max() < ROUNDED * np.ptp(own))
 
 
 def _plain(value: Any) -> Any:

@@ -50,7 +50,7 @@ class Shape:
     """Root of all shapes.
 
     A shape by formula is a class here with its `formula` and its triangles, the formula under its ``kind`` in
-    `nuno.contact.particle.distances`, and a function in `nuno.bodies.make_bodies`.
+    `nuno.contact.particle.distances`, and a function in `nuno.bodies.make_bodies`: see docs/extending.md.
     """
 
     kind: ClassVar[str] = "shape"

@@ -286,7 +286,7 @@ class ClothSolver(ClothLaunches):
         """Room for candidate pairs, none of them listed.
 
         Those that kernels solve stand as all numbers of a world or of lanes do. What the CPU lists and picks, for one
-        world after the other, stands world by world: see `candidate_pairs`.
+        world after the other, stands world by world.
         """
         state, size, empty = self.state, self._size, self._empty
         state.vertex_triangle = self._list(4 * size.vertex_triangle)
@@ -334,16 +334,6 @@ class ClothSolver(ClothLaunches):
     def listings(self) -> np.ndarray:
         """(worlds,) float, how often pairs were listed since the state was set."""
         return self.download(self.state.notes, NOTES)[:, LISTINGS]
-
-    def candidate_pairs(self, world: int) -> list[np.ndarray]:
-        """The vertices of a world's listed vertex-triangle and edge-edge candidates, (k, 4) int each."""
-        state, size, rows = self.state, self._size, []
-        kinds = ((state.vertex_triangle, size.vertex_triangle), (state.edge_edge, size.edge_edge))
-        for (array, room), count in zip(kinds, self.pair_counts[world], strict=True):
-            numbers = array.numpy().ravel()[4 * room * world : 4 * room * (world + 1)]
-            by_pair = self._cuda or self.plan == "grid"
-            rows.append((numbers.reshape(room, 4) if by_pair else numbers.reshape(4, room).T)[:count])
-        return rows
 
     def make_room(self) -> bool:
         """Make lists longer that were too short by the last counts; return whether the run's state is not to be used.

@@ -21,7 +21,7 @@ SUSPECTS = 512
 """Pairs of elements that a warp that lists pairs can note at least: more than any two blocks of neighbouring vertices
 have."""
 PAIRS = 6, 16
-"""Room for candidates, vertex-triangle and edge-edge ones, for each vertex, at first. Crumpled cloths have under 3 and
+"""Room for candidates, vertex-triangle and edge-edge ones, for each vertex, at first. Wrinkled cloths have under 3 and
 8, two layers that lie on each other up to 7 and 14."""
 MORE = 4.0
 """Times that room where memory allows: four layers have 15 and 43 candidates a vertex, many 20 and 56."""

@@ -5,6 +5,7 @@ Everything here depends on the rest shape alone; materials come in as compliance
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -59,9 +60,13 @@ class ElementKind:
         elements: The attribute of `ClothTopology` that has them.
         corners: Vertices of an element.
         columns: By name, the column of `Elements` and how many numbers it has for an element.
-        compliance: The state's table of compliances: "stretch", "shear" or "bend".
+        compliance: The state's table of compliances: "shear" or "bend", which have room for more kinds; "stretch" is
+            that of edges and triangles.
         stiffness: The material's numbers of which these are the inverse. Where there are two, along warp and weft,
             `Elements.axis` says which of them or of their geometric mean an element takes.
+        value: The constraint's C in NumPy, of its elements and positions (worlds, n, 3) [m]: (worlds, elements, parts)
+            of so many scalars or, with a last axis, vectors; their energies are C^2 / (2 scale compliance). None where
+            `nuno.bodies.cloth_measures` has the energy itself.
         plain: Whether every plan solves it colour by colour by `nuno.plans.cloth_elastic.solve_plain`, and before the
             others, for which some have methods of their own.
     """
@@ -72,27 +77,55 @@ class ElementKind:
     columns: dict[str, tuple[str, int]]
     compliance: str
     stiffness: tuple[str, ...]
+    value: Callable[[Elements, np.ndarray], np.ndarray] | None = None
     plain: bool = True
+
+
+def _cell_shear(cells: Elements, x: np.ndarray) -> np.ndarray:
+    """C = F_u . F_v = (|d - a|^2 - |b - c|^2) / (4 area) of a cell of corners a, b, c, d."""
+    a, b, c, d = (x[:, corner] for corner in cells.vertices.T)
+    diagonals = ((d - a) ** 2).sum(axis=-1) - ((b - c) ** 2).sum(axis=-1)
+    return (diagonals * cells.extra["quarter"])[..., None]
+
+
+def _line_bend(lines: Elements, x: np.ndarray) -> np.ndarray:
+    """C = x_0 - 2 x_1 + x_2."""
+    return np.einsum("wmcx,c->wmx", x[:, lines.vertices], (1.0, -2.0, 1.0))[:, :, None]
+
+
+def _cell_twist(twists: Elements, x: np.ndarray) -> np.ndarray:
+    """C = x_0 - x_1 - x_2 + x_3."""
+    return np.einsum("wmcx,c->wmx", x[:, twists.vertices], (1.0, -1.0, -1.0, 1.0))[:, :, None]
+
+
+def _patch_bend(patches: Elements, x: np.ndarray) -> np.ndarray:
+    """Three C = sum k_i x_i - rest; ``rest`` turns with the triangle, a sum of its two sides and its normal."""
+    corners = x[:, patches.vertices]
+    side, fold = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
+    normal = np.cross(side, fold)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-10)
+    at_rest = np.einsum("mjk,wmkx->wmjx", patches.extra["rest"], np.stack([side, fold, normal], axis=2))
+    return np.einsum("mjc,wmcx->wmjx", patches.extra["weight"], corners) - at_rest
 
 
 SHEAR, RIGIDITY = ("shear_stiffness",), ("bending_rigidity_warp", "bending_rigidity_weft")
 STIFFNESS = ("stretch_stiffness_warp", "stretch_stiffness_weft")
 ELEMENT_KINDS = (
-    ElementKind("cell", "cells", 4, {"scale": ("quarter", 1)}, "shear", SHEAR, plain=False),
+    ElementKind("cell", "cells", 4, {"scale": ("quarter", 1)}, "shear", SHEAR, _cell_shear, plain=False),
     ElementKind(
         "triangle", "triangles", 3, {"u": ("u", 3), "v": ("v", 3), "area": ("area", 1)}, "stretch", STIFFNESS + SHEAR,
         plain=False,
     ),
-    ElementKind("line", "lines", 3, {"scale": ("scale", 1)}, "bend", RIGIDITY, plain=False),
-    ElementKind("twist", "twists", 4, {"scale": ("scale", 1)}, "bend", RIGIDITY, plain=False),
+    ElementKind("line", "lines", 3, {"scale": ("scale", 1)}, "bend", RIGIDITY, _line_bend, plain=False),
+    ElementKind("twist", "twists", 4, {"scale": ("scale", 1)}, "bend", RIGIDITY, _cell_twist, plain=False),
     # three rows of six weights and three rest vectors of three numbers each
     ElementKind(
         "patch", "patches", 6, {"weight": ("weight", 18), "rest": ("rest", 9), "curved": ("curved", 1)}, "bend",
-        RIGIDITY,
+        RIGIDITY, _patch_bend,
     ),
 )  # fmt: skip
-"""All but the edges, which are solved by grid lines. A new kind has its elements here and a row, a file in
-`nuno.constraints`, and its place in `nuno.plans.cloth_elastic`."""
+"""All but the edges, which are solved by grid lines. docs/extending.md shows what a new kind needs: its elements and a
+row here, a file in `nuno.constraints`, and its place in `nuno.plans.cloth_elastic`."""
 PLAIN_KINDS = tuple(kind for kind in ELEMENT_KINDS if kind.plain)
 
 

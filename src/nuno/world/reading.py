@@ -12,7 +12,7 @@ from nuno.dynamics.dynamics import ParticleDynamics, dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.materials import Rigid
 from nuno.validation import flag
-from nuno.world.saving import Saving
+from nuno.world.copying import Copying
 
 if TYPE_CHECKING:
     from nuno.camera.camera import Camera
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nuno.world.contact_points import ContactPoints
 
 
-class Reading(Saving):
+class Reading(Copying):
     """A simulation with the verbs that read it."""
 
     def contacts(self, body: Body | str, *, itself: bool = False) -> ContactPoints:

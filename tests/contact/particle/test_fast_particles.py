@@ -1,4 +1,4 @@
-"""Particles that are swifter than contact promises to see: in a batch they go as they do alone."""
+"""Particles that are faster than contact promises to see: in a batch they go as they do alone."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from few_variants import few
 
 @pytest.mark.parametrize("kind", ["box", "mesh"])
 @pytest.mark.parametrize("seed", few([0, 1, 2], 1))
-def test_a_batch_of_swift_cloths_is_one_of_them(kind, seed):
+def test_a_batch_of_fast_cloths_is_one_of_them(kind, seed):
     """At 30 m/s particles go 6 cm in a substep; those of the first box differed by 9 cm between alone and batch.
 
     A vector of sixteen is looked at where one of it is near: alone these are particles, in a batch worlds.

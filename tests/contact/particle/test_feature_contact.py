@@ -190,7 +190,7 @@ def test_a_world_of_a_batch_meets_edges_as_alone_on_cuda():
 
 @pytest.mark.long
 def test_all_plans_meet_edges_alike():
-    """One source: sixteen particles at a time, one by one, and teams of blocks give the same bits."""
+    """One source: sixteen particles at a time, one by one, and groups of blocks give the same bits."""
     world = crowded(1)
     shapes = [world.find(name) for name in ("table", "ball", "can", "finger")]
     topology = ClothTopology.sheet((12, 12), (0.4, 0.4))
@@ -227,7 +227,7 @@ def test_a_cloth_far_from_the_rim_of_its_table_asks_for_nothing(device):
     assert run(0.36)._dynamics.solver.state.feature_shapes.numpy()[0] == 1
 
 
-def awake_at_sharp_shapes(body):
+def active_at_edged_shapes(body):
     """Return the elements (k,) that a cloth's last substep looked at, edges before triangles, and how many it lists."""
     solver = body._dynamics.solver
     starts = solver._surface.feature_colour.numpy()
@@ -246,7 +246,7 @@ def test_of_a_cloth_over_a_bar_only_edges_beside_it_are_looked_at():
     cloth = world.add(nuno.sheet((0.4, 0.4), cells=(20, 20), position=(0.0, 0.0, 0.08)))
     world.attach(cloth, nuno.Cloth(thickness=THICKNESS))
     world.run(0.3)
-    active, listed = awake_at_sharp_shapes(cloth)
+    active, listed = active_at_edged_shapes(cloth)
     sides = cloth._dynamics.solver._surface.side.numpy()
     assert 0 < len(active) < 0.5 * listed
     assert active.max() < len(sides)
@@ -268,7 +268,7 @@ def test_more_edges_may_touch_than_there_is_room_for_in_a_queue(device):
     cloth = world.add(nuno.sheet((0.5, 0.5), cells=(70, 70), position=(0.0, 0.0, 0.08)))
     world.attach(cloth, nuno.Cloth(thickness=0.003))
     world.run(0.2)
-    assert len(awake_at_sharp_shapes(cloth)[0]) > ROOM
+    assert len(active_at_edged_shapes(cloth)[0]) > ROOM
     points = surface(cloth, 4)
     away = np.hypot(points[:, 0, None] - places, points[:, 2, None] - 0.05).min(axis=1) - 0.02
     assert away.min() > 0.0015 - LEFT

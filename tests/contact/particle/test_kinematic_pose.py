@@ -224,7 +224,7 @@ def test_a_world_of_a_batch_moves_as_alone(kind):
 
 @pytest.mark.long
 def test_all_plans_see_a_shape_move_alike():
-    """One source: sixteen particles at a time, one by one, and teams of blocks give the same bits."""
+    """One source: sixteen particles at a time, one by one, and groups of blocks give the same bits."""
     world = nuno.World(device="cpu")
     tray = world.add(nuno.box((0.3, 0.3, 0.02), name="tray", position=(0, 0, -0.0125)))
     other = world.add(nuno.mesh((tray.vertices + np.array([0.3, 0, 0]), tray.faces), name="other"))

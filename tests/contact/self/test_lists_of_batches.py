@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from listed_pairs import listed_pairs
 
 import nuno
 from nuno.solvers.cloth_solver import ClothSolver
@@ -21,7 +22,7 @@ def listed(cloth, positions, device):
     made.step_parts(0, MOTION)
     counts = made.pair_counts[0]
     assert counts[0] <= made._size.vertex_triangle and counts[1] <= made._size.edge_edge
-    faces, edges = made.candidate_pairs(0)
+    faces, edges = listed_pairs(made, 0)
     near = {(int(q[0]), *sorted(map(int, q[1:]))) for q in faces}
     return near, {frozenset((frozenset(map(int, q[:2])), frozenset(map(int, q[2:])))) for q in edges}, made
 

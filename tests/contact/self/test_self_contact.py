@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from crossing import count_crossings, edge_edge_distances, vertex_triangle_distances
+from listed_pairs import listed_pairs
 
 import nuno
 from nuno.solvers.cloth_solver import ClothSolver
@@ -131,7 +132,7 @@ def test_lists_hold_all_near_pairs(worlds: int) -> None:
     found = 0
     for k in range(worlds):
         x = listed[k].astype(float)
-        triangles, pairs = solver.candidate_pairs(k)
+        triangles, pairs = listed_pairs(solver, k)
         have = {(r[0], *sorted(r[1:])) for r in triangles.tolist()}
         near = np.argwhere(vertex_triangle_distances(x, faces) < far)
         want = {(i, *sorted(faces[f].tolist())) for i, f in near.tolist() if i not in faces[f]}

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import nuno
-from interrupts import heed_interrupts
+from interrupts import obey_interrupts
 from nuno.errors import NotConnectedError
 from nuno.robot.readings import ImageReading
 from nuno.robot.ros1.ros1_driver import CHECK, PYTHON, Ros1Driver
@@ -157,7 +157,7 @@ def test_the_command(master, still_g1):
     """Promise: `nuno serve --ros1` shows the robot on the master; an interrupt ends it, and the node with it."""
     command = [sys.executable, "-m", "nuno", "serve", "g1", "--ros1", "--port", "0", "--device", "cpu"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=obey_interrupts
     ) as process:
         try:
             said = process.stdout.readline()

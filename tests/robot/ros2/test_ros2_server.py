@@ -52,7 +52,7 @@ from ros2_node import (
     until,
 )  # fmt: skip
 
-from interrupts import heed_interrupts
+from interrupts import obey_interrupts
 from nuno.errors import InvalidInputError
 from nuno.robot.readings import ImageReading
 from nuno.robot.ros2.dds_bridge import DdsBridge
@@ -229,7 +229,7 @@ def test_the_command(plain):
     command = [sys.executable, "-m", "nuno", "serve", "g1", "--ros2", "--domain", str(DOMAIN), "--device", "cpu"]
     stays = stay_here(DOMAIN)
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts,
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=obey_interrupts,
         env=os.environ | {"ROS_LOCALHOST_ONLY": "1"},
     ) as process:  # fmt: skip
         try:

@@ -7,7 +7,7 @@ import sys
 
 from wire_with import PATIENCE
 
-from interrupts import heed_interrupts
+from interrupts import obey_interrupts
 from nuno.__main__ import main
 from nuno.robot.wire.client import WireRobot
 
@@ -16,7 +16,7 @@ def test_serve(still_g1):
     """It says where it is, a robot is there, and an interrupt ends it."""
     command = [sys.executable, "-m", "nuno", "serve", "g1", "--port", "0", "--stepped", "--device", "cpu"]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=obey_interrupts
     ) as process:
         try:
             said = process.stdout.readline()

@@ -29,7 +29,8 @@ from nuno.state.cloth_state import Shapes
 BOX, SPHERE, CYLINDER, CAPSULE, PLANE, SOLID_MESH, SHELL_MESH, HULL = range(8)
 FORMULAS = {"box": BOX, "sphere": SPHERE, "cylinder": CYLINDER, "capsule": CAPSULE, "plane": PLANE}
 """The kinds of shapes with a formula, which `distance_solid` has. Edges of cloth, too, look at those before the plane,
-all of them convex; others come between the plane and the meshes."""
+all of them convex; others come between the plane and the meshes, and only vertices look at them. docs/extending.md
+shows what a new one needs."""
 
 FAR = wp.constant(1.0e6)
 """[m] The distance of what is too far to matter."""
@@ -111,7 +112,7 @@ def distance_solid(kind: int, p: Any, a: Any, b: Any, c: Any):
 
 @wp.func
 def way_in(kind: int, p: Any, u: Any, a: Any, b: Any, c: Any):
-    """Return where a way of the substep that ends at p and is u long enters a convex shape.
+    """Return where a way of the substep that ends at p and is u long enters a shape with a formula.
 
     Returns:
         The distance of p from the plane that touches the shape there, its normal, and whether the way enters at all

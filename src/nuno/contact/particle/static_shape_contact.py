@@ -47,7 +47,7 @@ def touch_still(t: Any, n: int, shapes: Shapes, s: int, dt: float, rank: int, si
             u = position(t, i) - start_position(t, i)
             normal = r * local
             un = dot(u, normal)
-            if kind < PLANE and wp.min(gap, gap - un) < 0.0:
+            if kind != PLANE and wp.min(gap, gap - un) < 0.0:
                 entered_at, entered, met = way_in(kind, p, transposed_mul(r, u), sa, sb, sc)
                 if met > 0.0:
                     gap = entered_at

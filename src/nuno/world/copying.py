@@ -1,4 +1,4 @@
-"""Saving a world: snapshots and files, and imagined worlds of which one is adopted."""
+"""Copying a world: snapshots and files, and imagined worlds of which one is adopted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 
-class Saving(Running):
+class Copying(Running):
     """A simulation with the verbs of time, and those of copies."""
 
     def save(self, path: str | os.PathLike[str] | None = None) -> Snapshot:
@@ -143,7 +143,7 @@ class Saving(Running):
             InvalidInputError: not imagined from this world, or ``k`` or ``world`` out of range.
             BodyStateError: this world is a batch itself, and ``world`` does not say which one is meant.
         """
-        if not isinstance(futures, Saving) or futures is self or futures._family != self._family:
+        if not isinstance(futures, Copying) or futures is self or futures._family != self._family:
             raise InvalidInputError("adopt needs a world that imagine of this world returned")
         with futures._change("adopt"):
             snapshot = capture(futures, self._engine.name).pick(check_world_index(k, futures.world_count))
