@@ -56,11 +56,14 @@ def importing_kernels() -> Iterator[None]:
     """Let Python look for no garbage meanwhile, as it would hundreds of times: a sixth of what importing takes.
 
     Nor does it look among what is there then, 300,000 objects, until and when the process ends, which took 0.7 s of CPU
-    time there.
+    time there. Warp looks for function arguments only where there are any (`nuno.kernels.function_arguments`).
     """
+    from nuno.kernels.function_arguments import look_for_function_arguments_where_taken
+
     was_enabled = gc.isenabled()
     gc.disable()
     try:
+        look_for_function_arguments_where_taken()
         yield
     finally:
         gc.freeze()
