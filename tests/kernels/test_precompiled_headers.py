@@ -10,7 +10,7 @@ import warp as wp
 from warp._src import context
 
 from nuno.kernels import precompiled_headers
-from nuno.kernels.precompiled_headers import compiling
+from nuno.kernels.precompiled_headers import begin_to_read_headers, compiling
 
 NAME = "headers.pch"
 
@@ -77,6 +77,15 @@ def test_a_thread_reads_them_itself_where_reading_ahead_failed(folder, made):
     with compiling(threading.Event()):
         assert context.runtime.get_clang_pch_dir() == str(folder)
     assert list(folder.iterdir()) == []
+
+
+def test_they_are_read_once(monkeypatch):
+    """Who asks later gets the same files."""
+    reads = []
+    monkeypatch.setattr(precompiled_headers, "_made", None)
+    monkeypatch.setattr(precompiled_headers, "_read", lambda: reads.append(True) or [])
+    assert begin_to_read_headers() is begin_to_read_headers()
+    assert begin_to_read_headers().result() == [] and len(reads) == 1
 
 
 def test_a_warp_of_another_form_is_left(monkeypatch):
