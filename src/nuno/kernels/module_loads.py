@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 from nuno.kernels.compile_watch import waited
@@ -36,17 +37,15 @@ def load_ahead(modules: Iterable[tuple[Any, int | None]], device: str, threads: 
         options: dict[str, Any] = {} if block is None else {"block_dim": block}
         if key not in _loads or _loads[key].done():
             _written[key] = threading.Event()
-            _loads[key] = pool.submit(_load, module, device, options, _written[key])
+            _loads[key] = pool.submit(_load, partial(wp.load_module, module, device, **options), _written[key])
     pool.shutdown(wait=False)
 
 
-def _load(module: Any, device: str, options: dict[str, Any], written: threading.Event) -> None:
-    import warp as wp
-
+def _load(load: Callable[[], Any], written: threading.Event) -> None:
     from nuno.kernels.precompiled_headers import compiling
 
     with compiling(written):
-        wp.load_module(module, device, **options)
+        load()
 
 
 def wait_for_source(module: Any, device: str, block: int | None = None) -> None:
