@@ -79,6 +79,28 @@ def test_a_thread_reads_them_itself_where_reading_ahead_failed(folder, made):
     assert list(folder.iterdir()) == []
 
 
+def test_a_thread_reads_them_itself_where_reading_ahead_does_not_end(folder, made, monkeypatch):
+    """As in a process that was forked meanwhile: its thread is not there."""
+    monkeypatch.setattr(precompiled_headers, "PATIENCE", 0.01)
+    with compiling(threading.Event()):
+        assert context.runtime.get_clang_pch_dir() == str(folder)
+    assert not made.done() and list(folder.iterdir()) == []
+
+
+def test_a_copy_is_whole_or_not_there(folder, made, tmp_path, monkeypatch):
+    """Where the disk is full halfway, the thread reads the headers itself."""
+
+    def fail(_, to):
+        to.write_bytes(b"half")
+        raise OSError("no space left on device")
+
+    read(made, tmp_path)
+    monkeypatch.setattr(precompiled_headers.shutil, "copyfile", fail)
+    with compiling(threading.Event()):
+        assert context.runtime.get_clang_pch_dir() == str(folder)
+    assert not (folder / NAME).exists()
+
+
 def test_they_are_read_once(monkeypatch):
     """Who asks later gets the same files."""
     reads = []

@@ -16,7 +16,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,9 @@ from nuno.numbers.cpu_compiler import compile_quickly
 
 MODULE = "nuno.kernels.precompiled_headers"
 """A Warp module that is nothing but headers, compiled as those of an estimate are."""
+
+PATIENCE = 30.0
+"""[s] A thread that has waited so long for the headers reads them itself."""
 
 _here = threading.local()
 _lock = threading.Lock()
@@ -79,6 +82,23 @@ def _read() -> list[Path]:
     return [] if made is None else sorted(Path(made()).iterdir())
 
 
+def _read_ahead() -> list[Path]:
+    """The files, if there are any: none where reading has failed, or does not end, as in a process that was forked."""
+    try:
+        return [] if _made is None else _made.result(PATIENCE)
+    except Exception:
+        return []
+
+
+def _copy(files: list[Path], folder: Path) -> None:
+    """Copy what is not there yet, each file whole or not at all."""
+    for path in files:
+        if not (folder / path.name).exists():
+            with suppress(OSError):
+                shutil.copyfile(path, folder / f"{path.name}.part")
+                (folder / f"{path.name}.part").replace(folder / path.name)
+
+
 def _own_folder() -> Any:
     """Warp's function that gives the folder of a thread's precompiled headers; None if it has no such function."""
     from warp._src import context
@@ -101,10 +121,8 @@ def _take_headers() -> bool:
         written: threading.Event | None = getattr(_here, "source_written", None)
         if written is not None:
             written.set()
-            if folder is not None and _made is not None and _made.exception() is None:
-                for path in _made.result():
-                    if not (Path(folder) / path.name).exists():
-                        shutil.copyfile(path, Path(folder) / path.name)
+            if folder is not None:
+                _copy(_read_ahead(), Path(folder))
         return folder
 
     get_clang_pch_dir.takes_headers = True  # type: ignore[attr-defined]
