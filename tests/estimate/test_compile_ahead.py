@@ -78,6 +78,26 @@ def test_none_waits_for_another_by_its_flags(asked):
 
 
 @pytest.mark.parametrize("cached", [False, True])
+def test_an_empty_cache_has_headers_read_and_the_longest_written_first(monkeypatch, cached):
+    """Before the estimate goes on; of a full cache nothing is waited for."""
+    begun, may_end = [], threading.Event()
+
+    def load(module, device, **options):
+        if module.name == "nuno.plans.run_lanes" and not cached:
+            begun.append("written")
+        elif cached:
+            assert may_end.wait(60.0)
+
+    monkeypatch.setattr(wp, "load_module", load)
+    monkeypatch.setattr(compile_ahead, "is_cached", lambda *_: cached)
+    monkeypatch.setattr(compile_ahead, "begin_to_read_headers", lambda: begun.append("headers"))
+    wait = compile_ahead.compile_ahead("cpu")
+    assert begun == ([] if cached else ["headers", "written"])
+    may_end.set()
+    wait()
+
+
+@pytest.mark.parametrize("cached", [False, True])
 def test_both_sizes_of_batches_are_compiled_on_cuda(asked, monkeypatch, caplog, cached):
     """By blocks as they are launched, told by name before anything waits; of what is in the cache nothing is loaded."""
     monkeypatch.setattr(compile_ahead, "is_cached", lambda *_: cached)

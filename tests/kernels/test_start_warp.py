@@ -3,8 +3,9 @@
 import gc
 
 import pytest
+import warp as wp
 
-from nuno.kernels import start_warp
+from nuno.kernels import kernel_cache, precompiled_headers, start_warp
 from nuno.kernels.start_warp import begin_to_start_warp, importing_kernels
 
 
@@ -43,3 +44,14 @@ def test_what_goes_wrong_on_the_thread_is_raised(monkeypatch):
     monkeypatch.setattr(start_warp, "start_warp", fail)
     with pytest.raises(RuntimeError, match="no driver"):
         begin_to_start_warp().result()
+
+
+@pytest.mark.parametrize(("devices", "cached", "begins"), [(0, False, True), (0, True, False), (1, False, False)])
+def test_headers_are_read_where_the_cpu_has_to_compile(monkeypatch, devices, cached, begins):
+    """Not where its kernels are in the cache, nor where a device may be what runs them."""
+    begun = []
+    monkeypatch.setattr(wp, "get_cuda_device_count", lambda: devices)
+    monkeypatch.setattr(kernel_cache, "is_cached", lambda *_: cached)
+    monkeypatch.setattr(precompiled_headers, "begin_to_read_headers", lambda: begun.append(True))
+    start_warp._read_headers_for("nuno.plans.run_lanes")
+    assert bool(begun) == begins

@@ -169,7 +169,7 @@ def _residuals(numbers: np.ndarray, chosen: Chosen, camera: Camera, table: Table
     assert table.half_extents is not None
     middle = np.asarray(table.centre or (0.0, 0.0)) + numbers[5:7]
     half = np.asarray(table.half_extents) + numbers[7:9]
-    corners = border(replace(table, centre=tuple(middle), half_extents=tuple(np.maximum(half, 1e-3))))
+    corners = _corners(middle, np.maximum(half, 1e-3), table.height)
     found = []
     for k, side, line in chosen:
         begin, end = corners[k], corners[(k + 1) % 4]
@@ -236,6 +236,10 @@ def corrected(camera: Camera, table: Table, errors: np.ndarray) -> tuple[Camera,
 def border(table: Table) -> np.ndarray:
     """(4, 3) float, the corners of a table's top [m], around it."""
     assert table.half_extents is not None
+    return _corners(np.asarray(table.centre or (0.0, 0.0)), np.asarray(table.half_extents), table.height)
+
+
+def _corners(middle: np.ndarray, half: np.ndarray, height: float) -> np.ndarray:
+    """(4, 3) float, the corners of a top of half sizes (2,) about a middle (2,) [m]."""
     signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    at = np.asarray(table.centre or (0.0, 0.0)) + signs * np.asarray(table.half_extents)
-    return np.column_stack([at, np.full(4, table.height)])
+    return np.column_stack([middle + signs * half, np.full(4, height)])

@@ -1,7 +1,8 @@
 """An estimate's kernels, compiled on other threads while the images are looked at.
 
 With an empty kernel cache most of the wait is for one of them, that of a batch in lanes or by blocks; the others are
-compiled beside it.
+compiled beside it. On the CPU nothing else is done in Python until that one's source is written, for the compiler then
+has more to do than all that is left.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import warp as wp
 from nuno.camera import extent, raster
 from nuno.estimate import pattern, similarity
 from nuno.kernels.kernel_cache import is_cached
-from nuno.kernels.module_loads import load_ahead, wait_for_load
+from nuno.kernels.module_loads import load_ahead, wait_for_load, wait_for_source
+from nuno.kernels.precompiled_headers import begin_to_read_headers
 from nuno.plans.block_plan import FEW_THREADS, MANY_THREADS, run_blocks_many, run_blocks_shared
 from nuno.plans.cloth_worlds import run_lanes
 from nuno.plans.cpu_threads import core_count
@@ -43,7 +45,12 @@ def compile_ahead(device: str) -> Callable[[], None]:
     parts = [wp.get_module(part.__name__) for part in (pack, extent, raster, similarity, pattern)]
     if device == "cpu":
         parts.insert(0, run_lanes.module)
+        is_compiled = is_cached(f"{run_lanes.module.name}_*", "o")
+        if not is_compiled:
+            begin_to_read_headers()
         load_ahead(((part, None) for part in parts), device, THREADS)
+        if not is_compiled:
+            wait_for_source(run_lanes.module, device)
     else:
         parts.append(pack.find_broken.module)
         every = [(kernel.module, block) for kernel, block in BATCHES]

@@ -157,8 +157,9 @@ def estimate_pick(
         device=device, engine=engine, progress=progress, hand_std=hand_std, hand_path=hand_path,
     )  # fmt: skip
     images = read_images(before, after, before_mask, after_mask, hidden, settings.camera)
-    wait_for_kernels = compile_ahead(settings.device)
     stages.end("read")
+    wait_for_kernels = compile_ahead(settings.device)
+    stages.end("compile")
     measured = rectangle is None
     doubt = with_view_of_table(settings, images) if measured else TableDoubt(settings)
     settings = doubt.settings

@@ -14,6 +14,8 @@ from nuno.kernels.start_warp import begin_to_start_warp, importing_kernels
 
 KERNELS = "nuno.plans.run_blocks_shared"
 """Of a batch of picks on CUDA, compiled for about a minute."""
+CPU_KERNELS = "nuno.plans.run_lanes"
+"""The same for the CPU, compiled for most of the wait for a first answer."""
 
 
 def add_pick(commands: Any) -> argparse.ArgumentParser:
@@ -50,7 +52,7 @@ def run_pick(options: argparse.Namespace) -> str:
     with importing_kernels():
         import warp  # noqa: F401 (before a thread does)
 
-        starting = begin_to_start_warp()
+        starting = begin_to_start_warp(CPU_KERNELS if options.engine == "nuno" else None)
         from nuno.estimate.case import read_case
 
     parts = options.candidates.lower().split("x")

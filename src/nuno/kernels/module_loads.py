@@ -6,14 +6,17 @@ once more, so whoever launches waits first.
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 from nuno.kernels.compile_watch import waited
 
 _loads: dict[tuple[str, str, int | None], Future[Any]] = {}
+_written: dict[tuple[str, str, int | None], threading.Event] = {}
 
 
 def load_ahead(modules: Iterable[tuple[Any, int | None]], device: str, threads: int) -> None:
@@ -33,8 +36,31 @@ def load_ahead(modules: Iterable[tuple[Any, int | None]], device: str, threads: 
         key = (module.name, device, block)
         options: dict[str, Any] = {} if block is None else {"block_dim": block}
         if key not in _loads or _loads[key].done():
-            _loads[key] = pool.submit(wp.load_module, module, device, **options)
+            _written[key] = threading.Event()
+            _loads[key] = pool.submit(_load, partial(wp.load_module, module, device, **options), _written[key])
     pool.shutdown(wait=False)
+
+
+def _load(load: Callable[[], Any], written: threading.Event) -> None:
+    from nuno.kernels.precompiled_headers import compiling
+
+    with compiling(written):
+        load()
+
+
+def wait_for_source(module: Any, device: str, block: int | None = None) -> None:
+    """Wait until the source of a module that is being loaded has been written, or the load is over.
+
+    Until then Python's lock is what its thread needs; from then on the compiler has work for a core, and none for
+    Python.
+
+    Args:
+        module: As in `wait_for_load`.
+        device: As in `load_ahead`.
+        block: As in `load_ahead`.
+    """
+    if written := _written.get((module.name, device, block)):
+        written.wait()
 
 
 def wait_for_load(module: Any, device: str, block: int | None = None) -> None:

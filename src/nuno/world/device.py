@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 from nuno.errors import InvalidInputError
+from nuno.kernels.function_arguments import look_for_function_arguments_where_taken
 from nuno.kernels.kernel_cache import take_machine_code
 from nuno.kernels.quiet import quiet_warp
 from nuno.kernels.struct_references import pass_structs_by_reference
@@ -30,6 +31,7 @@ def found_device(name: str) -> str:
     """
     quiet_warp()
     pass_structs_by_reference()
+    look_for_function_arguments_where_taken()
     if name == "cpu":
         return name
     import warp as wp
