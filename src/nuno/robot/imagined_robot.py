@@ -219,12 +219,8 @@ class ImaginedRobot:
             return
         aims = [own.begin(end, span, servo) for own in self._motions]
         if span > 0.0:
-            commands = [
-                self.balance.command(state, aim, span, self._servo)
-                for state, aim in zip(self._states, aims, strict=True)
-            ]
-            self.balance.dynamics.drive(*(np.array(part) for part in zip(*commands, strict=True)))
-            self.balance.dynamics.lead_fingers(np.array([self.original.actual.angles_of(aim.q) for aim in aims]))
+            self.balance.dynamics.drive(*self.balance.command(self._states, aims, span, self._servo))
+            self.balance.dynamics.lead_fingers(self.original.actual.angles_of(np.array([aim.q for aim in aims])))
 
     def end_frame(self) -> None:
         """Take the frame's motion as done."""
@@ -238,10 +234,7 @@ class ImaginedRobot:
             ]
             return
         ended = self.balance.ended(max(self.world.time - self._before[0].time, 1e-9))
-        self._states = [
-            self.balance.judge(before, own.aim, *found, self.world.time)
-            for before, own, found in zip(self._states, self._motions, ended, strict=True)
-        ]
+        self._states = self.balance.judge(self._states, [own.aim for own in self._motions], ended, self.world.time)
         for own, state in zip(self._motions, self._states, strict=True):
             own.take_footing(state)
             own.joints.take_step((self.original.actual.angles_of(state.q), state.v[6:], state.a[6:]))
