@@ -74,13 +74,21 @@ class RigidContacts(RigidArrays):
         One is left out if it bounced away and another took its place in the row and pressed, all within the frame.
         """
         impulse, met = self._entries("impulse"), self._entries("met")
-        owner = self.table.parts.slot.numpy()
+        rows = np.unique(np.flatnonzero(impulse) // 3)
+        world, part, _ = np.unravel_index(rows, met.shape)
+        pairs = np.stack([self.table.parts.slot.numpy()[part], met.ravel()[rows]], axis=1)
+        # each gives the one and takes from the other, in the order of worlds, parts and rows
+        given = impulse.reshape(-1, 3)[rows]
+        given, worlds = np.stack([given, -given], axis=1).reshape(-1, 3), np.repeat(world, 2)
+        sides = np.stack([pairs, pairs[:, ::-1]], axis=1).reshape(-1, 2)
+        keys = sides[:, 0].astype(np.int64) * (1 << 32) + sides[:, 1]
         found: dict[int, dict[int, np.ndarray]] = {}
-        for world, p, k in np.argwhere(impulse.any(axis=-1)):
-            a, b = int(owner[p]), int(met[world, p, k])
-            for one, other, sign in ((a, b, 1.0), (b, a, -1.0)):
-                total = found.setdefault(one, {}).setdefault(other, np.zeros((self.world_count, 3)))
-                total[world] += sign * impulse[world, p, k]
+        _, firsts, kinds = np.unique(keys, return_index=True, return_inverse=True)
+        for kind in np.argsort(firsts).tolist():
+            own, (one, other) = kinds == kind, sides[firsts[kind]].tolist()
+            total = np.zeros((self.world_count, 3))
+            np.add.at(total, worlds[own], given[own])
+            found.setdefault(one, {})[other] = total
         return found
 
     def contact_count(self) -> np.ndarray:
