@@ -11,8 +11,8 @@ import numpy as np
 from nuno.dynamics.dynamics import dynamics_of
 from nuno.errors import BodyStateError, InvalidInputError
 from nuno.joints.held_points import held_points
-from nuno.joints.joint import Joint
-from nuno.joints.joint_drives import Motor, Spring
+from nuno.joints.joint import Joint, set_motors
+from nuno.joints.joint_drives import Spring
 from nuno.joints.joint_motion import positions_of, velocities_of
 from nuno.materials import Rigid
 from nuno.robot.finger_dynamics import FingerDynamics, possible_inertia
@@ -157,10 +157,7 @@ class LinkDynamics:
     ) -> None:  # fmt: skip
         """Set all motors: (n,) each, or (worlds, n)."""
         most = self.efforts + self.joint_friction
-        for n, joint in enumerate(self.joints):
-            joint.motor = Motor(
-                velocities[..., n], positions[..., n], stiffness[..., n], damping[..., n], most[n], effort[..., n]
-            )
+        set_motors(self.joints, positions, velocities, stiffness, damping, most, effort)
 
     def overcome(self, velocities: np.ndarray) -> np.ndarray:
         """Return what friction and damping take of joints that go at velocities [rad/s; m/s], of (n,) each."""
@@ -171,9 +168,12 @@ class LinkDynamics:
 
         The joints of their hands go where the fingers are.
         """
-        for row, angle in self.fingers.lead(wanted).items():
-            most = self.efforts[row] + self.joint_friction[row]
-            self.joints[row].motor = Motor(0.0, angle, self.stiffness[row], self.damping[row], most)
+        led = self.fingers.lead(wanted)
+        if led:
+            rows, angles = [*led], np.stack([*led.values()], axis=-1)
+            most = (self.efforts + self.joint_friction)[rows]
+            still = np.zeros(len(rows))
+            set_motors([self.joints[row] for row in rows], angles, still, self.stiffness[rows], self.damping[rows], most, still)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""
