@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -200,12 +200,9 @@ class Joint(Grip):
 
     def _set(self, numbers: Callable[[str, Any], dict[str, Any]], value: Any) -> None:
         world = self._live()
-        with world._change("set on a joint"):
-            drives = drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)
-            changed = replace(self.spec, drives=drives)
-            world.engine.allow_grip(changed, self.target is not None and self.target.is_dynamic)
-            self.spec = changed
-            world.engine.drives_changed(self)
+        _change_drives(
+            world, [self], lambda: [drive_table(world.world_count, numbers(self.kind, value), self.spec.drives)]
+        )
 
     def _poses(self) -> tuple[Any, Any]:
         """The joint's frame in the body and in the other, (worlds, 3) and (worlds, 4) each, in the world's frame."""
@@ -249,12 +246,21 @@ def set_motors(
     if worlds:
         raise InvalidInputError("the joints are in several worlds")
     motors = motor_table(positions, velocities, stiffness, damping, max_effort, effort)
-    with world._change("set on a joint"):
-        drives = np.stack([joint.spec.drives for joint in joints])  # (joints, worlds, ...)
+
+    def drives() -> np.ndarray:
+        tables = np.stack([joint.spec.drives for joint in joints])  # (joints, worlds, ...)
         for name, values in motors.items():
-            drives[:, :, DRIVES.index(name)] = np.broadcast_to(values, (world.world_count, len(joints))).T
-        for joint, own in zip(joints, drives, strict=True):
-            changed = replace(joint.spec, drives=own)
+            tables[:, :, DRIVES.index(name)] = np.broadcast_to(values, (world.world_count, len(joints))).T
+        return tables
+
+    _change_drives(world, joints, drives)
+
+
+def _change_drives(world: GripWorld, joints: Sequence[Joint], made: Callable[[], Iterable[np.ndarray]]) -> None:
+    """Give joints the drives (worlds, 11) that ``made`` returns, one a joint."""
+    with world._change("set on a joint"):
+        for joint, drives in zip(joints, made(), strict=True):
+            changed = replace(joint.spec, drives=drives)
             world.engine.allow_grip(changed, joint.target is not None and joint.target.is_dynamic)
             joint.spec = changed
             world.engine.drives_changed(joint)

@@ -176,10 +176,10 @@ class Balance:
             [sum(force[2] for force in contacts[w].get(link, {}).values()) for link in self._foot_links]
             for w in standing
         ], dtype=float)  # fmt: skip
-        states, aims, places, speeds = ([part[w] for w in standing] for part in (before, wanted, q, v))
-        footings: list[Footing] = stabiliser.footings(
-            states, aims, places, speeds, pressed, time, [self.load(own) for own in states]
-        )
+        states = [before[w] for w in standing]
+        aims, places, speeds = ([part[w] for w in standing] for part in (wanted, q, v))
+        loads = [self.load(own) for own in states]
+        footings: list[Footing] = stabiliser.footings(states, aims, places, speeds, pressed, time, loads)
         return footings
 
     def load(self, state: RobotState) -> Carried | None:

@@ -16,7 +16,7 @@ WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, eq=False)
 class FootKinematics:
-    """How centres of mass and soles are and move, in each of some worlds.
+    """Centres of mass and soles, and their motion, in each of some worlds.
 
     Attributes:
         centres: (worlds, 3, 3) places, velocities and accelerations of the centres of mass [m, m/s, m/s2].

@@ -79,7 +79,7 @@ def are_planned(heights: np.ndarray) -> np.ndarray:
 
 
 def planned_footings(heights: np.ndarray) -> list[Footing]:
-    """Return the footings of robots of which nothing is known yet, by the heights of wanted soles (worlds, feet) [m]."""
+    """Return the footings of robots of which nothing is known, by the heights of wanted soles (worlds, feet) [m]."""
     nothing = np.zeros((heights.shape[1], 3))
     return [Footing(tuple(own), nothing, nothing, np.zeros(3)) for own in are_planned(heights).tolist()]
 

@@ -168,12 +168,12 @@ class LinkDynamics:
 
         The joints of their hands go where the fingers are.
         """
-        led = self.fingers.lead(wanted)
-        if led:
-            rows, angles = [*led], np.stack([*led.values()], axis=-1)
+        there = self.fingers.lead(wanted)
+        if there:
+            rows, angles = [*there], np.stack([*there.values()], axis=-1)
+            joints, still = [self.joints[row] for row in rows], np.zeros(len(rows))
             most = (self.efforts + self.joint_friction)[rows]
-            still = np.zeros(len(rows))
-            set_motors([self.joints[row] for row in rows], angles, still, self.stiffness[rows], self.damping[rows], most, still)
+            set_motors(joints, angles, still, self.stiffness[rows], self.damping[rows], most, still)
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Return where the robot is, q (worlds, nq), and how it moves, v (worlds, nv), as Pinocchio has them."""

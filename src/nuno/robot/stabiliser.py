@@ -269,9 +269,7 @@ class Stabiliser:
             return np.zeros(3)
         there, now = (np.array(pin.centerOfMass(self._model, self._data, own))[:2] for own in (wanted.q, q))
         both = there + load.mass / (load.mass + self._mass) * (load.place[:2] - now)
-        corners = [
-            own @ turn[:2].T + place[:2] for own, place, turn in zip(self._outlines, places, turns, strict=True)
-        ]
+        corners = [own @ turn[:2].T + place[:2] for own, place, turn in zip(self._outlines, places, turns, strict=True)]
         outline = convex_outline(np.concatenate(corners))
         middle = outline.mean(axis=0)
         back = (nearest_in(middle + MIN_SHARE * (outline - middle), both) - both) * (1.0 + load.mass / self._mass)

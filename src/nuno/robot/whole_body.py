@@ -191,7 +191,7 @@ class WholeBodyControl:
         self, tasks: np.ndarray, wanted: np.ndarray, touching: np.ndarray, bears: np.ndarray, mass: np.ndarray,
         bias: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-        """Return whether anything fulfils the constraints, and what misses the tasks least, as `solve` does."""
+        """Return the motions and torques that miss the tasks least, as `solve` does."""
         (worlds, n), each = bias.shape, touching.shape[2]
         transposed = tasks.swapaxes(1, 2)
         hessians, linears = transposed @ tasks, -(transposed @ wanted[:, :, None])[:, :, 0]

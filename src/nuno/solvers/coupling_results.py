@@ -103,13 +103,13 @@ class CouplingResults:
         """
         given = self._impulses.numpy().reshape(self.world_count, self._bodies, self._bodies, 3)
         pairs = np.unique(np.flatnonzero(given) // 3 % self._bodies**2)
-        touched = np.zeros((self._bodies, self._bodies), dtype=bool)
-        touched.ravel()[pairs] = True
-        touched |= touched.T
+        pushing = np.zeros((self._bodies, self._bodies), dtype=bool)
+        pushing.ravel()[pairs] = True
+        pushing |= pushing.T
         unit = IMPULSE_UNIT * np.sqrt(self._rate)
         return {
             row: {other: given[:, row, other] * unit - given[:, other, row] * unit
-                  for other in np.flatnonzero(touched[row]).tolist()}
+                  for other in np.flatnonzero(pushing[row]).tolist()}
             for row in rows
         }  # fmt: skip
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import warp as wp
 
 from nuno.rigid.manifold import POINTS
-from nuno.rigid.rigid_arrays import RigidArrays
+from nuno.rigid.rigid_arrays import SAVED, RigidArrays
+from nuno.rigid.saved_contacts import LASTING, LISTING
 from nuno.shapes.quaternion import rotate
 
 
@@ -90,6 +92,23 @@ class RigidContacts(RigidArrays):
             np.add.at(total, worlds[own], given[own])
             found.setdefault(one, {})[other] = total
         return found
+
+    def copies(self, into: Mapping[tuple[str, str], wp.array]) -> dict[tuple[str, str], wp.array]:
+        """Return copies of all that the next step depends on, by whose it is and its name.
+
+        Args:
+            into: Copies of before that are not needed any more, or none: new memory takes longer than the copy.
+        """
+        made = {}
+        for owner, names in (("state", SAVED), ("manifolds", (*LASTING, *LISTING))):
+            for name in names:
+                own, there = getattr(getattr(self, owner), name), into.get((owner, name))
+                if there is None or there.size != own.size:
+                    made[owner, name] = wp.clone(own)
+                else:
+                    wp.copy(there, own)
+                    made[owner, name] = there
+        return made
 
     def contact_count(self) -> np.ndarray:
         """(worlds,) int: points at which bodies press on each other."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -91,7 +92,13 @@ class Advancing(Simulation):
             elif not self._run_looking(now, stop, look, instants, moving if careful else None):
                 return False
             now = stop
-        broken = [(body, np.atleast_1d(dynamics.finite())) for body, dynamics in moving.items()]
+        rigid: Any = next((dynamics for dynamics in moving.values() if dynamics.is_rigid), None)
+        sound = rigid is not None and rigid.solver.finite().all()  # all of them at once
+        broken = [
+            (body, np.atleast_1d(dynamics.finite()))
+            for body, dynamics in moving.items()
+            if not (sound and dynamics.is_rigid)
+        ]
         if self._must_repeat(moving):
             return False
         self._stepping.careful = not self._quiet and are_fast(moving)

@@ -85,8 +85,10 @@ def holding(grip: Grip, worlds: int) -> np.ndarray:
 
 def _connected(joined: np.ndarray) -> np.ndarray:
     """Return (n, worlds), the first of all that each of n is joined to, through others too; joined (n, n, worlds)."""
-    a, b, column = np.nonzero(joined)
     n, worlds = joined.shape[1:]
+    if worlds > 1 and (joined == joined[..., :1]).all():
+        return np.repeat(_connected(joined[..., :1]), worlds, axis=1)
+    a, b, column = np.nonzero(joined)
     first = np.repeat(np.arange(n)[:, None], worlds, axis=1)
     while True:
         least = np.minimum(first[a, column], first[b, column])
