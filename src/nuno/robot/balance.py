@@ -84,12 +84,15 @@ class Balance:
         rates = np.array([own.v[6:] for own in wanted])
         values = [angles, rates, *(np.tile(own, (worlds, 1)) for own in (dynamics.stiffness, dynamics.damping))]
         values.append(np.zeros(angles.shape))
-        if self.is_on and stabiliser is not None:
-            who = [w for w, own in enumerate(now) if own.fallen is None]
-            found, *motion = self._solved([now[w] for w in who], [wanted[w] for w in who], span)
-            who, (accelerations, efforts) = np.array(who, dtype=int)[found], (own[found] for own in motion)
-            speeds = np.array([now[w].v[6:] for w in who.tolist()]).reshape(len(who), -1)
-            present = self._robot.angles_of(np.array([now[w].q for w in who.tolist()]).reshape(len(who), -1))
+        standing = [w for w, own in enumerate(now) if own.fallen is None]
+        if self.is_on and stabiliser is not None and standing:
+            states = [now[w] for w in standing]
+            motion = stabiliser.actual([own.q for own in states], [own.v for own in states])
+            aims = stabiliser.aims(states, [wanted[w] for w in standing], now[0].time + span)
+            found, *solved = self._control.solve(states, motion, aims)
+            who, (accelerations, efforts) = np.array(standing)[found], (own[found] for own in solved)
+            speeds = np.array([own.v[6:] for own in states])[found]
+            present = self._robot.angles_of(np.array([own.q for own in states]))[found]
             error = angles[who] - present
             effort = efforts + dynamics.overcome(rates[who] + error / NEARS)
             goal = present + span * speeds, speeds + 0.5 * span * accelerations[:, 6:]
@@ -101,16 +104,6 @@ class Balance:
             for part, own in zip(values, given, strict=True):
                 part[:, servo.rows] = own
         return tuple(values)
-
-    def _solved(
-        self, now: Sequence[RobotState], wanted: Sequence[RobotState], span: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what `WholeBodyControl.solve` does of robots that stand, in each world."""
-        stabiliser: Any = self._stabiliser
-        if not now:
-            return np.zeros(0, dtype=bool), np.zeros((0, self._robot.model.nv)), np.zeros((0, self._robot.model.nv - 6))
-        motion = stabiliser.actual([own.q for own in now], [own.v for own in now])
-        return self._control.solve(now, motion, stabiliser.aims(now, wanted, now[0].time + span))
 
     def judge(
         self, before: Sequence[RobotState], wanted: Sequence[RobotState], ended: Sequence[tuple[Any, ...]], time: float
