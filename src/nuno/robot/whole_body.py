@@ -48,7 +48,7 @@ class Gains:
     """Weights of the tasks, and how fast errors are to vanish.
 
     Attributes:
-        centre, trunk, foot, posture, force: Weights.
+        centre, trunk, foot, posture, force: Weights, above 0.
         catch, swing: Weights of the centre of mass along the ground and of the foot in the air, in a step that catches
             the robot.
         centre_rate, trunk_rate, foot_rate, posture_rate: Of the double pole that errors follow [1/s].
