@@ -146,8 +146,10 @@ class BuiltinEngine(Engine):
         for coupled in self._stepping.last:
             index, borne, along = coupled.joint_loads()
             pairs = [(n, index[joint]) for n, joint in enumerate(joints) if joint in index]
-            own, their = ([*part] for part in zip(*pairs, strict=True)) if pairs else ([], [])
-            kept = np.array([coupled.kept[joints[n].body] for n in own], dtype=bool).reshape(len(own), -1).T
+            if not pairs:
+                continue
+            own, their = ([*part] for part in zip(*pairs, strict=True))
+            kept = np.array([np.broadcast_to(coupled.kept[joints[n].body], (worlds,)) for n in own]).T
             wrenches[:, own] = np.where(kept[..., None], borne[:, their], wrenches[:, own])
             efforts[:, own] = np.where(kept, along[:, their], efforts[:, own])
         return wrenches, efforts
