@@ -382,3 +382,17 @@ def test_motors_are_set_together_as_each_by_itself():
     own[0].release()
     with pytest.raises(nuno.BodyStateError):
         set_motors(own, position, velocity, stiffness, damping, most, effort)
+
+
+def test_loads_are_read_together_beside_bodies_without_joints():
+    """Wrenches and efforts of all joints at once are those of each by itself, while a box lies on a cloth elsewhere."""
+    world = nuno.World(device="cpu")
+    joints = linkage(world, ("hinge", "slider"))
+    world.add(nuno.box((0.5, 0.5, 0.02), position=(2.0, 0.0, 0.5)))
+    world.attach(world.add(nuno.sheet((0.2, 0.2), cells=(6, 6), position=(2.0, 0.0, 0.512))), nuno.Cloth(0.2))
+    world.attach(world.add(nuno.box((0.05, 0.05, 0.05), position=(2.0, 0.0, 0.539))), nuno.Rigid(mass=0.1))
+    world.run(3 / 60)
+    wrenches, efforts = world.engine.joint_loads(joints)
+    np.testing.assert_array_equal(wrenches, [[np.concatenate(joint.wrench) for joint in joints]])
+    np.testing.assert_array_equal(efforts, [[joint.effort for joint in joints]])
+    assert wrenches.any()
